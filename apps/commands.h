@@ -1,0 +1,20 @@
+#pragma once
+
+#include <CLI/CLI.hpp>
+
+#include "core/error.h"
+
+namespace evac {
+
+/// Each adds one subcommand of `evac` to `app`; when it was chosen, its callback does the work and sets `exit_code`.
+/// Callbacks may throw Error; `main` prints it and ends with its exit code. One file each: command_run.cpp, …
+void AddRun(CLI::App& app, ExitCode& exit_code);
+void AddResume(CLI::App& app, ExitCode& exit_code);
+void AddJudge(CLI::App& app, ExitCode& exit_code);
+void AddCorrelate(CLI::App& app, ExitCode& exit_code);
+void AddReport(CLI::App& app, ExitCode& exit_code);
+void AddValidate(CLI::App& app, ExitCode& exit_code);
+void AddDoctor(CLI::App& app, ExitCode& exit_code);
+void AddLs(CLI::App& app, ExitCode& exit_code);
+
+}  // namespace evac

@@ -1,0 +1,35 @@
+#include <fmt/core.h>
+
+#include <cstdio>
+
+#include "apps/commands.h"
+#include "core/version.h"
+
+int main(int argc, char** argv) {
+  CLI::App app("evac: find out, without a robot, how well a policy works.", "evac");
+  app.set_version_flag("--version", EVAC_VERSION);
+  app.require_subcommand(1);
+  app.footer("First steps:\n  evac run apps/configs/demo.yaml --out out/demo\n  evac report out/demo\n"
+             "Exit codes: 0 ok, 1 the answer is no, 2 invalid input, 3 inconclusive, 4 internal error.");
+  evac::ExitCode exit_code = evac::ExitCode::kOk;
+  try {
+    evac::AddRun(app, exit_code);
+    evac::AddResume(app, exit_code);
+    evac::AddJudge(app, exit_code);
+    evac::AddCorrelate(app, exit_code);
+    evac::AddReport(app, exit_code);
+    evac::AddValidate(app, exit_code);
+    evac::AddDoctor(app, exit_code);
+    evac::AddLs(app, exit_code);
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& error) {
+    return app.exit(error) == 0 ? 0 : static_cast<int>(evac::ExitCode::kInvalidInput);
+  } catch (const evac::Error& error) {
+    fmt::print(stderr, "evac: {}\n", error.what());
+    return static_cast<int>(error.exit_code());
+  } catch (const std::exception& error) {
+    fmt::print(stderr, "evac: internal error: {}\n", error.what());
+    return static_cast<int>(evac::ExitCode::kInternal);
+  }
+  return static_cast<int>(exit_code);
+}

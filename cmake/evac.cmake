@@ -1,0 +1,45 @@
+# How a module and a test are declared. A module is a folder of .cpp files that becomes the library evac_NAME.
+
+find_program(EVAC_CCACHE ccache)
+if(EVAC_CCACHE)
+  set(CMAKE_CXX_COMPILER_LAUNCHER ${EVAC_CCACHE})
+endif()
+
+set(EVAC_SANITIZE "" CACHE STRING "Sanitizers to build with, e.g. address,undefined")
+add_library(evac_options INTERFACE)
+target_compile_options(evac_options INTERFACE -Wall -Wextra -Werror)
+target_include_directories(evac_options INTERFACE ${CMAKE_SOURCE_DIR} ${CMAKE_BINARY_DIR})
+if(EVAC_SANITIZE)
+  add_compile_options(-fsanitize=${EVAC_SANITIZE} -fno-omit-frame-pointer -fno-sanitize-recover=all)
+  add_link_options(-fsanitize=${EVAC_SANITIZE})
+endif()
+
+# evac_module(NAME [LIBRARIES ...]): all .cpp files below this folder, except those in EXCLUDE.
+function(evac_module name)
+  cmake_parse_arguments(ARG "" "" "LIBRARIES;EXCLUDE" ${ARGN})
+  file(GLOB_RECURSE sources CONFIGURE_DEPENDS ${CMAKE_CURRENT_SOURCE_DIR}/*.cpp)
+  foreach(pattern ${ARG_EXCLUDE})
+    list(FILTER sources EXCLUDE REGEX ${pattern})
+  endforeach()
+  if(NOT sources)
+    add_library(evac_${name} INTERFACE)
+    target_link_libraries(evac_${name} INTERFACE evac_options ${ARG_LIBRARIES})
+    return()
+  endif()
+  add_library(evac_${name} STATIC ${sources})
+  target_link_libraries(evac_${name} PUBLIC evac_options ${ARG_LIBRARIES})
+endfunction()
+
+# evac_test(NAME [LIBRARIES ...]): all *_test.cpp below this folder become the binary bin/NAME_test, run by ctest.
+function(evac_test name)
+  cmake_parse_arguments(ARG "" "" "LIBRARIES" ${ARGN})
+  file(GLOB_RECURSE sources CONFIGURE_DEPENDS ${CMAKE_CURRENT_SOURCE_DIR}/*_test.cpp)
+  if(NOT sources)
+    return()
+  endif()
+  add_executable(${name}_test ${sources})
+  target_link_libraries(${name}_test PRIVATE evac_options evac_test_support ${ARG_LIBRARIES} GTest::gmock GTest::gtest_main)
+  target_compile_definitions(${name}_test PRIVATE EVAC_SOURCE_DIR="${CMAKE_SOURCE_DIR}"
+    EVAC_SHARED_DIR="${CMAKE_SOURCE_DIR}/../shared" EVAC_BIN_DIR="${CMAKE_BINARY_DIR}/bin")
+  add_test(NAME ${name} COMMAND ${name}_test)
+endfunction()

@@ -1,0 +1,232 @@
+#include "core/config.h"
+
+#include <algorithm>
+#include <cstdint>
+#include <limits>
+#include <sstream>
+
+#include "core/file.h"
+
+namespace evac {
+namespace {
+
+int EditDistance(const std::string& a, const std::string& b) {
+  std::vector<int> row(b.size() + 1);
+  for (std::size_t j = 0; j <= b.size(); ++j) row[j] = static_cast<int>(j);
+  for (std::size_t i = 1; i <= a.size(); ++i) {
+    int diagonal = row[0];
+    row[0] = static_cast<int>(i);
+    for (std::size_t j = 1; j <= b.size(); ++j) {
+      const int above = row[j];
+      row[j] = std::min({row[j] + 1, row[j - 1] + 1, diagonal + (a[i - 1] != b[j - 1])});
+      diagonal = above;
+    }
+  }
+  return row[b.size()];
+}
+
+std::string Shown(const YAML::Node& node) {
+  if (!node.IsDefined() || node.IsNull()) return "nothing";
+  if (node.IsMap()) return "a mapping";
+  if (node.IsSequence()) return "a list";
+  return "'" + node.Scalar() + "'";
+}
+
+template <typename T>
+const char* kTypeName = "a value";
+template <>
+const char* kTypeName<bool> = "true or false";
+template <>
+const char* kTypeName<int> = "a whole number";
+template <>
+const char* kTypeName<std::uint64_t> = "a whole number, 0 or more";
+template <>
+const char* kTypeName<double> = "a number";
+template <>
+const char* kTypeName<std::string> = "a text";
+template <>
+const char* kTypeName<std::vector<double>> = "a list of numbers";
+template <>
+const char* kTypeName<std::vector<std::string>> = "a list of texts";
+template <>
+const char* kTypeName<std::vector<std::uint64_t>> = "a list of whole numbers, 0 or more";
+
+/// Sorted keys, one line a scalar: what two files with the same content agree on.
+void WriteCanonical(const YAML::Node& node, const std::string& field, std::ostringstream& out) {
+  if (node.IsMap()) {
+    std::vector<std::string> keys;
+    for (const auto& item : node) keys.push_back(item.first.Scalar());
+    std::sort(keys.begin(), keys.end());
+    for (const std::string& key : keys) WriteCanonical(node[key], field + "." + key, out);
+  } else if (node.IsSequence()) {
+    for (std::size_t i = 0; i < node.size(); ++i) WriteCanonical(node[i], field + "." + std::to_string(i), out);
+  } else {
+    out << field << "=" << (node.IsScalar() ? node.Scalar() : "~") << "\n";
+  }
+}
+
+YAML::Node Parse(const std::string& text, const std::filesystem::path& file) {
+  try {
+    YAML::Node node = YAML::Load(text);
+    if (!node.IsMap()) throw InvalidInput("{}: found {}, wanted a YAML mapping (key: value)", file.string(), Shown(node));
+    return node;
+  } catch (const YAML::Exception& error) {
+    throw InvalidInput("{}:{}: not YAML: {}", file.string(), error.mark.line + 1, error.msg);
+  }
+}
+
+YAML::Node Step(const YAML::Node& node, const std::string& key) {
+  if (node.IsMap()) return node[key];
+  const bool is_index = !key.empty() && key.size() < 7 && std::all_of(key.begin(), key.end(), ::isdigit);
+  if (node.IsSequence() && is_index && std::stoul(key) < node.size()) return node[std::stoul(key)];
+  return YAML::Node(YAML::NodeType::Undefined);
+}
+
+}  // namespace
+
+Config::Config(YAML::Node node, std::filesystem::path file, std::string field)
+    : node_(std::move(node)), file_(std::move(file)), field_(std::move(field)) {}
+
+Config Config::FromFile(const std::filesystem::path& path) { return FromText(ReadFile(path), path); }
+
+Config Config::FromText(const std::string& text, const std::filesystem::path& name) { return Config(Parse(text, name), name, ""); }
+
+void Config::Set(const std::string& assignment) {
+  const std::size_t equals = assignment.find('=');
+  if (equals == std::string::npos || equals == 0) throw InvalidInput("--set {}: wanted path.to.field=VALUE", assignment);
+  std::vector<std::string> keys;
+  std::istringstream path(assignment.substr(0, equals));
+  for (std::string key; std::getline(path, key, '.');) keys.push_back(key);
+
+  YAML::Node parent = node_;  // reset, never assigned: assignment would write into the tree
+  for (std::size_t i = 0; i + 1 < keys.size(); ++i) {
+    const YAML::Node next = Step(parent, keys[i]);
+    if (!next.IsDefined()) throw InvalidInput("--set {}: {} has no field '{}'", assignment, file_.string(), keys[i]);
+    parent.reset(next);
+  }
+  YAML::Node value;
+  try {
+    value = YAML::Load(assignment.substr(equals + 1));
+  } catch (const YAML::Exception& error) {
+    throw InvalidInput("--set {}: the value is not YAML: {}", assignment, error.msg);
+  }
+  if (parent.IsMap()) {
+    parent[keys.back()] = value;
+    return;
+  }
+  YAML::Node item = Step(parent, keys.back());
+  if (!item.IsDefined()) throw InvalidInput("--set {}: {} has no field or item '{}'", assignment, file_.string(), keys.back());
+  item = value;
+}
+
+YAML::Node Config::Child(const std::string& key) const {
+  return node_.IsMap() ? node_[key] : YAML::Node(YAML::NodeType::Undefined);
+}
+
+std::string Config::FieldName(const std::string& key) const {
+  if (key.empty()) return field_;
+  return field_.empty() ? key : field_ + "." + key;
+}
+
+std::string Config::Where(const std::string& key) const {
+  const YAML::Node child = key.empty() ? node_ : Child(key);
+  const int line = child.IsDefined() ? child.Mark().line : node_.Mark().line;
+  const std::string field = FieldName(key);
+  return fmt::format("{}:{}{}", file_.string(), line + 1, field.empty() ? "" : ": field " + field);
+}
+
+bool Config::Has(const std::string& key) const {
+  const YAML::Node child = Child(key);
+  return child.IsDefined() && !child.IsNull();
+}
+
+void Config::ThrowWrongType(const std::string& key, const YAML::Node& found, const char* wanted) const {
+  throw InvalidInput("{}: found {}, wanted {}", Where(key), Shown(found), wanted);
+}
+
+template <typename T>
+T Config::Get(const std::string& key) const {
+  const YAML::Node child = Child(key);
+  if (!child.IsDefined() || child.IsNull()) ThrowWrongType(key, child, kTypeName<T>);
+  try {
+    return child.as<T>();
+  } catch (const YAML::Exception&) {
+    ThrowWrongType(key, child, kTypeName<T>);
+  }
+}
+
+template <typename T>
+T Config::Get(const std::string& key, const T& otherwise) const {
+  return Has(key) ? Get<T>(key) : otherwise;
+}
+
+template <typename T>
+T Config::Value() const {
+  try {
+    return node_.as<T>();
+  } catch (const YAML::Exception&) {
+    ThrowWrongType("", node_, kTypeName<T>);
+  }
+}
+
+#define EVAC_CONFIG_TYPE(T)                                        \
+  template T Config::Get<T>(const std::string&) const;             \
+  template T Config::Get<T>(const std::string&, const T&) const;   \
+  template T Config::Value<T>() const;
+EVAC_CONFIG_TYPE(bool)
+EVAC_CONFIG_TYPE(int)
+EVAC_CONFIG_TYPE(double)
+EVAC_CONFIG_TYPE(std::uint64_t)
+EVAC_CONFIG_TYPE(std::string)
+EVAC_CONFIG_TYPE(std::vector<double>)
+EVAC_CONFIG_TYPE(std::vector<std::uint64_t>)
+EVAC_CONFIG_TYPE(std::vector<std::string>)
+#undef EVAC_CONFIG_TYPE
+
+Config Config::Section(const std::string& key) const {
+  const YAML::Node child = Child(key);
+  if (!child.IsDefined() || !child.IsMap()) ThrowWrongType(key, child, "a mapping (key: value)");
+  return Config(child, file_, FieldName(key));
+}
+
+std::vector<Config> Config::List(const std::string& key) const {
+  const YAML::Node child = Child(key);
+  std::vector<Config> items;
+  if (!child.IsDefined() || child.IsNull()) return items;
+  if (!child.IsSequence()) ThrowWrongType(key, child, "a list");
+  for (std::size_t i = 0; i < child.size(); ++i) items.push_back(Config(child[i], file_, FieldName(key) + "." + std::to_string(i)));
+  return items;
+}
+
+std::vector<std::string> Config::Keys() const {
+  std::vector<std::string> keys;
+  if (!node_.IsMap()) return keys;
+  for (const auto& item : node_) keys.push_back(item.first.Scalar());
+  return keys;
+}
+
+std::filesystem::path Config::Path(const std::string& key) const {
+  const std::filesystem::path path = Get<std::string>(key);
+  return path.is_absolute() ? path : file_.parent_path() / path;
+}
+
+void Config::AllowOnly(std::initializer_list<const char*> known) const {
+  for (const std::string& key : Keys()) {
+    if (std::find(known.begin(), known.end(), key) != known.end()) continue;
+    const auto nearest = std::min_element(known.begin(), known.end(),
+                                          [&](const char* a, const char* b) { return EditDistance(key, a) < EditDistance(key, b); });
+    throw InvalidInput("{}: there is no such field; the nearest is '{}'", Where(key), *nearest);
+  }
+}
+
+void Config::Require(bool holds, const std::string& key, const std::string& wanted) const {
+  if (!holds) throw InvalidInput("{}: found {}, wanted {}", Where(key), Shown(Child(key)), wanted);
+}
+
+std::string Config::Canonical() const {
+  std::ostringstream out;
+  WriteCanonical(node_, "", out);
+  return std::move(out).str();
+}
+
+}  // namespace evac

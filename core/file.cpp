@@ -1,0 +1,51 @@
+#include "core/file.h"
+
+#include <fcntl.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <cstring>
+#include <fstream>
+#include <sstream>
+
+#include "core/error.h"
+
+namespace evac {
+namespace {
+
+namespace fs = std::filesystem;
+
+void Sync(const fs::path& path, int flags) {
+  const int descriptor = ::open(path.c_str(), flags | O_CLOEXEC);
+  const bool synced = descriptor >= 0 && ::fsync(descriptor) == 0;
+  const int error = errno;
+  if (descriptor >= 0) ::close(descriptor);
+  if (!synced) throw InternalError("{}: cannot be synced to disk: {}", path.string(), std::strerror(error));
+}
+
+}  // namespace
+
+std::string ReadFile(const fs::path& path) {
+  std::ifstream file(path, std::ios::binary);
+  if (!file || fs::is_directory(path)) throw InvalidInput("{}: cannot be read: {}", path.string(), std::strerror(errno ? errno : EISDIR));
+  std::ostringstream bytes;
+  bytes << file.rdbuf();
+  return std::move(bytes).str();
+}
+
+void SyncAndRename(const fs::path& from, const fs::path& to) {
+  Sync(from, O_RDONLY);
+  if (::rename(from.c_str(), to.c_str()) != 0) throw InternalError("{}: cannot be renamed from {}: {}", to.string(), from.string(), std::strerror(errno));
+  Sync(to.parent_path().empty() ? fs::path(".") : to.parent_path(), O_RDONLY | O_DIRECTORY);
+}
+
+void WriteFileAtomically(const fs::path& path, std::string_view bytes) {
+  const fs::path part = path.string() + ".tmp";
+  std::ofstream file(part, std::ios::binary | std::ios::trunc);
+  file.write(bytes.data(), static_cast<std::streamsize>(bytes.size()));
+  file.close();
+  if (!file) throw InternalError("{}: cannot be written: {}", path.string(), std::strerror(errno));
+  SyncAndRename(part, path);
+}
+
+}  // namespace evac

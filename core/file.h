@@ -1,0 +1,19 @@
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <string_view>
+
+namespace evac {
+
+/// @throws Error naming the file if it cannot be read.
+std::string ReadFile(const std::filesystem::path& path);
+
+/// Writes beside it, syncs, renames, syncs the folder: the file is there whole or not at all, also after a power cut.
+/// @throws Error naming the file and the system's reason.
+void WriteFileAtomically(const std::filesystem::path& path, std::string_view bytes);
+
+/// Syncs a finished file to disk, renames it to its final name and syncs that folder.
+void SyncAndRename(const std::filesystem::path& from, const std::filesystem::path& to);
+
+}  // namespace evac

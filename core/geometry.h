@@ -1,0 +1,30 @@
+#pragma once
+
+#include <Eigen/Geometry>
+#include <optional>
+
+#include "core/types.h"
+
+namespace evac {
+
+/// Where the camera is now: its mount's pose times mount_from_camera, so a moving wrist camera needs no other code.
+/// `left_gripper` is the first of `arms`, `right_gripper` the last (one arm: the same).
+/// @param arms  not empty unless the camera is mounted on the base.
+Eigen::Isometry3d BaseFromCamera(const Camera& camera, const Arms& arms);
+
+/// Pixel (u right, v down; the centre of the first pixel is .5, .5) of a point, or nothing if it is not in front.
+std::optional<Eigen::Vector2d> Project(const Camera& camera, const Eigen::Vector3d& point_in_camera_m);
+
+/// Unit direction, in the camera's frame, of the ray through a pixel.
+Eigen::Vector3d Ray(const Camera& camera, const Eigen::Vector2d& pixel);
+
+/// The same camera with its image scaled to another size (x and y on their own).
+Camera Resized(const Camera& camera, int width_px, int height_px);
+
+/// From translation and quaternion in x, y, z, w order; normalised here.
+Eigen::Isometry3d FromXyzQuat(const Eigen::Vector3d& xyz_m, const Eigen::Vector4d& quat_xyzw);
+
+/// Angle of the rotation between the two orientations, radians in [0, pi].
+double RotationBetween(const Eigen::Isometry3d& a, const Eigen::Isometry3d& b);
+
+}  // namespace evac

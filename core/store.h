@@ -1,0 +1,116 @@
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <map>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "core/types.h"
+#include "core/video.h"
+
+namespace evac {
+
+/// What a run was made from; stored once, at its start, and never changed.
+struct RunInfo {
+  std::string suite_text;  ///< the effective suite (after --set), YAML
+  std::string suite_hash;  ///< SHA-256 of its canonical form and of every page it names
+  std::string suite_path;  ///< where it was read from; for resume, no part of any result
+  std::string evac_version;
+};
+
+struct WorldInfo {
+  std::string name;          ///< real, sim, echo
+  std::string type;          ///< mujoco, echo
+  bool is_real = false;      ///< the reference of every comparison; its first frames are the initial scenes
+  std::string profile_hash;  ///< of what decides its behaviour beside the task (MuJoCo: the profile page), may be empty
+};
+
+struct PolicyInfo {
+  std::string name, checkpoint;
+  std::string declaration;  ///< the spec it declared at the handshake, JSON
+};
+
+/// Everything that is written when an episode ends.
+struct EpisodeRecord {
+  Episode episode;
+  PrivilegedTrack privileged;            ///< empty or one per observation
+  std::optional<FinishedVideo> video;    ///< already on disk under its final name, inside the run's folder
+  std::string thumbnail_jpeg;            ///< bytes; empty when there is no frame
+};
+
+/// How often the wire misbehaved, by name ("repeats", "stale_replies", …): counts of effort, no part of a result.
+using Counters = std::map<std::string, std::int64_t>;
+
+/// One run's truth: RUN/evac.sqlite and the files it names (docs/formats/run.md). Everything else is derived from it.
+/// WAL, synchronous=FULL, one writer process at a time (a lock file), any number of readers. Thread-safe.
+class Store {
+ public:
+  enum class Mode { kReadOnly, kReadWrite };
+
+  /// Begins a run in `folder` (made if absent), or continues the one there if it has the same suite hash.
+  /// @throws InvalidInput if another run is there, another process writes it, or its schema is newer than this program.
+  static Store CreateOrContinue(const std::filesystem::path& folder, const RunInfo& run);
+  /// @throws InvalidInput if there is no run in `folder`. Older schemas are migrated (kReadWrite) or read as they are.
+  static Store Open(const std::filesystem::path& folder, Mode mode);
+  /// For tests: nothing on disk but the videos, which go to `folder`.
+  static Store InMemory(const std::filesystem::path& folder, const RunInfo& run);
+
+  Store(Store&&) noexcept;
+  Store& operator=(Store&&) noexcept;
+  ~Store();
+
+  const std::filesystem::path& folder() const;
+  RunInfo run() const;
+
+  /// Declarations: adding the same again changes nothing; adding something else under a known name throws.
+  void AddTask(const Task& task);
+  void AddWorld(const WorldInfo& world);
+  void AddPolicy(const PolicyInfo& policy);
+  std::vector<Task> Tasks() const;
+  std::vector<WorldInfo> Worlds() const;
+  std::vector<PolicyInfo> Policies() const;
+
+  /// One transaction: the episode's row, its steps, privileged track, video path and hash are there, or nothing is.
+  /// @throws Error if the episode is there already, or the disk is full (the store stays intact).
+  void Add(const EpisodeRecord& record);
+  bool Has(const EpisodeKey& key) const;
+  /// Removes a failed episode and its verdicts so that it can run again (`resume --retry-failed`).
+  void RemoveFailed(const EpisodeKey& key);
+
+  /// All episodes in pair-key order, then world: without observations and commands (see LoadSteps).
+  std::vector<Episode> Episodes() const;
+  /// Fills in observations (arms only, no images) and commands.
+  void LoadSteps(Episode& episode) const;
+  /// For the oracle judge alone; empty if the world had none.
+  PrivilegedTrack LoadPrivileged(const std::string& episode_id) const;
+
+  /// Kept for the lowest seed per (task, initial state), so that the order of finishing does not matter. Lossless.
+  void AddInitialScene(const PairKey& pair, const InitialScene& scene);
+  std::optional<InitialScene> LoadInitialScene(const std::string& task, const std::string& initial_state) const;
+
+  void AddVerdict(const Verdict& verdict);
+  /// Every verdict ever given, oldest first.
+  std::vector<Verdict> Verdicts() const;
+  /// The current one per (episode id, judge): the last added.
+  std::map<std::string, std::map<std::string, Verdict>> CurrentVerdicts() const;
+
+  /// Adds to the run's counters.
+  void Count(const std::string& policy, const Counters& counters);
+  std::map<std::string, Counters> CountersByPolicy() const;
+
+  /// Removes videos, thumbnails and .tmp files that no row names: what a kill left behind. Call when continuing, before running.
+  void RemoveOrphans();
+
+  /// RUN/videos/<episode id>.mp4, its folder made.
+  std::filesystem::path VideoPath(const EpisodeKey& key) const;
+
+ private:
+  struct Database;
+  explicit Store(std::unique_ptr<Database> database);
+  std::unique_ptr<Database> database_;
+};
+
+}  // namespace evac

@@ -1,0 +1,17 @@
+#pragma once
+
+#include <filesystem>
+#include <string>
+
+#include "core/types.h"
+
+namespace evac {
+
+/// Reads a task from its YAML page (docs/add_a_task.md): id, instruction, arms, cameras, period_s, max_chunks, still, workspace,
+/// rubric. Sections that only some worlds read (`mujoco:`) stay in `Task::page`.
+/// @throws InvalidInput naming file, line, field, what was found and what was wanted.
+Task ReadTaskPage(const std::filesystem::path& path);
+/// The same from a text, e.g. the one a store kept.
+Task ParseTaskPage(const std::string& text, const std::filesystem::path& path);
+
+}  // namespace evac
