@@ -1,0 +1,36 @@
+#pragma once
+
+#include <cstdint>
+#include <deque>
+#include <optional>
+#include <vector>
+
+#include "core/types.h"
+
+namespace evac {
+
+/// One episode to run.
+struct Job {
+  const Task* task = nullptr;  ///< outlives the run
+  InitialState initial;
+  EpisodeKey key;
+
+  /// The world's randomness: the same for every policy, so that all of them meet the same world. World and profile
+  /// mix in their own names, so that no two worlds share a stream.
+  std::uint64_t WorldSeed() const;
+  /// The policy's noise: the same in every world, so that a pair differs by the world alone.
+  std::uint64_t PolicySeed() const;
+};
+
+/// The episodes still to run, first in, first out.
+class JobQueue {
+ public:
+  explicit JobQueue(std::vector<Job> jobs) : jobs_(jobs.begin(), jobs.end()) {}
+  std::optional<Job> Next();
+  std::size_t size() const { return jobs_.size(); }
+
+ private:
+  std::deque<Job> jobs_;
+};
+
+}  // namespace evac

@@ -1,0 +1,132 @@
+#include "harness/lane.h"
+
+#include <fmt/format.h>
+
+#include <opencv2/imgcodecs.hpp>
+#include <opencv2/imgproc.hpp>
+
+#include "core/check.h"
+#include "core/error.h"
+
+namespace evac {
+namespace {
+
+std::string Jpeg(const cv::Mat& rgb) {
+  if (rgb.empty()) return "";
+  cv::Mat bgr;
+  cv::cvtColor(rgb, bgr, cv::COLOR_RGB2BGR);
+  std::vector<unsigned char> bytes;
+  cv::imencode(".jpg", bgr, bytes, {cv::IMWRITE_JPEG_QUALITY, 85});
+  return std::string(bytes.begin(), bytes.end());
+}
+
+cv::Mat Enlarged(const cv::Mat& image, int scale) {
+  cv::Mat large;
+  cv::resize(image, large, {}, scale, scale, cv::INTER_NEAREST);
+  return large;
+}
+
+}  // namespace
+
+Lane::Lane(SceneId scene, Job job, const LaneOptions& options, Store& store)
+    : scene_(scene), job_(std::move(job)), options_(options), store_(store), still_(job_.task->still) {
+  episode_.key = job_.key;
+}
+
+void Lane::Begin(Policy& policy, World& world) {
+  StopReason blame = StopReason::kWorldError;
+  try {
+    const WorldStep first = world.Reset(scene_, *job_.task, job_.initial, job_.WorldSeed());
+    if (const auto wrong = WhatIsWrong(first.observation, *job_.task)) throw InternalError("{}", *wrong);
+    VideoOptions video = options_.video;
+    video.period_s = job_.task->period_s;
+    video_.emplace(store_.VideoPath(job_.key), video);
+    Append(first);
+    if (options_.keep_initial_scene) {
+      store_.AddInitialScene(job_.key.pair, {first.observation.images, first.observation.arms, job_.task->cameras});
+    }
+    blame = StopReason::kPolicyError;
+    policy.Reset(scene_, *job_.task, job_.PolicySeed());
+  } catch (const std::exception& error) {
+    Fail({blame, error.what()});
+  }
+}
+
+void Lane::Command(const Acted& acted) {
+  if (const Failure* failure = std::get_if<Failure>(&acted)) return Fail(*failure);
+  chunk_ = std::get<ActionChunk>(acted);
+  if (const auto wrong = WhatIsWrong(chunk_, *job_.task, options_.policy_chunk_size)) {
+    return Fail({StopReason::kPolicyError, fmt::format("chunk {}: {}", episode_.chunks + 1, *wrong)});
+  }
+  if (static_cast<int>(chunk_.targets.size()) > options_.chunk_size) {
+    chunk_.targets.resize(options_.chunk_size);
+    chunk_.ends_recording = false;
+  }
+  const Arms& last = episode_.commands.empty() ? observation().arms : episode_.commands.back();
+  if (const auto rest = still_.Rest(last, chunk_.targets, ObservedSinceLastChunk())) Stop(StopReason::kStill, *rest);
+}
+
+void Lane::Observe(const Advanced& advanced) {
+  if (const Failure* failure = std::get_if<Failure>(&advanced)) return Fail(*failure);
+  const auto& steps = std::get<std::vector<WorldStep>>(advanced);
+  if (steps.size() != chunk_.targets.size()) {
+    return Fail({StopReason::kWorldError, fmt::format("the world answered {} targets with {} observations", chunk_.targets.size(), steps.size())});
+  }
+  for (std::size_t k = 0; k < steps.size(); ++k) {
+    if (const auto wrong = WhatIsWrong(steps[k].observation, *job_.task)) {
+      return Fail({StopReason::kWorldError, fmt::format("chunk {}, step {}: {}", episode_.chunks + 1, k + 1, *wrong)});
+    }
+    episode_.commands.push_back(chunk_.targets[k]);
+    Append(steps[k]);
+  }
+  ++episode_.chunks;
+  if (chunk_.ends_recording) {
+    Stop(StopReason::kRecordingEnd, fmt::format("the recording ended after {} steps in {} chunks", episode_.commands.size(), episode_.chunks));
+  } else if (episode_.chunks >= job_.task->max_chunks) {
+    Stop(StopReason::kMaxChunks, fmt::format("still moving after {} chunks, the task's limit", episode_.chunks));
+  }
+}
+
+void Lane::Fail(const Failure& failure) {
+  episode_.failure = failure.message;
+  Stop(failure.stop, fmt::format("after {} chunks: {}", episode_.chunks, failure.message));
+}
+
+void Lane::Stop(StopReason stop, const std::string& sentence) {
+  episode_.stop = stop;
+  episode_.stop_reason = sentence;
+  over_ = true;
+}
+
+void Lane::Append(const WorldStep& step) {
+  if (!episode_.observations.empty()) episode_.observations.back().images.clear();  // they are in the video now
+  episode_.observations.push_back(step.observation);
+  privileged_.push_back(step.privileged);
+  last_frame_ = SideBySide(step.observation.images);
+  video_->Append(last_frame_);
+}
+
+/// Empty where the arms are only commanded: they say nothing about the gripper that the chunk does not say already.
+std::vector<Arms> Lane::ObservedSinceLastChunk() const {
+  const auto& observations = episode_.observations;
+  if (observations.back().arms_are_commanded) return {};
+  const std::size_t count = std::min<std::size_t>(observations.size(), options_.chunk_size + 1);
+  std::vector<Arms> observed;
+  for (std::size_t i = observations.size() - count; i < observations.size(); ++i) observed.push_back(observations[i].arms);
+  return observed;
+}
+
+EpisodeRecord Lane::Finish() {
+  EpisodeRecord record;
+  if (!last_frame_.empty()) {
+    record.video = video_->Finish();
+    record.thumbnail_jpeg = Jpeg(Enlarged(last_frame_, options_.video.scale));
+  }
+  const bool has_physics = !privileged_.empty() && !privileged_.front().bodies.empty();
+  if (has_physics) record.privileged = std::move(privileged_);
+  if (!episode_.observations.empty()) episode_.observations.back().images.clear();
+  record.episode = std::move(episode_);
+  return record;
+}
+
+}  // namespace evac

@@ -1,0 +1,75 @@
+#include "harness/lanes.h"
+
+#include "core/error.h"
+
+namespace evac {
+
+int Lanes::Refill(JobQueue& jobs, Policy& policy, World& world) {
+  int held = 0;
+  for (std::size_t i = 0; i < lanes_.size(); ++i) {
+    if (!lanes_[i]) {
+      std::optional<Job> job = jobs.Next();
+      if (!job) continue;
+      lanes_[i] = std::make_unique<Lane>(static_cast<SceneId>(i), std::move(*job), options_.lane, store_);
+      lanes_[i]->Begin(policy, world);
+    }
+    ++held;
+  }
+  return held;
+}
+
+std::vector<Lane*> Lanes::Live() const {
+  std::vector<Lane*> live;
+  for (const auto& lane : lanes_) {
+    if (lane && !lane->over()) live.push_back(lane.get());
+  }
+  return live;
+}
+
+std::vector<SceneObservation> Lanes::Observed() const {
+  std::vector<SceneObservation> observed;
+  for (const Lane* lane : Live()) observed.push_back({lane->scene(), &lane->observation()});
+  return observed;
+}
+
+void Lanes::Command(const std::vector<Acted>& answers) {
+  const std::vector<Lane*> live = Live();
+  if (answers.size() != live.size()) throw InternalError("the policy was asked for {} chunks and answered {}", live.size(), answers.size());
+  for (std::size_t i = 0; i < live.size(); ++i) live[i]->Command(answers[i]);
+}
+
+std::vector<SceneChunk> Lanes::Commanded() const {
+  std::vector<SceneChunk> commanded;
+  for (const Lane* lane : Live()) commanded.push_back({lane->scene(), &lane->chunk()});
+  return commanded;
+}
+
+void Lanes::Observe(const std::vector<Advanced>& answers) {
+  const std::vector<Lane*> live = Live();
+  if (answers.size() != live.size()) throw InternalError("the world was given {} chunks and answered {}", live.size(), answers.size());
+  for (std::size_t i = 0; i < live.size(); ++i) live[i]->Observe(answers[i]);
+}
+
+void Lanes::FailAll(const Failure& failure) {
+  for (Lane* lane : Live()) lane->Fail(failure);
+}
+
+std::vector<EpisodeRecord> Lanes::TakeFinished() {
+  std::vector<EpisodeRecord> finished;
+  for (auto& lane : lanes_) {
+    if (!lane || !lane->over()) continue;
+    finished.push_back(lane->Finish());
+    lane.reset();
+  }
+  return finished;
+}
+
+std::vector<Progress::LaneState> Lanes::State() const {
+  std::vector<Progress::LaneState> state;
+  for (const auto& lane : lanes_) {
+    if (lane) state.push_back({lane->job().key.Id(), lane->chunks(), lane->job().task->max_chunks});
+  }
+  return state;
+}
+
+}  // namespace evac

@@ -1,0 +1,50 @@
+#include "harness/rollout.h"
+
+#include "harness/lanes.h"
+
+namespace evac {
+namespace {
+
+/// What a policy or a world throws for a whole batch is the failure of every live episode, not the end of the run.
+template <typename Step>
+void OrFailAll(Lanes& lanes, StopReason blame, const Step& step) {
+  try {
+    step();
+  } catch (const std::exception& error) {
+    lanes.FailAll({blame, error.what()});
+  }
+}
+
+void Keep(const EpisodeRecord& record, Store& store, Summary& summary) {
+  store.Add(record);
+  ++summary.done;
+  if (!IsFailure(record.episode.stop)) return;
+  ++summary.failed;
+  summary.last_failure = record.episode.key.Id() + ": " + record.episode.failure;
+}
+
+bool MustEnd(const RolloutOptions& options, Summary& summary) {
+  summary.budget_spent = summary.failed > options.failures_left;
+  summary.interrupted = options.interrupted && options.interrupted();
+  return summary.budget_spent || summary.interrupted;
+}
+
+}  // namespace
+
+Summary RunEpisodes(Policy& policy, World& world, JobQueue& jobs, Store& store, const RolloutOptions& options) {
+  Summary summary;
+  Lanes lanes(store, options);
+  while (!MustEnd(options, summary) && lanes.Refill(jobs, policy, world) > 0) {  // new episodes take the free lanes: Reset on both sides
+    OrFailAll(lanes, StopReason::kPolicyError, [&] {
+      lanes.Command(policy.Act(lanes.Observed()));  // one chunk of actions per live lane, or why not; the stop rule reads it
+    });
+    OrFailAll(lanes, StopReason::kWorldError, [&] {
+      lanes.Observe(world.Advance(lanes.Commanded()));  // one call answers all lanes that have not come to rest
+    });
+    for (const EpisodeRecord& record : lanes.TakeFinished()) Keep(record, store, summary);
+    if (options.on_progress) options.on_progress({summary.done, summary.failed, lanes.State()});
+  }
+  return summary;
+}
+
+}  // namespace evac
