@@ -223,6 +223,8 @@ void Config::Require(bool holds, const std::string& key, const std::string& want
   if (!holds) throw InvalidInput("{}: found {}, wanted {}", Where(key), Shown(Child(key)), wanted);
 }
 
+std::string Config::Text() const { return YAML::Dump(node_) + "\n"; }
+
 std::string Config::Canonical() const {
   std::ostringstream out;
   WriteCanonical(node_, "", out);

@@ -1,0 +1,33 @@
+#include "harness/scheduler.h"
+
+#include <algorithm>
+
+#include "core/seed.h"
+
+namespace evac {
+
+std::vector<Job> AllJobs(const Suite& suite, const SuiteWorld& world, const SuitePolicy& policy) {
+  std::vector<Job> jobs;
+  for (const Task& task : suite.tasks) {
+    for (const InitialState& state : suite.initial_states) {
+      for (const std::uint64_t seed : suite.seeds) {
+        jobs.push_back({.task = &task,
+                        .initial = {state.id, SeedFor(state.seed, task.id)},
+                        .key = {{task.id, state.id, policy.name, policy.checkpoint, seed}, world.name}});
+      }
+    }
+  }
+  return jobs;
+}
+
+std::vector<Job> MissingJobs(std::vector<Job> jobs, const Store& store) {
+  std::erase_if(jobs, [&](const Job& job) { return store.Has(job.key); });
+  return jobs;
+}
+
+std::vector<SuiteWorld> RealFirst(std::vector<SuiteWorld> worlds) {
+  std::stable_partition(worlds.begin(), worlds.end(), [](const SuiteWorld& world) { return world.is_real; });
+  return worlds;
+}
+
+}  // namespace evac

@@ -1,0 +1,21 @@
+#pragma once
+
+#include <vector>
+
+#include "core/store.h"
+#include "harness/job.h"
+#include "harness/suite.h"
+
+namespace evac {
+
+/// Every episode of a suite in one world under one policy: tasks x initial states x seeds, in that order. The jobs point into
+/// `suite.tasks`.
+std::vector<Job> AllJobs(const Suite& suite, const SuiteWorld& world, const SuitePolicy& policy);
+
+/// Those that the store does not have yet: what `resume` runs.
+std::vector<Job> MissingJobs(std::vector<Job> jobs, const Store& store);
+
+/// The worlds with the real one first, because its first frames are where imagined episodes start.
+std::vector<SuiteWorld> RealFirst(std::vector<SuiteWorld> worlds);
+
+}  // namespace evac

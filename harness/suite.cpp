@@ -1,0 +1,213 @@
+#include "harness/suite.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <set>
+
+#include "core/config.h"
+#include "core/geometry.h"
+#include "core/seed.h"
+#include "core/task_page.h"
+#include "harness/suite_hash.h"
+
+namespace evac {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// Names become file names and parts of messages' channels.
+std::string NameField(const Config& page, const std::string& key) {
+  const std::string name = page.Get<std::string>(key);
+  const bool good = !name.empty() && name.size() <= 64 && name.front() != '.' && std::all_of(name.begin(), name.end(), [](unsigned char c) {
+    return std::isalnum(c) || c == '_' || c == '-' || c == '.';
+  });
+  page.Require(good, key, "1 … 64 letters, digits, '_', '-' and '.', not beginning with '.'");
+  return name;
+}
+
+SuiteWorld ReadWorld(const Config& page) {
+  page.AllowOnly({"name", "type", "role", "profile"});
+  SuiteWorld world;
+  world.name = NameField(page, "name");
+  world.type = page.Get<std::string>("type");
+  page.Require(world.type == "mujoco" || world.type == "echo", "type", "mujoco or echo");
+  const std::string role = page.Get<std::string>("role", "evaluated");
+  if (page.Has("role")) page.Require(role == "real" || role == "evaluated", "role", "real (the reference) or evaluated");
+  world.is_real = role == "real";
+  if (world.type == "mujoco") world.profile = page.Path("profile");
+  if (world.type == "echo") page.Require(!page.Has("profile"), "profile", "none: a recording has no physics");
+  return world;
+}
+
+SuitePolicy ReadPolicy(const Config& page) {
+  page.AllowOnly({"name", "checkpoint", "command", "join"});
+  SuitePolicy policy;
+  policy.name = NameField(page, "name");
+  policy.checkpoint = page.Has("checkpoint") ? NameField(page, "checkpoint") : "default";
+  page.Require(page.Has("command") != page.Has("join"), "command", "either a command line (a list) or `join: {url, token}`");
+  if (page.Has("join")) {
+    const Config join = page.Section("join");
+    join.AllowOnly({"url", "token"});
+    policy.join_url = join.Get<std::string>("url");
+    policy.join_token = join.Get<std::string>("token");
+    return policy;
+  }
+  policy.command = page.Get<std::vector<std::string>>("command");
+  page.Require(!policy.command.empty() && !policy.command.front().empty(), "command", "a program and its arguments");
+  return policy;
+}
+
+std::vector<InitialState> ReadInitialStates(const Config& suite) {
+  const Config page = suite.Section("initial_states");
+  page.AllowOnly({"seed", "count"});
+  const auto seed = page.Get<std::uint64_t>("seed");
+  const int count = page.Get<int>("count");
+  page.Require(count >= 1 && count <= 9999, "count", "1 … 9999 initial states per task");
+  std::vector<InitialState> states;
+  for (int i = 0; i < count; ++i) states.push_back({fmt::format("{}-{:04d}", seed, i), SeedFor(SeedFor(seed, "initial state"), i)});
+  return states;
+}
+
+StillRule ReadStill(const Config& suite, const StillRule& otherwise) {
+  if (!suite.Has("still")) return otherwise;
+  const Config page = suite.Section("still");
+  page.AllowOnly({"enabled", "translation_m", "rotation_rad", "closure", "dwell_chunks", "min_chunks"});
+  StillRule still;
+  still.enabled = page.Get<bool>("enabled", otherwise.enabled);
+  still.translation_m = page.Get<double>("translation_m", otherwise.translation_m);
+  still.rotation_rad = page.Get<double>("rotation_rad", otherwise.rotation_rad);
+  still.closure = page.Get<double>("closure", otherwise.closure);
+  still.dwell_chunks = page.Get<int>("dwell_chunks", otherwise.dwell_chunks);
+  still.min_chunks = page.Get<int>("min_chunks", otherwise.min_chunks);
+  page.Require(still.dwell_chunks >= 1, "dwell_chunks", "1 or more");
+  page.Require(still.translation_m >= 0 && still.rotation_rad >= 0 && still.closure >= 0, "translation_m", "thresholds of 0 or more");
+  return still;
+}
+
+std::vector<Task> ReadTasks(const Config& suite) {
+  std::vector<Task> tasks;
+  for (const Config& item : suite.List("tasks")) {
+    const fs::path named = item.Value<std::string>();
+    Task task = ReadTaskPage(named.is_absolute() ? named : suite.file().parent_path() / named);
+    task.still = ReadStill(suite, task.still);
+    tasks.push_back(std::move(task));
+  }
+  if (!suite.Has("image")) return tasks;
+  const Config image = suite.Section("image");
+  image.AllowOnly({"height_px", "width_px"});
+  const int height_px = image.Get<int>("height_px"), width_px = image.Get<int>("width_px");
+  image.Require(height_px >= 16 && height_px <= 2160, "height_px", "16 … 2160");
+  image.Require(width_px >= 16 && width_px <= 3840, "width_px", "16 … 3840");
+  for (Task& task : tasks) {
+    for (Camera& camera : task.cameras) camera = Resized(camera, width_px, height_px);
+  }
+  return tasks;
+}
+
+Transport ReadTransport(const Config& suite) {
+  Transport transport;
+  if (!suite.Has("transport")) return transport;
+  const Config page = suite.Section("transport");
+  page.AllowOnly({"deadline_s", "repeat_after_s", "start_s", "images"});
+  transport.deadline_s = page.Get<double>("deadline_s", transport.deadline_s);
+  transport.repeat_after_s = page.Get<double>("repeat_after_s", transport.repeat_after_s);
+  transport.start_s = page.Get<double>("start_s", transport.start_s);
+  transport.images = page.Get<std::string>("images", transport.images);
+  page.Require(transport.deadline_s > 0, "deadline_s", "more than 0 s");
+  page.Require(transport.repeat_after_s > 0, "repeat_after_s", "more than 0 s");
+  page.Require(transport.images == "jpeg" || transport.images == "raw", "images", "jpeg or raw");
+  return transport;
+}
+
+VideoOptions ReadVideo(const Config& suite) {
+  VideoOptions video;
+  video.scale = 4;
+  if (!suite.Has("video")) return video;
+  const Config page = suite.Section("video");
+  page.AllowOnly({"crf", "preset", "scale"});
+  video.crf = page.Get<int>("crf", video.crf);
+  video.preset = page.Get<std::string>("preset", video.preset);
+  video.scale = page.Get<int>("scale", video.scale);
+  page.Require(video.crf >= 0 && video.crf <= 51, "crf", "0 (lossless) … 51");
+  page.Require(video.scale >= 1 && video.scale <= 16, "scale", "1 … 16");
+  return video;
+}
+
+template <typename Item, typename NameOf>
+void RequireDistinct(const std::vector<Item>& items, const Config& suite, const std::string& field, const NameOf& name_of) {
+  std::set<std::string> names;
+  for (const Item& item : items) {
+    if (!names.insert(name_of(item)).second) throw InvalidInput("{}: '{}' is there twice, wanted distinct names", suite.Where(field), name_of(item));
+  }
+}
+
+void CheckWhole(const Suite& suite, const Config& page) {
+  page.Require(!suite.worlds.empty(), "worlds", "at least one world");
+  page.Require(!suite.policies.empty(), "policies", "at least one policy");
+  page.Require(!suite.seeds.empty(), "seeds", "at least one seed");
+  page.Require(suite.lanes >= 1 && suite.lanes <= 256, "lanes", "1 … 256");
+  page.Require(suite.chunk_size >= 1 && suite.chunk_size <= 1000, "chunk_size", "1 … 1000 targets");
+  page.Require(suite.error_budget >= 0 && suite.error_budget <= 1, "error_budget", "a share, 0 … 1");
+  page.Require(suite.recording.has_value() != !suite.tasks.empty(), "tasks", "either task pages or a `recording`");
+  RequireDistinct(suite.worlds, page, "worlds", [](const SuiteWorld& world) { return world.name; });
+  RequireDistinct(suite.tasks, page, "tasks", [](const Task& task) { return task.id; });
+  RequireDistinct(suite.policies, page, "policies", [](const SuitePolicy& policy) { return policy.name + "@" + policy.checkpoint; });
+  const auto reals = std::count_if(suite.worlds.begin(), suite.worlds.end(), [](const SuiteWorld& world) { return world.is_real; });
+  page.Require(reals <= 1, "worlds", "at most one world with role: real");
+  for (const SuiteWorld& world : suite.worlds) {
+    page.Require((world.type == "echo") == suite.recording.has_value(), "worlds", "echo worlds with a `recording`, mujoco worlds with task pages");
+  }
+}
+
+Suite Build(const Config& page) {
+  page.AllowOnly({"suite", "description", "recording", "worlds", "tasks", "policies", "seeds", "initial_states", "chunk_size", "lanes", "threads",
+                  "error_budget", "image", "still", "judges", "video", "transport"});
+  Suite suite;
+  suite.name = NameField(page, "suite");
+  suite.path = page.file();
+  suite.text = page.Text();
+  for (const Config& world : page.List("worlds")) suite.worlds.push_back(ReadWorld(world));
+  for (const Config& policy : page.List("policies")) suite.policies.push_back(ReadPolicy(policy));
+  if (page.Has("recording")) suite.recording = page.Path("recording");
+  suite.tasks = ReadTasks(page);
+  suite.seeds = page.Get<std::vector<std::uint64_t>>("seeds", {1});
+  if (suite.recording) {
+    suite.initial_states = {{"recording", 0}};
+  } else {
+    suite.initial_states = ReadInitialStates(page);
+  }
+  suite.chunk_size = page.Get<int>("chunk_size", suite.chunk_size);
+  suite.lanes = page.Get<int>("lanes", suite.lanes);
+  suite.threads = page.Get<int>("threads", suite.threads);
+  suite.error_budget = page.Get<double>("error_budget", suite.error_budget);
+  suite.judges = page.Get<std::vector<std::string>>("judges", {});
+  suite.video = ReadVideo(page);
+  suite.transport = ReadTransport(page);
+  CheckWhole(suite, page);
+  suite.hash = SuiteHash(page, suite);
+  return suite;
+}
+
+/// A path given on the command line is relative to where the user stands; one in the file to the file.
+std::string FromWorkingDirectory(const std::string& assignment) {
+  const std::size_t equals = assignment.find('=');
+  if (equals == std::string::npos) return assignment;
+  const std::string field = assignment.substr(0, equals), value = assignment.substr(equals + 1);
+  const std::string last = field.substr(field.rfind('.') + 1);
+  const bool is_path = last == "recording" || last == "profile" || field.starts_with("tasks.");
+  if (!is_path || value.empty() || fs::path(value).is_absolute()) return assignment;
+  return field + "=" + fs::absolute(value).lexically_normal().string();
+}
+
+}  // namespace
+
+Suite ReadSuite(const fs::path& path, const std::vector<std::string>& assignments) {
+  Config page = Config::FromFile(path);
+  for (const std::string& assignment : assignments) page.Set(FromWorkingDirectory(assignment));
+  return Build(page);
+}
+
+Suite ParseSuite(const std::string& text, const fs::path& path) { return Build(Config::FromText(text, path)); }
+
+}  // namespace evac

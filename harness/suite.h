@@ -1,0 +1,63 @@
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "core/store.h"
+#include "core/types.h"
+
+namespace evac {
+
+struct SuiteWorld {
+  std::string name;
+  std::string type;                ///< mujoco, echo
+  bool is_real = false;            ///< `role: real`
+  std::filesystem::path profile;   ///< mujoco: the page of its physical truth; absolute or relative to the working directory
+};
+
+struct SuitePolicy {
+  std::string name, checkpoint;
+  std::vector<std::string> command;  ///< empty: joins a policy that runs already
+  std::string join_url, join_token;  ///< where it listens
+};
+
+struct Transport {
+  double deadline_s = 10;      ///< a policy that has not answered by then has failed the episode
+  double repeat_after_s = 1;   ///< an unanswered request is sent again after this
+  double start_s = 30;         ///< how long a policy may take to declare itself
+  std::string images = "jpeg"; ///< jpeg or raw
+};
+
+/// One YAML file holds a whole evaluation (docs/suite.md). Paths in it are relative to the file.
+struct Suite {
+  std::string name;
+  std::filesystem::path path;
+  std::string text;  ///< the effective suite: after `--set`
+  std::string hash;  ///< of everything that can change a result: the effective suite and every page and scene it names
+  std::vector<SuiteWorld> worlds;
+  std::vector<Task> tasks;  ///< cameras resized to `image`; those of a recording are filled in by apps/factory
+  std::vector<SuitePolicy> policies;
+  std::vector<std::uint64_t> seeds;
+  std::vector<InitialState> initial_states;  ///< per task; their seeds mix in the task's id when used
+  int chunk_size = 8;
+  int lanes = 4;
+  int threads = 0;            ///< 0: one per core
+  double error_budget = .1;   ///< share of episodes that may fail before the run gives up
+  std::vector<std::string> judges;
+  VideoOptions video;
+  Transport transport;
+  std::optional<std::filesystem::path> recording;
+};
+
+/// Reads and checks a suite.
+/// @param assignments  `--set` values, in order; paths in them are relative to the working directory.
+/// @throws InvalidInput naming file, line, field, what was found and what was wanted.
+Suite ReadSuite(const std::filesystem::path& path, const std::vector<std::string>& assignments);
+
+/// The same from the text that a store kept.
+Suite ParseSuite(const std::string& text, const std::filesystem::path& path);
+
+}  // namespace evac

@@ -1,0 +1,63 @@
+#include "harness/suite_hash.h"
+
+#include <algorithm>
+#include <sstream>
+#include <vector>
+
+#include "core/hash.h"
+
+namespace evac {
+namespace {
+
+namespace fs = std::filesystem;
+
+bool StartsWithAny(const std::string& line, std::initializer_list<const char*> prefixes) {
+  return std::any_of(prefixes.begin(), prefixes.end(), [&](const char* prefix) { return line.starts_with(prefix); });
+}
+
+/// The files below a folder by name and content, in name order; or the one file.
+std::string HashOfTree(const fs::path& path) {
+  if (!fs::is_directory(path)) return Sha256HexOfFile(path);
+  std::vector<std::string> lines;
+  for (const auto& entry : fs::recursive_directory_iterator(path)) {
+    if (entry.is_regular_file()) lines.push_back(fs::relative(entry.path(), path).string() + " " + Sha256HexOfFile(entry.path()));
+  }
+  std::sort(lines.begin(), lines.end());
+  std::string text;
+  for (const std::string& line : lines) text += line + "\n";
+  return Sha256Hex(text);
+}
+
+/// The page's content and that of every file that a scalar in it names (the scene's XML).
+std::string HashOfPage(const fs::path& path) {
+  const Config page = Config::FromFile(path);
+  std::string text = page.Canonical();
+  std::istringstream lines(page.Canonical());
+  for (std::string line; std::getline(lines, line);) {
+    const std::string value = line.substr(line.find('=') + 1);
+    const fs::path named = path.parent_path() / value;
+    std::error_code ignored;
+    if (value.find('.') != std::string::npos && fs::is_regular_file(named, ignored)) text += value + " " + Sha256HexOfFile(named) + "\n";
+  }
+  return Sha256Hex(text);
+}
+
+}  // namespace
+
+std::string SuiteHash(const Config& page, const Suite& suite) {
+  std::ostringstream text;
+  std::istringstream lines(page.Canonical());
+  for (std::string line; std::getline(lines, line);) {
+    const bool by_content = StartsWithAny(line, {".recording=", ".tasks."}) || line.find(".profile=") != std::string::npos;
+    if (!by_content && !StartsWithAny(line, {".lanes=", ".threads=", ".error_budget=", ".description=", ".transport.deadline_s=",
+                                          ".transport.repeat_after_s=", ".transport.start_s="})) text << line << "\n";
+  }
+  for (const Task& task : suite.tasks) text << "task " << task.id << " " << HashOfPage(task.page_path) << "\n";
+  for (const SuiteWorld& world : suite.worlds) {
+    if (!world.profile.empty()) text << "profile " << world.name << " " << HashOfPage(world.profile) << "\n";
+  }
+  if (suite.recording) text << "recording " << HashOfTree(*suite.recording) << "\n";
+  return Sha256Hex(text.str());
+}
+
+}  // namespace evac
