@@ -1,0 +1,76 @@
+#include "harness/still.h"
+
+#include <gtest/gtest.h>
+
+namespace evac {
+namespace {
+
+Arms At(double x_m, double closure = 0) {
+  ArmState arm;
+  arm.base_from_gripper.translation() = {x_m, 0, 0};
+  arm.closure = closure;
+  return {arm};
+}
+
+std::vector<Arms> Stay(double x_m, double closure = 0) { return {At(x_m, closure), At(x_m, closure)}; }
+
+constexpr StillRule kRule{.enabled = true, .translation_m = .005, .rotation_rad = .05, .closure = .05, .dwell_chunks = 2, .min_chunks = 3};
+
+TEST(Still, AnEpisodeRestsAfterTheDwellAndNotBeforeTheMinimum) {
+  StillMeter meter(kRule);
+  EXPECT_FALSE(meter.Rest(At(0), Stay(0), Stay(0)));  // 0 executed
+  EXPECT_FALSE(meter.Rest(At(0), Stay(0), Stay(0)));  // the dwell holds, but only 1 executed
+  EXPECT_FALSE(meter.Rest(At(0), Stay(0), Stay(0)));
+  EXPECT_TRUE(meter.Rest(At(0), Stay(0), Stay(0)));   // 3 executed
+}
+
+TEST(Still, MotionStartsTheDwellAgain) {
+  StillMeter meter({.dwell_chunks = 2, .min_chunks = 0});
+  EXPECT_FALSE(meter.Rest(At(0), Stay(0), Stay(0)));
+  EXPECT_FALSE(meter.Rest(At(0), Stay(.02), Stay(0)));
+  EXPECT_FALSE(meter.Rest(At(.02), Stay(.02), Stay(.02)));
+  EXPECT_TRUE(meter.Rest(At(.02), Stay(.02), Stay(.02)));
+}
+
+TEST(Still, AStuckArmThatIsStillCommandedHasNotFinished) {
+  StillMeter meter({.dwell_chunks = 1, .min_chunks = 0});
+  EXPECT_FALSE(meter.Rest(At(0), Stay(.1), Stay(0)));
+}
+
+TEST(Still, ACoastingArmThatIsNoLongerCommandedHasNotFinished) {
+  StillMeter meter({.dwell_chunks = 1, .min_chunks = 0});
+  const std::vector<Arms> coasting = {At(.1), At(.05), At(.01)};
+  EXPECT_FALSE(meter.Rest(At(0), Stay(0), coasting));
+}
+
+TEST(Still, AClosingGripperIsMotion) {
+  StillMeter meter({.dwell_chunks = 1, .min_chunks = 0});
+  EXPECT_FALSE(meter.Rest(At(0, 0), Stay(0, 1), {}));
+}
+
+TEST(Still, WhereArmsAreOnlyCommandedTheCommandDecides) {
+  StillMeter meter({.dwell_chunks = 1, .min_chunks = 0});
+  const auto sentence = meter.Rest(At(0), Stay(.001), {});
+  ASSERT_TRUE(sentence);
+  EXPECT_NE(sentence->find("is not measured"), std::string::npos) << *sentence;
+  EXPECT_NE(sentence->find("1.0 mm"), std::string::npos) << *sentence;
+}
+
+TEST(Still, ARecordingThatIsReplayedNeverRests) {
+  StillMeter meter({.enabled = false, .dwell_chunks = 1, .min_chunks = 0});
+  for (int i = 0; i < 10; ++i) EXPECT_FALSE(meter.Rest(At(0), Stay(0), Stay(0)));
+}
+
+TEST(Still, TheLargestMotionIsOverAllArmsAndTimes) {
+  Arms start = {At(0).front(), At(0).front()};
+  Arms later = start;
+  later[1].base_from_gripper.rotate(Eigen::AngleAxisd(.3, Eigen::Vector3d::UnitZ()));
+  later[0].closure = .4;
+  const Motion motion = LargestMotion(start, std::vector<Arms>{later, start});
+  EXPECT_NEAR(motion.rotation_rad, .3, 1e-12);
+  EXPECT_DOUBLE_EQ(motion.closure, .4);
+  EXPECT_DOUBLE_EQ(motion.translation_m, 0);
+}
+
+}  // namespace
+}  // namespace evac

@@ -1,0 +1,121 @@
+#include "harness/suite.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <fstream>
+
+#include "core/error.h"
+#include "harness/scheduler.h"
+#include "tests/support/temp_folder.h"
+
+namespace evac {
+namespace {
+
+using ::testing::HasSubstr;
+
+constexpr const char* kSuite = R"(
+suite: tiny
+recording: rec
+worlds:
+  - {name: echo, type: echo}
+policies:
+  - {name: replay, checkpoint: a, command: [evac-policy, replay]}
+  - {name: replay, checkpoint: b, command: [evac-policy, replay]}
+seeds: [1, 2]
+lanes: 2
+)";
+
+class SuiteTest : public ::testing::Test {
+ protected:
+  SuiteTest() {
+    std::filesystem::create_directory(folder_ / "rec");
+    Write("rec/action.npy", "bytes");
+  }
+  std::filesystem::path Write(const std::string& name, const std::string& text) {
+    std::ofstream(folder_ / name) << text;
+    return folder_ / name;
+  }
+  std::string Complaint(const std::string& text, const std::vector<std::string>& assignments = {}) {
+    try {
+      ReadSuite(Write("suite.yaml", text), assignments);
+    } catch (const Error& error) {
+      EXPECT_EQ(error.exit_code(), ExitCode::kInvalidInput);
+      return error.what();
+    }
+    return "no complaint";
+  }
+  TempFolder folder_;
+};
+
+TEST_F(SuiteTest, AnUnknownKeyIsNamedWithItsLineAndTheNearestKnownOne) {
+  EXPECT_THAT(Complaint(std::string(kSuite) + "lane: 3\n"), AllOf(HasSubstr("suite.yaml:11"), HasSubstr("field lane"), HasSubstr("'lanes'")));
+}
+
+TEST_F(SuiteTest, AWrongTypeSaysWhatWasFoundAndWhatWasWanted) {
+  EXPECT_THAT(Complaint(std::string(kSuite) + "chunk_size: many\n"), AllOf(HasSubstr("field chunk_size"), HasSubstr("'many'"), HasSubstr("a whole number")));
+}
+
+TEST_F(SuiteTest, ASecondRealWorldOrATwinPolicyIsRefused) {
+  EXPECT_THAT(Complaint(kSuite, {"policies.1.checkpoint=a"}), HasSubstr("'replay@a' is there twice"));
+}
+
+TEST_F(SuiteTest, SetOverridesAnyFieldAndChangesTheHash) {
+  const auto path = Write("suite.yaml", kSuite);
+  const Suite plain = ReadSuite(path, {}), changed = ReadSuite(path, {"policies.1.checkpoint=c", "chunk_size=4"});
+  EXPECT_EQ(changed.policies[1].checkpoint, "c");
+  EXPECT_EQ(changed.chunk_size, 4);
+  EXPECT_NE(plain.hash, changed.hash);
+  EXPECT_THAT(Complaint(kSuite, {"nowhere.field=1"}), HasSubstr("has no field 'nowhere'"));
+}
+
+TEST_F(SuiteTest, TheHashIgnoresCommentsLayoutAndSpeedButNotTheContentOfFiles) {
+  const auto path = Write("suite.yaml", kSuite);
+  const std::string hash = ReadSuite(path, {}).hash;
+  EXPECT_EQ(ReadSuite(Write("other.yaml", std::string("# a comment\n") + kSuite), {}).hash, hash);
+  EXPECT_EQ(ReadSuite(path, {"lanes=7", "error_budget=0.5"}).hash, hash);
+  Write("rec/action.npy", "other bytes");
+  EXPECT_NE(ReadSuite(path, {}).hash, hash);
+}
+
+TEST_F(SuiteTest, PathsInSetAreRelativeToTheWorkingDirectory) {
+  const auto path = Write("suite.yaml", kSuite);
+  const auto relative = std::filesystem::relative(folder_ / "rec");
+  EXPECT_EQ(ReadSuite(path, {"recording=" + relative.string()}).recording, (folder_ / "rec").lexically_normal());
+}
+
+TEST_F(SuiteTest, TheStoredTextReadsAsTheSameSuite) {
+  const Suite suite = ReadSuite(Write("suite.yaml", kSuite), {"seeds=[3]"});
+  const Suite again = ParseSuite(suite.text, suite.path);
+  EXPECT_EQ(again.hash, suite.hash);
+  EXPECT_EQ(again.seeds, std::vector<std::uint64_t>{3});
+}
+
+TEST(Scheduler, PairsShareTheirSeedsAcrossWorldsAndWorldsAcrossPolicies) {
+  Suite suite;
+  suite.tasks.resize(1);
+  suite.tasks[0].id = "task";
+  suite.initial_states = {{"7-0000", 11}, {"7-0001", 12}};
+  suite.seeds = {1, 2};
+  const SuitePolicy a{"p", "a", {}, "", ""}, b{"p", "b", {}, "", ""};
+  const SuiteWorld real{"real", "mujoco", true, ""}, sim{"sim", "mujoco", false, ""};
+  const auto real_a = AllJobs(suite, real, a), sim_a = AllJobs(suite, sim, a), real_b = AllJobs(suite, real, b);
+  ASSERT_EQ(real_a.size(), 4u);
+  for (std::size_t i = 0; i < real_a.size(); ++i) {
+    EXPECT_EQ(real_a[i].key.pair, sim_a[i].key.pair);
+    EXPECT_EQ(real_a[i].PolicySeed(), sim_a[i].PolicySeed());
+    EXPECT_EQ(real_a[i].WorldSeed(), real_b[i].WorldSeed());
+    EXPECT_NE(real_a[i].PolicySeed(), real_b[i].PolicySeed());
+    EXPECT_EQ(real_a[i].initial.seed, real_b[i].initial.seed);
+  }
+  EXPECT_NE(real_a[0].PolicySeed(), real_a[1].PolicySeed());
+}
+
+TEST(Scheduler, TheRealWorldComesFirst) {
+  const auto worlds = RealFirst({{"sim", "mujoco", false, ""}, {"real", "mujoco", true, ""}, {"other", "mujoco", false, ""}});
+  EXPECT_EQ(worlds[0].name, "real");
+  EXPECT_EQ(worlds[1].name, "sim");
+}
+
+}  // namespace
+}  // namespace evac
