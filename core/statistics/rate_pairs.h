@@ -1,0 +1,14 @@
+#pragma once
+
+#include <vector>
+
+namespace evac {
+
+/// What every comparison of worlds works on: entry i is one point, a policy (on a task). Named, because the order of
+/// arguments has been confused before: SIMPLER's signature is (sim, real), its README calls it with (real, sim).
+struct RatePairs {
+  std::vector<double> real;  ///< R: success rate in the reference world
+  std::vector<double> sim;   ///< S: success rate in the world under test, of the same length
+};
+
+}  // namespace evac

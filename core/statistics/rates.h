@@ -1,0 +1,43 @@
+#pragma once
+
+#include <cstdint>
+#include <span>
+
+#include "core/statistics/estimate.h"
+
+/// One success rate and its interval (statistics.md 3.1). Each takes k = `successes` of n = `trials`.
+/// n = 0: the value is undefined, the interval is [0, 1]: nothing is known.
+/// All throw InvalidInput unless 0 <= k <= n and 0 < confidence < 1.
+namespace evac {
+
+struct Count {
+  std::int64_t successes = 0, trials = 0;
+};
+
+/// Score interval without continuity correction (Wilson 1927). The default of every rate that is shown.
+Estimate WilsonInterval(std::int64_t successes, std::int64_t trials, double confidence = 0.95);
+
+/// "Exact": covers at least `confidence` whatever the rate (Clopper & Pearson 1934). For gates that promise coverage.
+Estimate ClopperPearsonInterval(std::int64_t successes, std::int64_t trials, double confidence = 0.95);
+
+/// Equal-tailed Beta(k + 1/2, n - k + 1/2), its low end 0 at k = 0 and its high end 1 at k = n (Brown, Cai & DasGupta
+/// 2001).
+Estimate JeffreysInterval(std::int64_t successes, std::int64_t trials, double confidence = 0.95);
+
+/// What repeats within one cluster (the same initial state, several seeds) tell about a rate.
+struct ClusterStatistics {
+  Number rate = Undefined{"no trials"};  ///< pooled: sum of successes / sum of trials
+  Number icc = Undefined{"no trials"};   ///< ICC(1) by one-way ANOVA; below 0 where clusters are more alike than chance
+  Number design_effect = Undefined{"no trials"};     ///< 1 + (m - 1) ICC, m the (average) number of trials per cluster
+  Number effective_trials = Undefined{"no trials"};  ///< trials / design effect, at most trials
+  Number cluster_se = Undefined{"no trials"};        ///< of the rate: linearised ratio, with G / (G - 1)
+  Number naive_se = Undefined{"no trials"};          ///< as if all trials were independent
+  std::int64_t clusters = 0, trials = 0;
+};
+/// Clusters without trials are left out.
+ClusterStatistics StatisticsOfClusters(std::span<const Count> clusters);
+
+/// Wilson on the effective number of trials; plain Wilson where that is undefined (one trial per cluster).
+Estimate ClusteredWilsonInterval(std::span<const Count> clusters, double confidence = 0.95);
+
+}  // namespace evac

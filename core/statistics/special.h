@@ -1,0 +1,26 @@
+#pragma once
+
+/// The special functions statistics needs, named for what they mean. Double precision, about 1e-14 relative.
+/// All throw InvalidInput outside their domain.
+namespace evac {
+
+/// P(Z <= x), Z standard normal.
+double NormalCdf(double x);
+/// The x with P(Z <= x) = p. @param p in (0, 1).
+double NormalQuantile(double p);
+/// z of a two-sided interval: Phi^-1(1 - (1 - confidence) / 2); 1.9599… for .95. @param confidence in (0, 1).
+double TwoSidedZ(double confidence);
+
+/// Regularised incomplete beta: P(X <= x), X ~ Beta(a, b). @param a, b > 0. @param x in [0, 1].
+double BetaCdf(double a, double b, double x);
+/// The x with BetaCdf(a, b, x) = p. @param p in [0, 1].
+double BetaQuantile(double p, double a, double b);
+
+/// P(X > x), X chi-square with `degrees` degrees of freedom. @param x >= 0. @param degrees > 0.
+double ChiSquareTail(double x, double degrees);
+/// P(|T| > |t|), T Student with `degrees` degrees of freedom. @param degrees > 0.
+double StudentTwoSided(double t, double degrees);
+/// P(X <= k), X ~ Bin(n, 1/2). @param k in [0, n].
+double FairBinomialCdf(long k, long n);
+
+}  // namespace evac
