@@ -1,0 +1,66 @@
+#pragma once
+
+#include <condition_variable>
+#include <filesystem>
+#include <map>
+#include <mutex>
+#include <optional>
+#include <string>
+#include <thread>
+#include <vector>
+
+namespace evac {
+
+struct PolicyProcessOptions {
+  std::vector<std::string> command;                ///< program (looked up in PATH) and arguments, not empty
+  std::map<std::string, std::string> environment;  ///< added to the harness's own
+  std::filesystem::path working_directory;         ///< empty: the harness's
+  std::filesystem::path log;                       ///< its stdout and stderr are appended here
+  double first_restart_after_s = 0.2;              ///< back-off after a death; doubles with each …
+  double longest_back_off_s = 5;                   ///< … up to this
+  int restarts = 5;                                ///< more deaths than this within `window_s`: given up
+  double window_s = 60;
+  double grace_s = 3;                              ///< between SIGTERM and SIGKILL
+};
+
+/// A policy's process, started, watched, restarted and stopped. Nothing of it outlives the harness:
+///
+///   harness ── guardian ── the policy's command (its own session) ── whatever it starts
+///
+/// The guardian is a fork of the harness that does nothing but wait. It ends everything below it, also what left the
+/// policy's session (it is the "subreaper" of its descendants), when the policy ends, when Stop asks for it, or when the
+/// harness is gone, be it by SIGKILL: it sees its pipe to the harness close. If the guardian itself is killed, the policy gets SIGKILL.
+class PolicyProcess {
+ public:
+  /// Starts it. @throws InvalidInput if the command is empty or the log cannot be written.
+  explicit PolicyProcess(PolicyProcessOptions options);
+  /// Stops it.
+  ~PolicyProcess();
+  PolicyProcess(const PolicyProcess&) = delete;
+  PolicyProcess& operator=(const PolicyProcess&) = delete;
+
+  /// SIGTERM to all of it, `grace_s`, SIGKILL; returns when nothing is left. Idempotent.
+  void Stop();
+
+  /// Why it is not coming back: "it ended 6 times within 60 s, the last time with exit code 3: <log's last line> (policy.log)".
+  /// Nothing while it runs or is about to be restarted, and after Stop. Thread-safe.
+  std::optional<std::string> WhyGone() const;
+
+  int restarts() const;  ///< so far. Thread-safe.
+
+ private:
+  void Supervise();
+  int RunOnce();
+  void GiveUp(int deaths, int status);
+
+  PolicyProcessOptions options_;
+  mutable std::mutex mutex_;
+  std::condition_variable stopping_changed_;
+  bool stopping_ = false;
+  int alive_pipe_ = -1;  ///< closing it asks the guardian to end
+  int restarts_ = 0;
+  std::optional<std::string> why_gone_;
+  std::thread supervisor_;
+};
+
+}  // namespace evac

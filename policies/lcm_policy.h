@@ -1,0 +1,67 @@
+#pragma once
+
+#include <functional>
+#include <map>
+#include <memory>
+#include <optional>
+#include <string>
+
+#include "core/policy.h"
+#include "core/store.h"
+#include "policies/lcm_link.h"
+#include "policies/spec.h"
+
+namespace evac {
+
+struct LcmPolicyOptions {
+  LcmAddress address;
+  double deadline_s = 20;       ///< from a request's first sending to giving it up as policy_timeout
+  double repeat_after_s = 0.5;  ///< before the first repeat of what was not answered; doubles with each
+  bool raw_images = false;      ///< exact pixels instead of JPEG; for tests
+  int jpeg_quality = 95;        ///< 0 … 100
+  Pacing pacing;
+  /// Asked while waiting: why nobody will ever answer (PolicyProcess::WhyGone), so that nobody waits for the deadline.
+  std::function<std::optional<std::string>()> why_gone;
+};
+
+/// A policy in another process, at the end of an LCM link (docs/formats/policy_wire.md).
+///
+/// What the wire does is never the run's end: what stays unanswered until its deadline becomes Failure{policy_timeout}, an error
+/// reply or a malformed one becomes Failure{policy_error} with what and where, for that scene alone. Replies that answer
+/// something else are recognised and counted. Repeats change no result: the server answers them from its cache.
+///
+///   LcmPolicy policy({.address = LcmAddress::For(run_name)});
+///   const PolicySpec declared = policy.Handshake(HarnessSpec(task, chunk_size), 30);
+///   RunEpisodes(policy, world, …);
+class LcmPolicy : public Policy {
+ public:
+  /// @throws InvalidInput if there is no multicast here or the options are out of range.
+  explicit LcmPolicy(LcmPolicyOptions options);
+  ~LcmPolicy() override;
+
+  /// Both sides declare. To be called once, before the first Reset; a process that is only just starting has `wait_s` for it.
+  /// @returns what the policy declared.
+  /// @throws InvalidInput if they do not fit together (both declarations side by side), if nobody answers within `wait_s`,
+  ///         or if two policies answer on this address.
+  PolicySpec Handshake(const PolicySpec& harness, double wait_s);
+
+  /// The policy's declared name; before the handshake the token.
+  std::string Name() const override;
+
+  /// Returns at once: the start travels with the next Act, where a refusal is a policy_error.
+  void Reset(SceneId scene, const Task& task, std::uint64_t seed) override;
+
+  /// All scenes' requests are sent before the first answer is awaited. Chunks longer than the harness's are cut to it.
+  std::vector<Acted> Act(std::span<const SceneObservation> batch) override;
+
+  /// repeats, stale_replies (of an earlier request), duplicate_replies, late_replies (after the deadline),
+  /// reordered_replies (overtaken by a later one), foreign_replies (another run's, token's or client's),
+  /// undecodable_replies, timeouts, malformed_replies, error_replies.
+  const Counters& counters() const;
+
+ private:
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace evac

@@ -1,0 +1,50 @@
+#pragma once
+
+#include <Eigen/Geometry>
+#include <opencv2/core.hpp>
+#include <optional>
+#include <vector>
+
+#include "core/types.h"
+
+/// What a policy without any learning can see: patches of a colour it knows by name, to a fraction of a pixel, and where in the
+/// robot's base frame they are when their height is known. Works on small, noisy or blurred pictures: nothing here
+/// looks at a single pixel alone, and thresholds follow the light.
+namespace evac {
+
+/// A colour by its hue and by how colourful it is, whatever the light's brightness.
+struct ColourModel {
+  double hue_deg = 0;             ///< [0, 360): 0 red, 120 green, 240 blue
+  double hue_tolerance_deg = 20;  ///< beyond it a pixel is another colour
+  double min_saturation = 0.25;   ///< [0, 1] of HSV; what is greyer is no colour at all
+  double max_saturation = 1.0;    ///< [0, 1]; tells brown bread from an orange box
+  double min_value = 0.1;         ///< [0, 1] of HSV; what is darker is shadow
+};
+
+/// One connected patch of a colour.
+struct Blob {
+  double weight_px = 0;           ///< its area, where a pixel covered by half counts half
+  Eigen::Vector2d centroid_px;    ///< weighted; pixel centres at integer + 0.5, as in Camera
+  Eigen::Vector2d major_axis;     ///< unit vector along its longest extent, right-pointing (x ≥ 0)
+  double major_sd_px = 0, minor_sd_px = 0;  ///< standard deviations along and across `major_axis`
+  cv::Rect box;                   ///< of the pixels covered by at least half
+  cv::Mat cover;                  ///< CV_32F, image-sized, in [0, 1]: how much of a pixel belongs to it
+};
+
+/// How much of each pixel is of this colour, CV_32F in [0, 1]. Colourfulness is measured against the most colourful
+/// pixels of that hue in the picture, so a pixel half on a grey ground counts about half, in any light.
+/// @param rgb  CV_8UC3, RGB.
+cv::Mat Cover(const cv::Mat& rgb, const ColourModel& colour);
+
+/// The connected patches of a colour, the largest first; those below `min_weight_px` are noise and left out.
+std::vector<Blob> FindBlobs(const cv::Mat& rgb, const ColourModel& colour, double min_weight_px);
+
+/// Where the ray through a pixel meets the horizontal plane at `height_m` (base frame), or nothing if it does not.
+std::optional<Eigen::Vector3d> OnPlane(const Camera& camera, const Eigen::Isometry3d& base_from_camera,
+                                       const Eigen::Vector2d& pixel, double height_m);
+
+/// Part of a blob, as one: the weighted centroid of its rows from the topmost down to `fraction` of its height.
+/// In a picture of a standing thing these rows show its upper end.
+Eigen::Vector2d TopCentroid(const Blob& blob, double fraction);
+
+}  // namespace evac
