@@ -1,0 +1,76 @@
+#include <fmt/format.h>
+
+#include <memory>
+
+#include "apps/commands.h"
+#include "apps/evaluate.h"
+#include "apps/factory.h"
+#include "core/version.h"
+
+namespace evac {
+namespace {
+
+namespace fs = std::filesystem;
+
+RunInfo InfoOf(const Suite& suite) {
+  return {.suite_text = suite.text, .suite_hash = suite.hash, .suite_path = fs::absolute(suite.path).lexically_normal().string(), .evac_version = EVAC_VERSION};
+}
+
+struct RunArguments {
+  std::string suite, out;
+  std::vector<std::string> assignments;
+};
+
+struct ResumeArguments {
+  std::string run;
+  bool retry_failed = false;
+  int lanes = 0;
+};
+
+ExitCode Run(const RunArguments& arguments) {
+  Suite suite = ReadSuite(arguments.suite, arguments.assignments);
+  Store store = Store::CreateOrContinue(arguments.out, InfoOf(suite));
+  FillInRecordedTask(suite);
+  return Evaluate(suite, store, {});
+}
+
+ExitCode Resume(const ResumeArguments& arguments) {
+  const RunInfo info = Store::Open(arguments.run, Store::Mode::kReadOnly).run();
+  Suite suite = ParseSuite(info.suite_text, info.suite_path);
+  if (suite.hash != info.suite_hash) {
+    throw InvalidInput("{}: a file that the suite {} names has changed since the run began (suite hash {:.12}…, was {:.12}…); "
+                       "start a new run with `evac run`", arguments.run, info.suite_path, suite.hash, info.suite_hash);
+  }
+  if (arguments.lanes > 0) suite.lanes = arguments.lanes;
+  Store store = Store::CreateOrContinue(arguments.run, info);
+  FillInRecordedTask(suite);
+  return Evaluate(suite, store, {.retry_failed = arguments.retry_failed});
+}
+
+}  // namespace
+
+void AddRun(CLI::App& app, ExitCode& exit_code) {
+  auto arguments = std::make_shared<RunArguments>();
+  CLI::App* command = app.add_subcommand("run", "Evaluate the policies of a suite in its worlds");
+  command->add_option("suite", arguments->suite, "the suite's YAML file (docs/suite.md)")->required();
+  command->add_option("-o,--out", arguments->out, "the run's folder; one that is there is continued")->required();
+  command->add_option("--set", arguments->assignments, "override a field: path.to.field=VALUE (repeatable)")->expected(1)->take_all();
+  command->footer("Examples:\n"
+                  "  evac run apps/configs/demo.yaml --out out/demo\n"
+                  "  evac run apps/configs/demo.yaml --out out/unseen --set initial_states.seed=9 --set initial_states.count=40\n"
+                  "  evac run apps/configs/agibot_replay.yaml --out out/replay --set recording=path/to/recording\n"
+                  "Into a run that is there already with the same suite it goes on where it was.");
+  command->callback([arguments, &exit_code] { exit_code = Run(*arguments); });
+}
+
+void AddResume(CLI::App& app, ExitCode& exit_code) {
+  auto arguments = std::make_shared<ResumeArguments>();
+  CLI::App* command = app.add_subcommand("resume", "Go on with a run that was interrupted");
+  command->add_option("run", arguments->run, "the run's folder")->required();
+  command->add_flag("--retry-failed", arguments->retry_failed, "run the failed episodes again");
+  command->add_option("--lanes", arguments->lanes, "episodes that advance together (changes no result)")->check(CLI::Range(1, 256));
+  command->footer("Example:\n  evac resume out/demo --retry-failed");
+  command->callback([arguments, &exit_code] { exit_code = Resume(*arguments); });
+}
+
+}  // namespace evac

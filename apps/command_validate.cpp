@@ -1,0 +1,47 @@
+#include <fmt/format.h>
+
+#include <memory>
+
+#include "apps/commands.h"
+#include "apps/factory.h"
+#include "harness/scheduler.h"
+
+namespace evac {
+namespace {
+
+struct ValidateArguments {
+  std::string suite;
+  std::vector<std::string> assignments;
+};
+
+/// Everything that can be known to be wrong before the first episode, short of starting the policies.
+ExitCode Validate(const ValidateArguments& arguments) {
+  Suite suite = ReadSuite(arguments.suite, arguments.assignments);
+  FillInRecordedTask(suite);
+  CheckRubrics(suite);
+  int episodes = 0;
+  for (const SuiteWorld& world : suite.worlds) {
+    const std::unique_ptr<World> built = MakeWorld(world, suite);
+    for (const Task& task : suite.tasks) built->Reset(0, task, suite.initial_states.front(), 0);
+    for (const SuitePolicy& policy : suite.policies) {
+      if (!policy.command.empty()) CommandLine(policy, suite);
+      episodes += static_cast<int>(AllJobs(suite, world, policy).size());
+    }
+  }
+  fmt::print("{}: valid. {} worlds x {} tasks x {} policies x {} initial states x {} seeds = {} episodes. Suite hash {}\n", arguments.suite,
+             suite.worlds.size(), suite.tasks.size(), suite.policies.size(), suite.initial_states.size(), suite.seeds.size(), episodes, suite.hash);
+  return ExitCode::kOk;
+}
+
+}  // namespace
+
+void AddValidate(CLI::App& app, ExitCode& exit_code) {
+  auto arguments = std::make_shared<ValidateArguments>();
+  CLI::App* command = app.add_subcommand("validate", "Check a suite and everything it names, without running it");
+  command->add_option("suite", arguments->suite, "the suite's YAML file (docs/suite.md)")->required();
+  command->add_option("--set", arguments->assignments, "override a field: path.to.field=VALUE (repeatable)")->expected(1)->take_all();
+  command->footer("Example:\n  evac validate apps/configs/demo.yaml --set initial_states.count=5");
+  command->callback([arguments, &exit_code] { exit_code = Validate(*arguments); });
+}
+
+}  // namespace evac

@@ -1,0 +1,51 @@
+#pragma once
+
+#include <filesystem>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "core/store.h"
+#include "core/world.h"
+#include "harness/policy_process.h"
+#include "harness/suite.h"
+#include "policies/lcm_policy.h"
+
+namespace evac {
+
+/// Suite entries become things: this is where modules meet.
+
+/// The task of a suite that replays a recording is made from it; other suites are left as they are.
+void FillInRecordedTask(Suite& suite);
+
+/// @throws InvalidInput naming task, stage and condition if the oracle could not judge by a rubric.
+void CheckRubrics(const Suite& suite);
+
+/// Tasks and worlds, as the store keeps them; checks the rubrics first.
+void Declare(const Suite& suite, Store& store);
+
+std::unique_ptr<World> MakeWorld(const SuiteWorld& world, const Suite& suite);
+
+/// The command line of a policy with its program found and `${recording}` filled in.
+/// @throws InvalidInput if the program is not there.
+std::vector<std::string> CommandLine(const SuitePolicy& policy, const Suite& suite);
+
+/// A policy's process, if it is ours to start, and the link to it; both gone with this.
+class RunningPolicy {
+ public:
+  /// Starts and greets it. @throws InvalidInput with both declarations if it does not fit the suite's tasks.
+  RunningPolicy(const SuitePolicy& policy, const Suite& suite, const std::filesystem::path& run_folder);
+
+  Policy& policy() { return *link_; }
+  int chunk_size() const { return spec_.chunk_size; }
+  std::string declaration() const { return ToJson(spec_); }
+  Counters counters() const;
+
+ private:
+  std::optional<PolicyProcess> process_;
+  std::optional<LcmPolicy> link_;  ///< gone before the process
+  PolicySpec spec_;
+};
+
+}  // namespace evac

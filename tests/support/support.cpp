@@ -1,1 +1,0 @@
-#include "tests/support/temp_folder.h"  // the library needs one translation unit
