@@ -1,6 +1,5 @@
 # Third-party libraries, all from Debian; their headers are SYSTEM so that -Werror is about our code only.
 find_package(Eigen3 REQUIRED)
-find_package(OpenCV 4 REQUIRED COMPONENTS core imgproc imgcodecs)
 find_package(SQLite3 REQUIRED)
 find_package(OpenSSL REQUIRED COMPONENTS Crypto)
 find_package(yaml-cpp REQUIRED)
@@ -21,8 +20,12 @@ find_library(LCM_LIBRARY lcm REQUIRED)
 find_program(LCM_GEN lcm-gen REQUIRED)
 
 add_library(evac_opencv INTERFACE)
-target_include_directories(evac_opencv SYSTEM INTERFACE ${OpenCV_INCLUDE_DIRS})
-target_link_libraries(evac_opencv INTERFACE ${OpenCV_LIBS})
+find_path(OPENCV_INCLUDE opencv2/core.hpp PATH_SUFFIXES opencv4 REQUIRED)  # OpenCV's CMake files come only with all of its modules
+target_include_directories(evac_opencv SYSTEM INTERFACE ${OPENCV_INCLUDE})
+foreach(module core imgproc imgcodecs)
+  find_library(OPENCV_${module} opencv_${module} REQUIRED)
+  target_link_libraries(evac_opencv INTERFACE ${OPENCV_${module}})
+endforeach()
 
 add_library(evac_hdf5 INTERFACE)
 target_include_directories(evac_hdf5 SYSTEM INTERFACE ${HDF5_INCLUDE_DIRS})

@@ -6,6 +6,7 @@
 #include <sstream>
 
 #include "core/file.h"
+#include "core/hash.h"
 
 namespace evac {
 namespace {
@@ -222,6 +223,8 @@ void Config::AllowOnly(std::initializer_list<const char*> known) const {
 void Config::Require(bool holds, const std::string& key, const std::string& wanted) const {
   if (!holds) throw InvalidInput("{}: found {}, wanted {}", Where(key), Shown(Child(key)), wanted);
 }
+
+std::string Config::ContentHash() const { return Sha256Hex(Canonical()); }
 
 std::string Config::Text() const { return YAML::Dump(node_) + "\n"; }
 

@@ -60,6 +60,8 @@ class Config {
   const std::filesystem::path& file() const { return file_; }
   /// Canonical text: the same for the same content, whatever the comments or the layout of the file. What is hashed.
   std::string Canonical() const;
+  /// SHA-256 of Canonical().
+  std::string ContentHash() const;
   /// As YAML again, with what was set; without the comments.
   std::string Text() const;
   const YAML::Node& node() const { return node_; }
