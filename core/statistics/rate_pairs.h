@@ -1,5 +1,6 @@
 #pragma once
 
+#include <span>
 #include <vector>
 
 namespace evac {
@@ -10,5 +11,9 @@ struct RatePairs {
   std::vector<double> real;  ///< R: success rate in the reference world
   std::vector<double> sim;   ///< S: success rate in the world under test, of the same length
 };
+
+/// What every function of two sequences asks of them. @throws InvalidInput if the lengths differ or a value is not
+/// finite.
+void CheckPairs(std::span<const double> x, std::span<const double> y);
 
 }  // namespace evac

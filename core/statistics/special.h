@@ -1,5 +1,7 @@
 #pragma once
 
+#include <cstdint>
+
 /// The special functions statistics needs, named for what they mean. Double precision, about 1e-14 relative.
 /// All throw InvalidInput outside their domain.
 namespace evac {
@@ -21,6 +23,6 @@ double ChiSquareTail(double x, double degrees);
 /// P(|T| > |t|), T Student with `degrees` degrees of freedom. @param degrees > 0.
 double StudentTwoSided(double t, double degrees);
 /// P(X <= k), X ~ Bin(n, 1/2). @param k in [0, n].
-double FairBinomialCdf(long k, long n);
+double FairBinomialCdf(std::int64_t k, std::int64_t n);
 
 }  // namespace evac

@@ -1,0 +1,69 @@
+#include "core/statistics/special.h"
+
+#include <boost/math/distributions/binomial.hpp>
+#include <boost/math/distributions/chi_squared.hpp>
+#include <boost/math/distributions/normal.hpp>
+#include <boost/math/distributions/students_t.hpp>
+#include <boost/math/special_functions/beta.hpp>
+#include <cmath>
+
+#include "core/error.h"
+
+namespace evac {
+namespace {
+
+void Require(bool holds, const char* name, double found, const char* wanted) {
+  if (!holds) throw InvalidInput("statistics: {} is {}, wanted {}", name, found, wanted);
+}
+
+}  // namespace
+
+double NormalCdf(double x) {
+  Require(!std::isnan(x), "x", x, "a number");
+  return std::erfc(-x / std::sqrt(2.0)) / 2;
+}
+
+double NormalQuantile(double p) {
+  Require(p > 0 && p < 1, "probability", p, "0 < p < 1");
+  return boost::math::quantile(boost::math::normal(), p);
+}
+
+double TwoSidedZ(double confidence) {
+  Require(confidence > 0 && confidence < 1, "confidence", confidence, "0 < confidence < 1");
+  return boost::math::quantile(boost::math::complement(boost::math::normal(), (1 - confidence) / 2));
+}
+
+double BetaCdf(double a, double b, double x) {
+  Require(a > 0 && std::isfinite(a), "a", a, "above 0");
+  Require(b > 0 && std::isfinite(b), "b", b, "above 0");
+  Require(x >= 0 && x <= 1, "x", x, "0 <= x <= 1");
+  return boost::math::ibeta(a, b, x);
+}
+
+double BetaQuantile(double p, double a, double b) {
+  Require(a > 0 && std::isfinite(a), "a", a, "above 0");
+  Require(b > 0 && std::isfinite(b), "b", b, "above 0");
+  Require(p >= 0 && p <= 1, "probability", p, "0 <= p <= 1");
+  return boost::math::ibeta_inv(a, b, p);
+}
+
+double ChiSquareTail(double x, double degrees) {
+  Require(x >= 0, "x", x, "x >= 0");
+  Require(degrees > 0, "degrees of freedom", degrees, "above 0");
+  return boost::math::cdf(boost::math::complement(boost::math::chi_squared(degrees), x));
+}
+
+double StudentTwoSided(double t, double degrees) {
+  Require(!std::isnan(t), "t", t, "a number");
+  Require(degrees > 0, "degrees of freedom", degrees, "above 0");
+  return 2 * boost::math::cdf(boost::math::complement(boost::math::students_t(degrees), std::abs(t)));
+}
+
+double FairBinomialCdf(std::int64_t k, std::int64_t n) {
+  Require(n >= 0, "n", static_cast<double>(n), "n >= 0");
+  Require(k >= 0 && k <= n, "k", static_cast<double>(k), "0 <= k <= n");
+  if (k == n) return 1;
+  return boost::math::cdf(boost::math::binomial(static_cast<double>(n), 0.5), static_cast<double>(k));
+}
+
+}  // namespace evac
