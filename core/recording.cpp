@@ -1,0 +1,88 @@
+#include "core/recording.h"
+
+#include <algorithm>
+#include <cctype>
+
+#include "core/error.h"
+#include "core/recording_parts.h"
+
+namespace evac {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// Safe in a path and in a URL.
+std::string SafeName(std::string name) {
+  for (char& letter : name) {
+    if (!std::isalnum(static_cast<unsigned char>(letter)) && letter != '-' && letter != '_' && letter != '.') letter = '_';
+  }
+  return name.empty() || name.front() == '.' ? "recording" + name : name;
+}
+
+/// ROOT/observations/<task>/<episode> (or its videos folder) → the places of its parts.
+ClipFolders TreeFolders(const fs::path& episode) {
+  const fs::path task = episode.parent_path().filename(), number = episode.filename();
+  const fs::path root = episode.parent_path().parent_path().parent_path();
+  return {fmt::format("{}-{}", task.string(), number.string()), episode / "videos",
+          root / "parameters" / task / number / "parameters" / "camera", root / "proprio_stats" / task / number / "proprio_stats.h5"};
+}
+
+bool IsTreeEpisode(const fs::path& folder) { return folder.parent_path().parent_path().filename() == "observations"; }
+
+void CheckOptions(const RecordingOptions& options) {
+  if (options.every_nth < 1) throw InvalidInput("recording: every_nth is {}, wanted 1 or more", options.every_nth);
+  const auto twice = [&](const std::string& name) { return std::count(options.cameras.begin(), options.cameras.end(), name) > 1; };
+  if (std::any_of(options.cameras.begin(), options.cameras.end(), twice)) throw InvalidInput("recording: a camera is named twice");
+}
+
+Recording ReadLayout(const fs::path& folder, const RecordingOptions& options) {
+  if (fs::exists(folder / "action.npy")) return ReadExampleLayout(folder, options);
+  if (fs::exists(folder / "proprio_stats.h5")) {
+    return ReadClipLayout({folder.filename().string(), folder, folder, folder / "proprio_stats.h5"}, options);
+  }
+  if (IsTreeEpisode(folder)) return ReadClipLayout(TreeFolders(folder), options);
+  if (IsTreeEpisode(folder.parent_path()) && folder.filename() == "videos") {
+    return ReadClipLayout(TreeFolders(folder.parent_path()), options);
+  }
+  throw InvalidInput("{}: no recording; wanted a folder with action.npy, one with proprio_stats.h5, or an episode of an AgiBot World "
+                     "tree: ROOT/observations/<task>/<episode>", folder.string());
+}
+
+}  // namespace
+
+Recording ReadRecording(const fs::path& folder, const RecordingOptions& options) {
+  CheckOptions(options);
+  std::error_code error;
+  const fs::path absolute = fs::canonical(folder, error);
+  if (error || !fs::is_directory(absolute)) throw InvalidInput("{}: no such folder", folder.string());
+  Recording recording = ReadLayout(absolute, options);
+  recording.id = SafeName(recording.id);
+  recording.every_nth = options.every_nth;
+  recording.arm_names = {"left", "right"};
+  recording.source += fmt::format(", {} steps of {:.4g} s", recording.arms.size(), recording.period_s);
+  return recording;
+}
+
+Task TaskFromRecording(const Recording& recording, double margin_m) {
+  Task task;
+  task.id = recording.id;
+  task.instruction = fmt::format("Do what was recorded in {}.", recording.id);
+  task.arms = recording.arm_names;
+  task.cameras = recording.cameras;
+  task.period_s = recording.period_s;
+  task.max_chunks = std::max<int>(1, static_cast<int>(recording.arms.size()) - 1);
+  task.still.enabled = false;
+  task.workspace_m.setEmpty();
+  for (const Arms& arms : recording.arms) {
+    for (const ArmState& arm : arms) task.workspace_m.extend(arm.base_from_gripper.translation());
+  }
+  task.workspace_m.min().array() -= margin_m;
+  task.workspace_m.max().array() += margin_m;
+  task.rubric.version = "none";
+  task.rubric.success = "A recording has no rubric of its own.";
+  return task;
+}
+
+InitialScene InitialSceneOf(const Recording& recording) { return {recording.first_images, recording.arms.front(), recording.cameras}; }
+
+}  // namespace evac

@@ -1,0 +1,144 @@
+#include <cmath>
+
+#include "core/error.h"
+#include "core/file.h"
+#include "core/recording_parts.h"
+#include "core/video.h"
+
+namespace evac {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr double kAgibotPeriod_s = 1.0 / 30;
+constexpr double kRateTolerance = 0.02;  // time stamps are rounded to a video's time base
+
+/// What one walk through a video tells.
+struct VideoFacts {
+  cv::Mat first;
+  std::size_t frames = 0;
+  double period_s = 0;  ///< mean; 0 if there is one frame
+};
+
+/// @param count  false: stop after two frames, which tell the rate.
+VideoFacts LookThrough(const fs::path& path, bool count) {
+  VideoReader video(path);
+  VideoFacts facts{video.Next(), 0, 0};
+  if (facts.first.empty()) throw InvalidInput("{}: the video has no frame", path.string());
+  const double begin_s = video.time_s();
+  double end_s = begin_s;
+  facts.frames = 1;
+  while ((count || facts.frames < 2) && !video.Next().empty()) {
+    end_s = video.time_s();
+    ++facts.frames;
+  }
+  if (facts.frames > 1) facts.period_s = (end_s - begin_s) / static_cast<double>(facts.frames - 1);
+  return facts;
+}
+
+/// About a whole number of frames per second is meant exactly.
+double Snapped(double period_s) {
+  const double rate_hz = std::round(1 / period_s);
+  return rate_hz > 0 && std::abs(period_s * rate_hz - 1) < kRateTolerance ? 1 / rate_hz : period_s;
+}
+
+Mount MountOf(const std::string& camera) {
+  if (camera == "hand_left") return Mount::kLeftGripper;
+  return camera == "hand_right" ? Mount::kRightGripper : Mount::kBase;
+}
+
+fs::path VideoOf(const ClipFolders& folders, const std::string& camera) { return folders.images / (camera + "_color.mp4"); }
+fs::path IntrinsicsOf(const ClipFolders& folders, const std::string& camera) { return folders.pages / (camera + "_intrinsic_params.json"); }
+
+/// The cameras asked for, or all that have a video; head always.
+std::vector<std::string> ChooseCameras(const ClipFolders& folders, const RecordingOptions& options) {
+  if (!options.cameras.empty()) return options.cameras;
+  const bool has_videos = fs::exists(VideoOf(folders, "head"));
+  std::vector<std::string> names = {"head"};
+  for (const std::string name : {"hand_left", "hand_right"}) {
+    if (fs::exists(VideoOf(folders, name))) {
+      names.push_back(name);
+    } else if (has_videos && fs::exists(IntrinsicsOf(folders, name))) {
+      throw InvalidInput("{}: there is a page for camera {}, but no video {}", folders.pages.string(), name, VideoOf(folders, name).string());
+    }
+  }
+  return names;
+}
+
+/// What reading the cameras needs to know of the rest.
+struct Context {
+  const ClipFolders& folders;
+  const RecordingOptions& options;
+  const std::vector<Arms>& arms;  ///< all recorded steps
+};
+
+Camera ReadCamera(const Context& context, const std::string& name, const cv::Mat& first) {
+  const fs::path intrinsics = IntrinsicsOf(context.folders, name);
+  const fs::path extrinsics = context.folders.pages / (name + "_extrinsic_params_aligned.json");
+  Camera camera = ParseIntrinsics(ReadFile(intrinsics), intrinsics.string());
+  camera.name = name;
+  camera.width_px = first.cols;
+  camera.height_px = first.rows;
+  camera.mount = MountOf(name);
+  CheckPinhole(camera, intrinsics.string());
+  const std::vector<Eigen::Isometry3d> poses = ParseExtrinsics(ReadFile(extrinsics), extrinsics.string());
+  camera.mount_from_camera = FixedMount({camera.mount, poses, context.arms}, context.options, extrinsics.string());
+  return camera;
+}
+
+/// @throws InvalidInput if a video is too short for the steps, or its rate differs from that of the videos before it.
+void CheckVideo(const VideoFacts& facts, const fs::path& path, const Context& context, double period_s) {
+  if (context.options.count_video_frames && facts.frames < context.arms.size()) {
+    throw InvalidInput("{}: {} frames, wanted one for each of the {} steps of {}", path.string(), facts.frames, context.arms.size(),
+                       context.folders.proprio.string());
+  }
+  if (period_s > 0 && std::abs(facts.period_s / period_s - 1) > kRateTolerance) {
+    throw InvalidInput("{}: {:.2f} frames per second, wanted {:.2f} as the video before it", path.string(), 1 / facts.period_s, 1 / period_s);
+  }
+}
+
+/// Adds one camera that has a video. @returns the video's period, s, or 0 if it has one frame.
+double AddVideoCamera(const Context& context, const std::string& name, double period_s, Recording& recording) {
+  const fs::path path = VideoOf(context.folders, name);
+  if (!fs::exists(path)) throw InvalidInput("{}: missing: camera {} has no video", path.string(), name);
+  const VideoFacts facts = LookThrough(path, context.options.count_video_frames);
+  CheckVideo(facts, path, context, period_s);
+  recording.videos.push_back(path);
+  recording.first_images.push_back(facts.first);
+  recording.cameras.push_back(ReadCamera(context, name, facts.first));
+  return facts.period_s;
+}
+
+/// A clip without videos: its first frame is all there is to see.
+void AddStillCamera(const Context& context, const std::vector<std::string>& names, Recording& recording) {
+  const fs::path frame = context.folders.images / "frame.png";
+  if (names != std::vector<std::string>{"head"} || !fs::exists(frame)) {
+    throw InvalidInput("{}: missing: camera {} has no video", VideoOf(context.folders, names.back()).string(), names.back());
+  }
+  recording.first_images = {ReadPng(frame)};
+  recording.cameras = {ReadCamera(context, "head", recording.first_images[0])};
+}
+
+}  // namespace
+
+Recording ReadClipLayout(const ClipFolders& folders, const RecordingOptions& options) {
+  std::vector<Arms> arms = ReadProprio(folders.proprio);
+  const Context context{folders, options, arms};
+  const std::vector<std::string> names = ChooseCameras(folders, options);
+  Recording recording;
+  recording.id = folders.id;
+  double video_period_s = 0;
+  if (fs::exists(VideoOf(folders, names.front()))) {
+    for (const std::string& name : names) video_period_s = AddVideoCamera(context, name, video_period_s, recording);
+  } else {
+    AddStillCamera(context, names, recording);
+  }
+  const double found_period_s = video_period_s > 0 ? Snapped(video_period_s) : kAgibotPeriod_s;
+  recording.period_s = (options.recorded_period_s > 0 ? options.recorded_period_s : found_period_s) * options.every_nth;
+  recording.arms = EveryNth(std::move(arms), options.every_nth);
+  recording.source = fmt::format("{}: AgiBot World layout, {} cameras{}", folders.images.string(), names.size(),
+                                 recording.videos.empty() ? ", first frame" : "");
+  return recording;
+}
+
+}  // namespace evac

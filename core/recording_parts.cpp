@@ -1,0 +1,114 @@
+#include "core/recording_parts.h"
+
+#include <algorithm>
+#include <opencv2/imgcodecs.hpp>
+#include <opencv2/imgproc.hpp>
+
+#include "core/error.h"
+#include "core/file.h"
+#include "core/geometry.h"
+
+namespace evac {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr double kClosedGripper = 120;                        // AgiBot's raw reading of a closed gripper
+constexpr double kLowestGripper = -10, kHighestGripper = 140;  // beyond these it is another unit
+constexpr double kUnitTolerance = 1e-3;
+constexpr unsigned kMaxSide_px = 8192;
+
+/// A side of the image out of the PNG's first chunk (big-endian), so that a lying file cannot ask for gigabytes.
+unsigned PngSide(const std::string& bytes, std::size_t at) {
+  unsigned side = 0;
+  for (std::size_t i = at; i < at + 4; ++i) side = side << 8 | static_cast<unsigned char>(bytes[i]);
+  return side;
+}
+
+}  // namespace
+
+ArmState ArmFromRaw(const RawArm& raw, const std::string& where) {
+  if (!raw.xyz_m.allFinite() || !raw.quat_xyzw.allFinite()) throw InvalidInput("{}: the pose is not finite", where);
+  const double length = raw.quat_xyzw.norm();
+  if (std::abs(length - 1) > kUnitTolerance) {
+    throw InvalidInput("{}: the quaternion has length {:.4f}, wanted 1 within {}", where, length, kUnitTolerance);
+  }
+  if (!(raw.gripper >= kLowestGripper && raw.gripper <= kHighestGripper)) {
+    throw InvalidInput("{}: the gripper reads {}, wanted 0 (open) … {} (closed)", where, raw.gripper, kClosedGripper);
+  }
+  return {FromXyzQuat(raw.xyz_m, raw.quat_xyzw), std::clamp(raw.gripper / kClosedGripper, 0.0, 1.0)};
+}
+
+Eigen::Isometry3d RigidOrThrow(const Eigen::Matrix3d& rotation, const Eigen::Vector3d& translation_m, const std::string& where) {
+  if (!rotation.allFinite() || !translation_m.allFinite()) throw InvalidInput("{}: the pose is not finite", where);
+  const double off = (rotation * rotation.transpose() - Eigen::Matrix3d::Identity()).norm();
+  if (!(off < kUnitTolerance && rotation.determinant() > 0)) {
+    throw InvalidInput("{}: the rotation matrix is no rotation (R Rᵀ is {:.4f} from the identity, determinant {:.4f})", where, off,
+                       rotation.determinant());
+  }
+  Eigen::Isometry3d pose = Eigen::Isometry3d::Identity();
+  pose.linear() = Eigen::Quaterniond(rotation).normalized().toRotationMatrix();
+  pose.translation() = translation_m;
+  return pose;
+}
+
+void CheckPinhole(const Camera& camera, const std::string& where) {
+  if (!(camera.fx_px > 0 && camera.fy_px > 0 && std::isfinite(camera.fx_px) && std::isfinite(camera.fy_px))) {
+    throw InvalidInput("{}: focal lengths {}, {} px, wanted positive numbers", where, camera.fx_px, camera.fy_px);
+  }
+  const bool inside = camera.cx_px > 0 && camera.cx_px < camera.width_px && camera.cy_px > 0 && camera.cy_px < camera.height_px;
+  if (!inside) {
+    throw InvalidInput("{}: principal point ({:.1f}, {:.1f}) px, wanted one inside the image of {}x{}", where, camera.cx_px,
+                       camera.cy_px, camera.width_px, camera.height_px);
+  }
+}
+
+cv::Mat ReadPng(const fs::path& path) {
+  const std::string bytes = ReadFile(path);
+  constexpr std::size_t kWidthAt = 16, kHeightAt = 20, kHeaderEnd = 24;
+  if (bytes.size() < kHeaderEnd || bytes.compare(0, 8, "\x89PNG\r\n\x1a\n") != 0) throw InvalidInput("{}: no PNG file", path.string());
+  const unsigned width_px = PngSide(bytes, kWidthAt), height_px = PngSide(bytes, kHeightAt);
+  if (width_px == 0 || height_px == 0 || width_px > kMaxSide_px || height_px > kMaxSide_px) {
+    throw InvalidInput("{}: {}x{} pixels, wanted 1 … {} each", path.string(), width_px, height_px, kMaxSide_px);
+  }
+  cv::Mat image;
+  try {
+    const cv::Mat encoded(1, static_cast<int>(bytes.size()), CV_8UC1, const_cast<char*>(bytes.data()));
+    image = cv::imdecode(encoded, cv::IMREAD_COLOR);  // BGR
+    if (!image.empty()) cv::cvtColor(image, image, cv::COLOR_BGR2RGB);
+  } catch (const cv::Exception& error) {
+    throw InvalidInput("{}: the PNG cannot be decoded: {}", path.string(), error.what());
+  }
+  if (image.empty()) throw InvalidInput("{}: the PNG cannot be decoded", path.string());
+  return image;
+}
+
+Eigen::Isometry3d FixedMount(const CameraTrack& track, const RecordingOptions& options, const std::string& file) {
+  const auto& poses = track.base_from_camera;
+  const std::size_t steps = track.arms.size();
+  if (poses.size() == 1 && track.mount == Mount::kBase) return poses.front();
+  if (poses.size() < steps) throw InvalidInput("{}: {} poses, wanted one per step: {}", file, poses.size(), steps);
+  const auto mount_from_camera = [&](std::size_t k) -> Eigen::Isometry3d {
+    if (track.mount == Mount::kBase) return poses[k];
+    const ArmState& arm = track.mount == Mount::kLeftGripper ? track.arms[k].front() : track.arms[k].back();
+    return arm.base_from_gripper.inverse() * poses[k];
+  };
+  const Eigen::Isometry3d first = mount_from_camera(0);
+  for (std::size_t k = 1; k < steps; ++k) {
+    const Eigen::Isometry3d now = mount_from_camera(k);
+    const double moved_m = (now.translation() - first.translation()).norm(), turned_rad = RotationBetween(now, first);
+    if (moved_m <= options.camera_tolerance_m && turned_rad <= options.camera_tolerance_rad) continue;
+    throw InvalidInput("{}: at step {} the camera is {:.3f} m and {:.3f} rad from where it was at step 0 on its mount ({}); wanted "
+                       "at most {} m and {} rad: a camera that moves on its mount cannot be described", file, k, moved_m, turned_rad,
+                       track.mount == Mount::kBase ? "the base" : "the gripper", options.camera_tolerance_m, options.camera_tolerance_rad);
+  }
+  return first;
+}
+
+std::vector<Arms> EveryNth(std::vector<Arms> arms, int n) {
+  std::vector<Arms> kept;
+  for (std::size_t k = 0; k < arms.size(); k += static_cast<std::size_t>(n)) kept.push_back(std::move(arms[k]));
+  return kept;
+}
+
+}  // namespace evac

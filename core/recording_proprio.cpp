@@ -1,0 +1,115 @@
+#include <hdf5.h>
+
+#include <array>
+#include <limits>
+
+#include "core/error.h"
+#include "core/recording_parts.h"
+
+namespace evac {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr hsize_t kMaxSteps = 1'000'000;  // nine hours at 30 Hz
+constexpr int kArms = 2;
+
+/// Owns an identifier of the HDF5 library.
+class Handle {
+ public:
+  Handle(hid_t id, herr_t (*close)(hid_t)) : id_(id), close_(close) {}
+  ~Handle() {
+    if (id_ >= 0) close_(id_);
+  }
+  Handle(const Handle&) = delete;
+  Handle& operator=(const Handle&) = delete;
+  hid_t id() const { return id_; }
+  bool valid() const { return id_ >= 0; }
+
+ private:
+  hid_t id_;
+  herr_t (*close_)(hid_t);
+};
+
+/// The library's own error printing is off while this lives: what goes wrong is said by our messages.
+class QuietHdf5 {
+ public:
+  QuietHdf5() {
+    H5Eget_auto2(H5E_DEFAULT, &function_, &data_);
+    H5Eset_auto2(H5E_DEFAULT, nullptr, nullptr);
+  }
+  ~QuietHdf5() { H5Eset_auto2(H5E_DEFAULT, function_, data_); }
+  QuietHdf5(const QuietHdf5&) = delete;
+  QuietHdf5& operator=(const QuietHdf5&) = delete;
+
+ private:
+  H5E_auto2_t function_ = nullptr;
+  void* data_ = nullptr;
+};
+
+struct Track {
+  hsize_t steps = 0;
+  hsize_t width = 0;           ///< numbers per arm
+  std::vector<double> values;  ///< [steps, 2, width]
+
+  const double* At(hsize_t step, int arm) const { return &values[(step * kArms + static_cast<hsize_t>(arm)) * width]; }
+};
+
+/// The shape of a data set, checked to be [T, 2] (width 1) or [T, 2, width] before anything of its size is allocated.
+hsize_t StepsOf(const Handle& data, hsize_t width, const std::string& where) {
+  const Handle space(H5Dget_space(data.id()), H5Sclose);
+  const int wanted_rank = width == 1 ? 2 : 3;
+  std::array<hsize_t, 3> shape = {0, 0, width};
+  const int rank = space.valid() ? H5Sget_simple_extent_ndims(space.id()) : -1;
+  if (rank == wanted_rank) H5Sget_simple_extent_dims(space.id(), shape.data(), nullptr);
+  if (rank != wanted_rank || shape[1] != kArms || shape[2] != width) {
+    throw InvalidInput("{}: its shape is not [T, 2{}]: one row per step, left and right arm", where,
+                       width == 1 ? "" : fmt::format(", {}", width));
+  }
+  if (shape[0] == 0 || shape[0] > kMaxSteps) throw InvalidInput("{}: {} steps, wanted 1 … {}", where, shape[0], kMaxSteps);
+  return shape[0];
+}
+
+Track ReadTrack(const Handle& file, const char* name, hsize_t width, const std::string& path) {
+  const std::string where = fmt::format("{}: {}", path, name);
+  const Handle data(H5Dopen2(file.id(), name, H5P_DEFAULT), H5Dclose);
+  if (!data.valid()) throw InvalidInput("{}: there is no such data set", where);
+  const Handle type(H5Dget_type(data.id()), H5Tclose);
+  const H5T_class_t kind = type.valid() ? H5Tget_class(type.id()) : H5T_NO_CLASS;
+  if (kind != H5T_FLOAT && kind != H5T_INTEGER) throw InvalidInput("{}: it holds no numbers", where);
+  Track track{StepsOf(data, width, where), width, {}};
+  // What the file does not fill stays NaN and is refused as such.
+  track.values.assign(track.steps * kArms * width, std::numeric_limits<double>::quiet_NaN());
+  if (H5Dread(data.id(), H5T_NATIVE_DOUBLE, H5S_ALL, H5S_ALL, H5P_DEFAULT, track.values.data()) < 0) {
+    throw InvalidInput("{}: the data set cannot be read", where);
+  }
+  return track;
+}
+
+}  // namespace
+
+std::vector<Arms> ReadProprio(const fs::path& path) {
+  const QuietHdf5 quiet;
+  const Handle file(H5Fopen(path.c_str(), H5F_ACC_RDONLY, H5P_DEFAULT), H5Fclose);
+  if (!file.valid()) throw InvalidInput("{}: no HDF5 file, or a broken one", path.string());
+  const Track gripper = ReadTrack(file, "state/effector/position", 1, path.string());
+  const Track position = ReadTrack(file, "state/end/position", 3, path.string());
+  const Track orientation = ReadTrack(file, "state/end/orientation", 4, path.string());
+  if (gripper.steps != position.steps || gripper.steps != orientation.steps) {
+    throw InvalidInput("{}: state/effector/position has {} steps, state/end/position {}, state/end/orientation {}; wanted the same",
+                       path.string(), gripper.steps, position.steps, orientation.steps);
+  }
+  std::vector<Arms> arms;
+  arms.reserve(gripper.steps);
+  for (hsize_t step = 0; step < gripper.steps; ++step) {
+    Arms both;
+    for (int arm = 0; arm < kArms; ++arm) {
+      const RawArm raw{Eigen::Vector3d(position.At(step, arm)), Eigen::Vector4d(orientation.At(step, arm)), *gripper.At(step, arm)};
+      both.push_back(ArmFromRaw(raw, fmt::format("{}: step {}, {} arm", path.string(), step, arm == 0 ? "left" : "right")));
+    }
+    arms.push_back(std::move(both));
+  }
+  return arms;
+}
+
+}  // namespace evac
