@@ -1,0 +1,176 @@
+#include "reports/correlation_output.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <nlohmann/json.hpp>
+#include <set>
+#include <string_view>
+
+namespace evac {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+void Put(Json& json, const std::string& key, const Number& number) {
+  json[key] = number ? Json(*number) : Json(nullptr);
+  if (!number) json[key + "_reason"] = number.reason();
+}
+
+void Put(Json& json, const std::string& key, const Defined<Interval>& interval) {
+  json[key] = interval ? Json::array({interval->low, interval->high}) : Json(nullptr);
+  if (!interval) json[key + "_reason"] = interval.reason();
+}
+
+void Put(Json& json, const std::string& key, const Estimate& estimate) {
+  Put(json, key, estimate.value);
+  Put(json, key + "_ci95", estimate.interval);
+  json[key + "_ci95_method"] = estimate.method;
+}
+
+Json JsonOf(const CorrelationPoint& point) {
+  Json json = {{"task", point.task}, {"policy", point.policy}, {"real_sr", point.real_sr}, {"sim_sr", point.sim_sr}};
+  if (point.real) json["real_n"] = point.real->trials;
+  if (point.sim) json["sim_n"] = point.sim->trials;
+  return json;
+}
+
+bool IsBootstrapped(const CorrelationGroup& group) {
+  return std::ranges::any_of(group.points, [](const CorrelationPoint& point) { return point.real.has_value(); });
+}
+
+void PutBootstrap(Json& json, const CorrelationGroup& group) {
+  Put(json, "pearson_ci95_bca", group.pearson_bca);
+  Put(json, "spearman_ci95_bca", group.spearman_bca);
+  Put(json, "mmrv_ci95_bca", group.mmrv_bca);
+  json["bootstrap_replicates"] = group.options.bootstrap.replicates;
+  json["bootstrap_seed"] = group.options.bootstrap.seed;
+  json["undefined_replicates"] = group.undefined_replicates;
+}
+
+Json JsonOf(const CorrelationGroup& group) {
+  Json json = {{"group", group.group}, {"n", group.points.size()}};
+  Put(json, "pearson", group.pearson);
+  Put(json, "spearman", group.spearman);
+  Put(json, "mmrv", group.mmrv);
+  json["mmrv_convention"] =
+      fmt::format("{},{}", Name(group.options.convention.gap), Name(group.options.convention.ties));
+  json["ties"] = group.ranks.ties;
+  json["ties_real"] = group.ranks.ties_real;
+  json["ties_sim"] = group.ranks.ties_sim;
+  Put(json, "mmrv_over_range", group.ranks.over_range);
+  Put(json, "kendall_tau_b", group.kendall_tau_b);
+  Put(json, "bias", group.distance.bias);
+  Put(json, "mae", group.distance.mae);
+  Put(json, "rmse", group.distance.rmse);
+  Put(json, "ccc", group.distance.ccc);
+  if (IsBootstrapped(group)) PutBootstrap(json, group);
+  json["points"] = Json::array();
+  for (const CorrelationPoint& point : group.points) json["points"].push_back(JsonOf(point));
+  json["left_out"] = group.left_out;
+  return json;
+}
+
+/// A table whose columns are as wide as their widest cell.
+class TextTable {
+ public:
+  void Add(std::vector<std::string> cells) { rows_.push_back(std::move(cells)); }
+
+  std::string Text() const {
+    std::string text;
+    for (const std::vector<std::string>& row : rows_) {
+      std::string line;
+      for (std::size_t column = 0; column < row.size(); ++column)
+        line += fmt::format("{:<{}}  ", row[column], Width(column));
+      text += fmt::format("{}\n", std::string_view(line).substr(0, line.find_last_not_of(' ') + 1));
+    }
+    return text;
+  }
+
+ private:
+  std::size_t Width(std::size_t column) const {
+    std::size_t width = 0;
+    for (const std::vector<std::string>& row : rows_) width = std::max(width, row[column].size());
+    return width;
+  }
+
+  std::vector<std::vector<std::string>> rows_;
+};
+
+std::string TextOf(const Number& number) { return number ? fmt::format("{:.3f}", *number) : "undefined"; }
+
+std::string TextOf(const Estimate& estimate) {
+  if (!estimate.value || !estimate.interval) return TextOf(estimate.value);
+  return fmt::format("{:.3f} [{:.3f}, {:.3f}]", *estimate.value, estimate.interval->low, estimate.interval->high);
+}
+
+std::string TextOf(double rate, const std::optional<Count>& count) {
+  return count ? fmt::format("{:.3f} ({}/{})", rate, count->successes, count->trials) : fmt::format("{:.3f}", rate);
+}
+
+std::string GroupTable(const std::vector<CorrelationGroup>& groups) {
+  TextTable table;
+  table.Add({"group", "n", "Pearson", "Spearman", "MMRV", "MMRV/range", "bias"});
+  for (const CorrelationGroup& group : groups) {
+    table.Add({group.group, fmt::format("{}", group.points.size()), TextOf(group.pearson), TextOf(group.spearman),
+               TextOf(group.mmrv), TextOf(group.ranks.over_range), TextOf(group.distance.bias)});
+  }
+  return table.Text();
+}
+
+/// The points of every group that has counts; groups of one task repeat those of their world and are not shown.
+std::string PointTable(const std::vector<CorrelationGroup>& groups) {
+  std::string text;
+  for (const CorrelationGroup& group : groups) {
+    if (!IsBootstrapped(group) || group.group.find('/') != std::string::npos) continue;
+    TextTable points;
+    points.Add({"task", "policy", "real", group.group});
+    for (const CorrelationPoint& point : group.points) {
+      points.Add({point.task, point.policy, TextOf(point.real_sr, point.real), TextOf(point.sim_sr, point.sim)});
+    }
+    text += fmt::format("\n{}", points.Text());
+  }
+  return text;
+}
+
+std::string Footnotes(const std::vector<CorrelationGroup>& groups) {
+  std::set<std::string> methods, undefined, left_out;
+  std::int64_t ties = 0;
+  for (const CorrelationGroup& group : groups) {
+    ties += group.ranks.ties;
+    left_out.insert(group.left_out.begin(), group.left_out.end());
+    const auto note = [&](const char* name, const Estimate& estimate) {
+      if (!estimate.value)
+        undefined.insert(fmt::format("{}: {} is undefined: {}", group.group, name, estimate.value.reason()));
+      if (estimate.value && !estimate.interval)
+        undefined.insert(fmt::format("{}: {} has no interval: {}", group.group, name, estimate.interval.reason()));
+      if (estimate.interval) methods.insert(fmt::format("{}: {}", name, estimate.method));
+    };
+    note("Pearson", group.pearson);
+    note("Spearman", group.spearman);
+    note("MMRV", group.mmrv);
+  }
+  std::string text = "\n";
+  for (const std::string& method : methods) text += fmt::format("95 % interval of {}\n", method);
+  if (!groups.empty()) {
+    text += fmt::format("MMRV (0 is best): {}; {} pair{} of points tied\n", Name(groups[0].options.convention), ties,
+                        ties == 1 ? "" : "s");
+  }
+  for (const std::string& line : undefined) text += fmt::format("{}\n", line);
+  for (const std::string& line : left_out) text += fmt::format("left out: {}\n", line);
+  return text;
+}
+
+}  // namespace
+
+std::string CorrelationJson(const std::vector<CorrelationGroup>& groups) {
+  Json json = {{"groups", Json::array()}};
+  for (const CorrelationGroup& group : groups) json["groups"].push_back(JsonOf(group));
+  return json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
+}
+
+std::string CorrelationText(const std::vector<CorrelationGroup>& groups) {
+  return GroupTable(groups) + PointTable(groups) + Footnotes(groups);
+}
+
+}  // namespace evac
