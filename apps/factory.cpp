@@ -1,0 +1,126 @@
+#include "apps/factory.h"
+
+#include <unistd.h>
+
+#include <algorithm>
+#include <cstdlib>
+#include <sstream>
+#include <thread>
+
+#include "core/config.h"
+#include "core/recording.h"
+#include "judges/oracle_judge.h"
+#include "worldmodel/echo_world.h"
+#include "worldmodel/sim/mujoco_world.h"
+
+namespace evac {
+namespace {
+
+namespace fs = std::filesystem;
+
+int Threads(const Suite& suite) {
+  return suite.threads > 0 ? suite.threads : std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
+}
+
+/// Beside this program first, so that `evac` finds its own `evac-policy` wherever it was built or installed.
+std::string FindProgram(const std::string& program, const Suite& suite) {
+  if (program.find('/') != std::string::npos) {
+    const fs::path path = fs::path(program).is_absolute() ? fs::path(program) : fs::absolute(suite.path).parent_path() / program;
+    if (::access(path.c_str(), X_OK) == 0) return path.lexically_normal().string();
+    throw InvalidInput("{}: a policy's command names {}, which is no program here", suite.path.string(), path.string());
+  }
+  const fs::path beside = fs::read_symlink("/proc/self/exe").parent_path() / program;
+  if (::access(beside.c_str(), X_OK) == 0) return beside.string();
+  const char* path = std::getenv("PATH");
+  std::istringstream folders(path ? path : "");
+  for (std::string folder; std::getline(folders, folder, ':');) {
+    if (!folder.empty() && ::access((fs::path(folder) / program).c_str(), X_OK) == 0) return (fs::path(folder) / program).string();
+  }
+  throw InvalidInput("{}: a policy's command names '{}', which is neither beside evac nor in PATH", suite.path.string(), program);
+}
+
+std::string Filled(std::string word, const Suite& suite) {
+  const std::string variable = "${recording}";
+  const std::size_t at = word.find(variable);
+  if (at == std::string::npos) return word;
+  if (!suite.recording) throw InvalidInput("{}: a policy's command names ${{recording}}, but the suite has no field recording", suite.path.string());
+  return word.replace(at, variable.size(), fs::absolute(*suite.recording).lexically_normal().string());
+}
+
+PolicyProcessOptions ProcessOptions(const SuitePolicy& policy, const Suite& suite, const fs::path& run_folder, const LcmAddress& address) {
+  const fs::path log = run_folder / "logs" / (policy.name + "@" + policy.checkpoint + ".log");
+  fs::create_directories(log.parent_path());
+  return {.command = CommandLine(policy, suite),
+          .environment = {{"EVAC_LCM_URL", address.url}, {"EVAC_TOKEN", address.token}},
+          .working_directory = fs::absolute(suite.path).parent_path(),
+          .log = log};
+}
+
+/// Every task of the suite must fit, not only the one that was greeted with.
+void CheckAllTasks(const Suite& suite, const PolicySpec& declared) {
+  for (const Task& task : suite.tasks) {
+    const PolicySpec wanted = HarnessSpec(task, suite.chunk_size);
+    if (!Compare(wanted, declared).empty()) {
+      throw InvalidInput("policy {}@{} does not fit task {}:\n{}", declared.name, declared.checkpoint, task.id, SideBySide(wanted, declared));
+    }
+  }
+}
+
+}  // namespace
+
+void FillInRecordedTask(Suite& suite) {
+  if (!suite.recording || !suite.tasks.empty()) return;
+  suite.tasks = {TaskFromRecording(ReadRecording(*suite.recording))};
+}
+
+void CheckRubrics(const Suite& suite) {
+  for (const Task& task : suite.tasks) {
+    if (task.rubric.stages.empty()) continue;  // a recording's task: people can still judge it
+    if (const auto wrong = WhatIsWrong(task.rubric)) throw InvalidInput("{}: field rubric: {}", task.page_path, *wrong);
+  }
+}
+
+void Declare(const Suite& suite, Store& store) {
+  CheckRubrics(suite);
+  for (const Task& task : suite.tasks) store.AddTask(task);
+  for (const SuiteWorld& world : suite.worlds) {
+    const std::string profile_hash = world.profile.empty() ? "" : Config::FromFile(world.profile).ContentHash();
+    store.AddWorld({.name = world.name, .type = world.type, .is_real = world.is_real, .profile_hash = profile_hash});
+  }
+}
+
+std::unique_ptr<World> MakeWorld(const SuiteWorld& world, const Suite& suite) {
+  if (world.type == "echo") return std::make_unique<EchoWorld>(ReadRecording(*suite.recording));
+  return std::make_unique<MujocoWorld>(MujocoWorldOptions{.name = world.name, .profile = world.profile, .threads = Threads(suite)});
+}
+
+std::vector<std::string> CommandLine(const SuitePolicy& policy, const Suite& suite) {
+  std::vector<std::string> words = {FindProgram(policy.command.front(), suite)};
+  for (std::size_t i = 1; i < policy.command.size(); ++i) words.push_back(Filled(policy.command[i], suite));
+  return words;
+}
+
+RunningPolicy::RunningPolicy(const SuitePolicy& policy, const Suite& suite, const fs::path& run_folder) {
+  LcmPolicyOptions options;
+  options.deadline_s = suite.transport.deadline_s;
+  options.repeat_after_s = suite.transport.repeat_after_s;
+  options.raw_images = suite.transport.images == "raw";
+  if (policy.command.empty()) {
+    options.address = {policy.join_url, policy.join_token};
+  } else {
+    options.address = LcmAddress::For(fmt::format("{} {} {}@{}", fs::absolute(run_folder).string(), ::getpid(), policy.name, policy.checkpoint));
+    process_.emplace(ProcessOptions(policy, suite, run_folder, options.address));
+    options.why_gone = [this] { return process_->WhyGone(); };
+  }
+  link_.emplace(std::move(options));
+  spec_ = link_->Handshake(HarnessSpec(suite.tasks.front(), suite.chunk_size), suite.transport.start_s);
+  CheckAllTasks(suite, spec_);
+}
+
+Counters RunningPolicy::counters() const {
+  Counters counters = link_->counters();
+  if (process_) counters["restarts"] = process_->restarts();
+  return counters;
+}
+
+}  // namespace evac
