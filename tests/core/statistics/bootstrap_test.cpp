@@ -1,0 +1,131 @@
+#include "core/statistics/bootstrap.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+
+#include "core/error.h"
+#include "core/seed.h"
+#include "core/statistics/association.h"
+#include "core/statistics/paired_bootstrap.h"
+
+namespace evac {
+namespace {
+
+constexpr BootstrapOptions kFew = {.replicates = 300, .seed = 5, .confidence = 0.95};
+
+/// Policies of rising skill; in both worlds a state is easy or hard for all.
+TaskOutcomes RandomTask(std::uint64_t seed, int policies, int states) {
+  SplitMix64 random(seed);
+  TaskOutcomes task;
+  std::vector<double> difficulty;
+  for (int s = 0; s < states; ++s) difficulty.push_back(random.Uniform());
+  for (int p = 0; p < policies; ++p) {
+    PointOutcomes& point = task.points.emplace_back();
+    const double skill = (p + 1.0) / (policies + 1.0);
+    for (int s = 0; s < states; ++s) {
+      point.real.push_back({random.Uniform() + skill > difficulty[s] + 0.4, 1});
+      point.sim.push_back({random.Uniform() + skill > difficulty[s] + 0.4, 1});
+    }
+  }
+  return task;
+}
+
+TEST(Quantile, IsTheOrderStatisticAtWholePlacesAndLinearBetweenThem) {
+  const std::vector<double> sorted = {1, 2, 4, 8};
+  EXPECT_EQ(Quantile(sorted, 0), 1);
+  EXPECT_EQ(Quantile(sorted, 1), 8);
+  EXPECT_NEAR(Quantile(sorted, 1.0 / 3), 2, 1e-12);
+  EXPECT_NEAR(Quantile(sorted, 0.5), 3, 1e-12);
+  EXPECT_EQ(Quantile(std::vector<double>{7}, 0.3), 7);
+  EXPECT_THROW(Quantile({}, 0.5), Error);
+  EXPECT_THROW(Quantile(sorted, 1.1), Error);
+}
+
+TEST(Bootstrap, AStatisticThatNeverScattersHasAnIntervalOfNoWidth) {
+  const BootstrapIntervals intervals = IntervalsOf({0.5, std::vector<double>(100, 0.5), {0.5, 0.5, 0.5}});
+  EXPECT_EQ(intervals.percentile->low, 0.5);
+  EXPECT_EQ(intervals.percentile->high, 0.5);
+  EXPECT_EQ(*intervals.z0, 0);
+  EXPECT_EQ(*intervals.acceleration, 0);
+  EXPECT_EQ(intervals.bca->low, 0.5);
+  EXPECT_EQ(intervals.bca->high, 0.5);
+}
+
+TEST(Bootstrap, WhatCannotBeCorrectedIsUndefined) {
+  EXPECT_EQ(IntervalsOf({0.5, {}, {}}).percentile.reason(), "no replicates");
+  const BootstrapIntervals one_sided = IntervalsOf({0.5, {0.6, 0.7, 0.8}, {0.4, 0.5}});
+  EXPECT_TRUE(one_sided.percentile);
+  EXPECT_EQ(one_sided.bca.reason(), "all replicates lie on one side of the estimate");
+  EXPECT_FALSE(IntervalsOf({0.5, {0.4, 0.6}, {}}).bca);
+  EXPECT_THROW(IntervalsOf({0.5, {0.4, 0.6}, {}}, 1.0), Error);
+}
+
+TEST(ClusterBootstrap, RefusesNothingToDrawFrom) {
+  EXPECT_THROW(ClusterBootstrapRate({}), Error);
+  EXPECT_THROW(ClusterBootstrapRate(std::vector<Count>{{1, 2}}, {.replicates = 0}), Error);
+}
+
+TEST(PairedStateBootstrap, IsTheSameForTheSameSeedAndStaysInRange) {
+  const std::vector<TaskOutcomes> tasks = {RandomTask(1, 4, 12), RandomTask(2, 3, 9)};
+  const PairedBootstrap one = PairedStateBootstrap(tasks, {}, kFew), again = PairedStateBootstrap(tasks, {}, kFew);
+  EXPECT_EQ(one.pearson->resampled.replicates, again.pearson->resampled.replicates);
+  EXPECT_EQ(one.mmrv->resampled.replicates, again.mmrv->resampled.replicates);
+  for (const Defined<BootstrapOf>& correlation : {one.pearson, one.spearman}) {
+    for (const double r : correlation->resampled.replicates) EXPECT_LE(std::abs(r), 1);
+    EXPECT_LE(-1, correlation->intervals.percentile->low);
+    EXPECT_LE(correlation->intervals.percentile->low, correlation->intervals.percentile->high);
+    EXPECT_LE(correlation->intervals.percentile->high, 1);
+  }
+  EXPECT_GE(one.mmrv->intervals.percentile->low, 0);
+  EXPECT_EQ(one.method, "paired state bootstrap, percentile, B=300, seed 5");
+}
+
+TEST(PairedStateBootstrap, TwoWorldsThatNeverDisagreeCorrelatePerfectlyInEveryReplicate) {
+  TaskOutcomes task = RandomTask(3, 5, 20);
+  for (PointOutcomes& point : task.points) point.sim = point.real;
+  const PairedBootstrap bootstrap = PairedStateBootstrap({task}, {}, kFew);
+  EXPECT_EQ(bootstrap.pearson->intervals.percentile->low, 1);
+  EXPECT_EQ(bootstrap.mmrv->intervals.percentile->high, 0);
+}
+
+TEST(PairedStateBootstrap, ItsThetaIsTheStatisticOfTheRates) {
+  const std::vector<TaskOutcomes> tasks = {RandomTask(4, 3, 7), RandomTask(5, 3, 11)};
+  const RatePairs rates = RatesOf(tasks);
+  ASSERT_EQ(rates.real.size(), 6u);
+  const PairedBootstrap bootstrap = PairedStateBootstrap(tasks, {}, kFew);
+  EXPECT_EQ(bootstrap.pearson->resampled.theta, *Pearson(rates.sim, rates.real).value);
+  EXPECT_EQ(bootstrap.mmrv->resampled.theta, *Mmrv(rates).mmrv);
+  EXPECT_EQ(bootstrap.pearson->resampled.jackknife.size(), 18u);
+}
+
+TEST(PairedStateBootstrap, DropsAndCountsReplicatesWhereTheStatisticIsUndefined) {
+  TaskOutcomes task;  // one state decides everything: without it all real rates are 0
+  task.points = {{.real = {{1, 1}, {0, 1}, {0, 1}}, .sim = {{1, 1}, {0, 1}, {1, 1}}},
+                 {.real = {{0, 1}, {0, 1}, {0, 1}}, .sim = {{0, 1}, {1, 1}, {0, 1}}},
+                 {.real = {{0, 1}, {0, 1}, {0, 1}}, .sim = {{0, 1}, {0, 1}, {0, 1}}}};
+  const PairedBootstrap bootstrap = PairedStateBootstrap({task}, {}, kFew);
+  EXPECT_GT(bootstrap.pearson->undefined, 0);
+  EXPECT_EQ(bootstrap.pearson->undefined + static_cast<std::int64_t>(bootstrap.pearson->resampled.replicates.size()),
+            300);
+  EXPECT_EQ(bootstrap.mmrv->undefined, 0);
+}
+
+TEST(PairedStateBootstrap, CountsAReplicateThatLostAPointAsUndefined) {
+  TaskOutcomes task = RandomTask(6, 4, 6);
+  for (std::size_t state = 1; state < 6; ++state) task.points[0].real[state] = task.points[0].sim[state] = {0, 0};
+  const PairedBootstrap bootstrap = PairedStateBootstrap({task}, {}, kFew);
+  EXPECT_GT(bootstrap.mmrv->undefined, 0);
+  EXPECT_EQ(RatesOf({task}).real.size(), 4u);
+}
+
+TEST(PairedStateBootstrap, SaysWhyThereIsNothingAndRefusesStatesThatDoNotMatch) {
+  EXPECT_EQ(PairedStateBootstrap({}).pearson.reason(), "no points");
+  TaskOutcomes task = RandomTask(7, 3, 5);
+  task.points[1].sim.pop_back();
+  EXPECT_THROW(PairedStateBootstrap({task}), Error);
+  EXPECT_THROW(PairedStateBootstrap({}, {}, {.replicates = 0}), Error);
+}
+
+}  // namespace
+}  // namespace evac
