@@ -14,7 +14,7 @@ namespace evac {
 struct RecordingOptions {
   int every_nth = 1;                 ///< keep every nth recorded step: the period grows by as much (30 Hz and 3: 0.1 s)
   double recorded_period_s = 0;      ///< between recorded steps; 0: the layout's (example .1 s, else the video's or 1/30 s)
-  std::vector<std::string> cameras;  ///< which, by name and in this order; empty: all that are there, head first
+  std::vector<std::string> cameras = {};  ///< which, by name and in this order; empty: all that are there, head first
   double camera_tolerance_m = 0.02;  ///< how far a camera may move against its mount and still count as fixed to it …
   double camera_tolerance_rad = 0.05;  ///< … and how far it may turn
   bool count_video_frames = true;    ///< false: believe that the videos are long enough (a policy that needs no image)
