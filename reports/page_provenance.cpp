@@ -1,0 +1,143 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <map>
+#include <set>
+
+#include "reports/findings.h"
+#include "reports/html.h"
+#include "reports/page_parts.h"
+#include "reports/wording.h"
+
+namespace evac {
+namespace {
+
+std::string Row(const std::string& name, const std::string& html) {
+  return fmt::format("<div><dt>{}</dt><dd>{}</dd></div>", name, html.empty() ? "–" : html);
+}
+
+std::string Code(const std::string& text) { return text.empty() ? "none" : "<code>" + Escaped(text) + "</code>"; }
+
+std::string Folded(const std::string& title, const std::string& text) {
+  if (text.empty()) return "";
+  return fmt::format("<details class=\"folded\"><summary>{}</summary><pre>{}</pre></details>", Escaped(title),
+                     Escaped(text));
+}
+
+std::string Worlds(const RunSummary& summary) {
+  std::string html;
+  for (const WorldInfo& world : summary.data.worlds) {
+    html += fmt::format("<p><b>{}</b>, {}{}; profile {}</p>", Escaped(world.name), Escaped(world.type),
+                        world.is_real ? ", the reference" : "", Code(world.profile_hash));
+  }
+  return html;
+}
+
+std::string Tasks(const RunSummary& summary) {
+  std::string html;
+  for (const Task& task : summary.data.tasks) {
+    std::set<std::string> states;
+    std::set<std::uint64_t> seeds;
+    for (const JudgedEpisode& judged : summary.episodes) {
+      if (judged.episode.key.pair.task != task.id) continue;
+      states.insert(judged.episode.key.pair.initial_state);
+      seeds.insert(judged.episode.key.pair.seed);
+    }
+    std::string seed_list;
+    for (const std::uint64_t seed : seeds) seed_list += (seed_list.empty() ? "" : ", ") + std::to_string(seed);
+    html +=
+        fmt::format("<p><b>{}</b>, {}{}; seeds {}; rubric {}: {}</p>", Escaped(task.id),
+                    Counted(static_cast<std::int64_t>(states.size()), "initial state"),
+                    states.empty() ? "" : fmt::format(", {} … {}", Escaped(*states.begin()), Escaped(*states.rbegin())),
+                    seed_list.empty() ? "none" : seed_list, Code(task.rubric.version), Escaped(task.rubric.success));
+  }
+  return html;
+}
+
+std::string Policies(const RunSummary& summary) {
+  std::string html;
+  for (const PolicyInfo& policy : summary.data.policies) {
+    const std::string label = PolicyLabel(policy.name, policy.checkpoint);
+    html += policy.declaration.empty() ? "<p><b>" + Escaped(label) + "</b>: nothing declared</p>"
+                                       : Folded(label, policy.declaration);
+  }
+  return html;
+}
+
+std::string Judges(const RunSummary& summary) {
+  std::string html = fmt::format("<p>Counted: <b>{}</b>.</p>", Escaped(summary.options.judge));
+  std::map<std::string, std::int64_t> rubrics;
+  for (const JudgedEpisode& judged : summary.episodes) {
+    if (judged.verdict) ++rubrics[judged.verdict->rubric_version];
+  }
+  for (const auto& [rubric, count] : rubrics)
+    html += fmt::format("<p>{} by rubric {}.</p>", Counted(count, "verdict"), Code(rubric));
+  for (const std::string& judge : summary.judges) {
+    if (judge != summary.options.judge)
+      html += fmt::format("<p>Also in the store, not counted here: {}.</p>", Escaped(judge));
+  }
+  return html;
+}
+
+std::string Methods(const RunSummary& summary) {
+  const double confidence = 100 * summary.options.confidence;
+  std::string html = fmt::format(
+      "<p>Rates: Wilson score interval, {:.0f} %, on the effective number of trials where an initial state was tried "
+      "with several seeds.</p>",
+      confidence);
+  for (const WorldComparison& comparison : summary.comparisons) {
+    html += fmt::format(
+        "<p>{} against {}: Pearson, Spearman and MMRV ({}) over {}; {:.0f} % intervals by {}.</p>",
+        Escaped(comparison.other), Escaped(comparison.real), Escaped(Name(comparison.correlation.options.convention)),
+        Counted(comparison.correlation.pearson.n, "point"), confidence, Escaped(comparison.correlation.pearson.method));
+  }
+  html += fmt::format(
+      "<p>Pairs share task, initial state, policy, checkpoint and seed. McNemar’s test is exact and two-sided; decided "
+      "below p = {}; not corrected for the number of tests.</p>",
+      kAlpha);
+  html += fmt::format(
+      "<p>“Follows closely” means that the whole interval of Pearson lies above {}; “in direction”, above 0. Fewer "
+      "than {} points give no correlation.</p>",
+      kCloseCorrelation, kMinCorrelationPoints);
+  return html;
+}
+
+std::string Exclusions(const RunSummary& summary) {
+  std::string html;
+  for (const Outcome outcome : {Outcome::kError, Outcome::kCannotTell, Outcome::kInvalid, Outcome::kUnjudged}) {
+    if (summary.Count(outcome) > 0)
+      html += fmt::format("<p>{}: {}.</p>", Counted(summary.Count(outcome), "episode"), Words(outcome));
+  }
+  for (const WorldComparison& comparison : summary.comparisons) {
+    std::int64_t uncounted = 0, unpaired = 0;
+    for (const PairTable& table : comparison.tables) {
+      uncounted += table.uncounted;
+      unpaired += table.unpaired;
+    }
+    if (uncounted > 0)
+      html += fmt::format("<p>{} of {} and {} where one side does not count.</p>", Counted(uncounted, "pair"),
+                          Escaped(comparison.real), Escaped(comparison.other));
+    if (unpaired > 0)
+      html += fmt::format("<p>{} of {} or {} without a partner.</p>", Counted(unpaired, "episode"),
+                          Escaped(comparison.real), Escaped(comparison.other));
+  }
+  return html.empty() ? "none" : html;
+}
+
+}  // namespace
+
+std::string ProvenancePart(const RunSummary& summary, const PageOptions& options) {
+  const RunInfo& run = summary.data.run;
+  std::string html = "<section id=\"provenance\"><h2>Provenance</h2><dl class=\"facts\">";
+  html += Row("Suite", "SHA-256 " + Code(run.suite_hash) + Folded("The effective suite", run.suite_text));
+  html +=
+      Row("Versions", fmt::format("run by evac {}, page by {}", Escaped(run.evac_version), Escaped(options.program)));
+  html += Row("Worlds", Worlds(summary)) + Row("Tasks", Tasks(summary)) + Row("Policies", Policies(summary)) +
+          Row("Judges", Judges(summary));
+  html += Row("Methods", Methods(summary)) + Row("Not counted", Exclusions(summary));
+  return html +
+         "</dl><p class=\"quiet\">The same numbers for programs: <code>report.json</code> beside this "
+         "page.</p></section>";
+}
+
+}  // namespace evac

@@ -1,0 +1,78 @@
+#include <fmt/format.h>
+
+#include "reports/charts.h"
+#include "reports/html.h"
+#include "reports/page_parts.h"
+#include "reports/wording.h"
+
+namespace evac {
+namespace {
+
+std::size_t WorldIndex(const RunSummary& summary, const std::string& world) {
+  std::size_t index = 1;  // 0 is the real one
+  for (const WorldInfo& info : summary.data.worlds) {
+    if (info.name == world) return info.is_real ? 0 : index;
+    if (!info.is_real) ++index;
+  }
+  return index;
+}
+
+/// "2 errors, 1 cannot tell": what is in no rate; empty where there is nothing.
+std::string ApartWords(const RateCell& cell) {
+  std::string words;
+  for (const Outcome outcome : {Outcome::kError, Outcome::kCannotTell, Outcome::kInvalid, Outcome::kUnjudged}) {
+    if (cell.Of(outcome) > 0) words += (words.empty() ? "" : ", ") + CountInWords(outcome, cell.Of(outcome));
+  }
+  return words;
+}
+
+std::string Row(const RunSummary& summary, const RateCell& cell) {
+  const std::size_t world = WorldIndex(summary, cell.world);
+  const std::int64_t successes = cell.Of(Outcome::kSuccess), n = successes + cell.Of(Outcome::kFailure);
+  const std::string apart = ApartWords(cell);
+  return fmt::format(
+      "<tr><th scope=\"row\">{}{}</th><td class=\"plot\">{}</td><td class=\"num\">{}/{}</td><td class=\"num "
+      "rate\">{}{}</td>"
+      "<td class=\"apart\">{}</td></tr>",
+      MarkerIcon(world == 0 ? 0 : 3 + (world - 1), fmt::format("dot w{}", world % 4)), Escaped(cell.world),
+      RateStrip(cell.rate, world), successes, n, n == 0 ? "undefined: no verdict" : PercentWithInterval(cell.rate),
+      apart.empty() ? "" : "<small class=\"aside\">" + apart + "</small>",
+      apart.empty() ? "<span class=\"none\">–</span>" : apart);
+}
+
+std::string TaskTable(const RunSummary& summary, const Task& task) {
+  std::string html = fmt::format(
+      "<div class=\"task\"><h3>{}</h3><p class=\"quiet\">“{}”</p><table class=\"rates\"><thead><tr><th "
+      "scope=\"col\">world</th>"
+      "<th scope=\"col\" class=\"plot\"><span class=\"sr\">success rate, percent</span>{}</th><th scope=\"col\" "
+      "class=\"num\">k/n</th>"
+      "<th scope=\"col\" class=\"num rate\">success [{:.0f} %]</th><th scope=\"col\" "
+      "class=\"apart\">apart</th></tr></thead>",
+      Escaped(task.id), Escaped(task.instruction), RateScale(), 100 * summary.options.confidence);
+  for (const std::string& policy : summary.policies) {
+    std::string rows;
+    for (const RateCell& cell : summary.rates) {
+      if (cell.task == task.id && cell.policy == policy) rows += Row(summary, cell);
+    }
+    if (!rows.empty())
+      html += fmt::format("<tbody><tr class=\"group\"><th scope=\"rowgroup\" colspan=\"5\">{}</th></tr>{}</tbody>",
+                          Escaped(policy), rows);
+  }
+  return html + "</table></div>";
+}
+
+}  // namespace
+
+std::string RatesPart(const RunSummary& summary) {
+  std::string html =
+      "<section id=\"rates\"><h2>Success rates</h2><p class=\"quiet\">Dot: successes over successes and failures. Bar: "
+      "Wilson interval"
+      ", clustered by initial state where states repeat. Errors, “cannot tell” and invalid verdicts stand apart and "
+      "are in no rate.</p>";
+  if (summary.rates.empty()) return html + "<p>The run holds no episodes yet.</p></section>";
+  html += "<div class=\"tasks\">";
+  for (const Task& task : summary.data.tasks) html += TaskTable(summary, task);
+  return html + "</div></section>";
+}
+
+}  // namespace evac

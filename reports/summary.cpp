@@ -1,0 +1,130 @@
+#include "reports/summary.h"
+
+#include <algorithm>
+#include <set>
+
+#include "core/error.h"
+
+namespace evac {
+namespace {
+
+std::vector<JudgedEpisode> Judged(const RunData& data, const std::string& judge) {
+  std::vector<JudgedEpisode> judged;
+  for (const Episode& episode : data.episodes) {
+    std::optional<Verdict> verdict;
+    if (const auto all = data.verdicts.find(episode.key.Id()); all != data.verdicts.end()) {
+      if (const auto own = all->second.find(judge); own != all->second.end()) verdict = own->second;
+    }
+    const Outcome outcome = OutcomeOf(episode, verdict);
+    judged.push_back({episode, outcome, std::move(verdict)});
+  }
+  return judged;
+}
+
+std::vector<std::string> JudgesOf(const RunData& data) {
+  std::set<std::string> names;
+  for (const auto& [episode, verdicts] : data.verdicts) {
+    for (const auto& [judge, verdict] : verdicts) names.insert(judge);
+  }
+  return {names.begin(), names.end()};
+}
+
+/// In the order declared; a policy that was never declared comes last.
+std::vector<std::string> PoliciesOf(const RunData& data) {
+  std::vector<std::string> labels;
+  const auto add = [&labels](const std::string& label) {
+    if (std::find(labels.begin(), labels.end(), label) == labels.end()) labels.push_back(label);
+  };
+  for (const PolicyInfo& policy : data.policies) add(PolicyLabel(policy.name, policy.checkpoint));
+  for (const Episode& episode : data.episodes) add(PolicyLabel(episode.key.pair.policy, episode.key.pair.checkpoint));
+  return labels;
+}
+
+std::vector<std::string> TasksOf(const RunData& data) {
+  std::vector<std::string> ids;
+  for (const Task& task : data.tasks) ids.push_back(task.id);
+  return ids;
+}
+
+void CountEpisodes(const std::vector<JudgedEpisode>& episodes, double confidence, RateCell& cell) {
+  std::vector<const JudgedEpisode*> members;
+  std::set<std::string> states;
+  for (const JudgedEpisode& judged : episodes) {
+    const EpisodeKey& key = judged.episode.key;
+    if (key.pair.task != cell.task || key.world != cell.world) continue;
+    if (PolicyLabel(key.pair.policy, key.pair.checkpoint) != cell.policy) continue;
+    ++cell.counts[static_cast<std::size_t>(judged.outcome)];
+    members.push_back(&judged);
+    if (judged.Counts()) states.insert(key.pair.initial_state);
+  }
+  cell.states = static_cast<std::int64_t>(states.size());
+  if (!members.empty()) cell.rate = RateOf(members, confidence);
+}
+
+std::vector<RateCell> AllCells(const RunSummary& summary) {
+  std::vector<RateCell> rates;
+  for (const Task& task : summary.data.tasks) {
+    for (const std::string& policy : summary.policies) {
+      for (const WorldInfo& world : summary.data.worlds) {
+        RateCell cell;
+        cell.task = task.id;
+        cell.policy = policy;
+        cell.world = world.name;
+        CountEpisodes(summary.episodes, summary.options.confidence, cell);
+        if (cell.Apart() + cell.Of(Outcome::kSuccess) + cell.Of(Outcome::kFailure) > 0)
+          rates.push_back(std::move(cell));
+      }
+    }
+  }
+  return rates;
+}
+
+std::vector<WorldComparison> ComparisonsOf(const RunSummary& summary) {
+  std::vector<WorldComparison> comparisons;
+  if (summary.reference.empty()) return comparisons;
+  const SummaryOptions& options = summary.options;
+  for (const WorldInfo& world : summary.data.worlds) {
+    if (world.is_real) continue;
+    comparisons.push_back(Compare(summary.episodes,
+                                  {summary.reference, world.name, TasksOf(summary.data), summary.policies},
+                                  {options.bootstrap_replicates, options.bootstrap_seed, options.confidence}));
+  }
+  return comparisons;
+}
+
+}  // namespace
+
+RunData ReadRun(const Store& store) {
+  return {store.run(),      store.Tasks(),           store.Worlds(),          store.Policies(),
+          store.Episodes(), store.CurrentVerdicts(), store.CountersByPolicy()};
+}
+
+std::int64_t RateCell::Apart() const {
+  return Of(Outcome::kCannotTell) + Of(Outcome::kInvalid) + Of(Outcome::kError) + Of(Outcome::kUnjudged);
+}
+
+std::int64_t RunSummary::Count(Outcome outcome) const {
+  return std::count_if(episodes.begin(), episodes.end(),
+                       [outcome](const JudgedEpisode& judged) { return judged.outcome == outcome; });
+}
+
+RunSummary Summarise(RunData data, const SummaryOptions& options) {
+  if (!(options.confidence > 0 && options.confidence < 1))
+    throw InvalidInput("confidence is {}, wanted a number between 0 and 1", options.confidence);
+  if (options.bootstrap_replicates < 1)
+    throw InvalidInput("bootstrap replicates are {}, wanted 1 or more", options.bootstrap_replicates);
+  RunSummary summary;
+  summary.options = options;
+  summary.judges = JudgesOf(data);
+  summary.episodes = Judged(data, options.judge);
+  summary.policies = PoliciesOf(data);
+  for (const WorldInfo& world : data.worlds) {
+    if (world.is_real && summary.reference.empty()) summary.reference = world.name;
+  }
+  summary.data = std::move(data);
+  summary.rates = AllCells(summary);
+  summary.comparisons = ComparisonsOf(summary);
+  return summary;
+}
+
+}  // namespace evac

@@ -1,0 +1,63 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "core/statistics/estimate.h"
+#include "core/store.h"
+#include "core/types.h"
+#include "reports/comparison.h"
+#include "reports/outcome.h"
+
+/// One run, counted: everything the page and the JSON say, before it is said. Read this file first.
+namespace evac {
+
+/// What the store holds of a run, read once. Everything after `ReadRun` is a pure function of it.
+struct RunData {
+  RunInfo run;
+  std::vector<Task> tasks;
+  std::vector<WorldInfo> worlds;
+  std::vector<PolicyInfo> policies;
+  std::vector<Episode> episodes;                                   ///< in pair-key order, then world
+  std::map<std::string, std::map<std::string, Verdict>> verdicts;  ///< the current one per (episode id, judge)
+  std::map<std::string, Counters> counters;                        ///< per policy
+};
+RunData ReadRun(const Store& store);
+
+struct SummaryOptions {
+  std::string judge = "oracle";     ///< whose verdicts are counted
+  double confidence = 0.95;         ///< of every interval, two-sided
+  int bootstrap_replicates = 2000;  ///< B of the paired state bootstrap
+  std::uint64_t bootstrap_seed = 0;
+};
+
+/// One (task, policy, world): its success rate, and apart from it what cannot count.
+struct RateCell {
+  std::string task, policy, world;               ///< policy with its checkpoint: "visual_pick@good"
+  std::array<std::int64_t, kOutcomes> counts{};  ///< episodes by Outcome
+  std::int64_t states = 0;                       ///< initial states with a success or a failure
+  Estimate rate;  ///< successes / (successes + failures); Wilson, clustered by initial state where states repeat
+  std::int64_t Of(Outcome outcome) const { return counts[static_cast<std::size_t>(outcome)]; }
+  std::int64_t Apart() const;  ///< episodes that are in no rate
+};
+
+struct RunSummary {
+  RunData data;
+  SummaryOptions options;
+  std::vector<std::string> judges;      ///< that gave any verdict
+  std::vector<JudgedEpisode> episodes;  ///< in the order of data.episodes
+  std::vector<std::string> policies;    ///< "name@checkpoint", in the order declared
+  std::vector<RateCell> rates;          ///< by task, policy, world, in the orders declared; only those with episodes
+  std::string reference;                ///< the real world's name; empty if there is none
+  std::vector<WorldComparison> comparisons;  ///< each other world with the reference
+  std::int64_t Count(Outcome outcome) const;
+};
+
+/// @throws InvalidInput unless 0 < confidence < 1 and bootstrap_replicates > 0.
+RunSummary Summarise(RunData data, const SummaryOptions& options);
+
+}  // namespace evac

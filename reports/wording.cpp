@@ -1,0 +1,50 @@
+#include "reports/wording.h"
+
+#include <fmt/format.h>
+
+#include <cmath>
+
+namespace evac {
+namespace {
+
+std::string Points(double share) {
+  const double percent = 100 * share;
+  const bool near_end = (percent > 0 && percent < 0.5) || (percent < 100 && percent > 99.5);
+  return near_end ? fmt::format("{:.1f}", percent) : fmt::format("{:.0f}", percent);
+}
+
+}  // namespace
+
+std::string Percent(double share) { return Points(share) + " %"; }
+
+std::string PercentWithInterval(const Estimate& rate) {
+  if (!rate.value) return "undefined: " + rate.value.reason();
+  if (!rate.interval) return fmt::format("{} (interval undefined: {})", Percent(*rate.value), rate.interval.reason());
+  return fmt::format("{} [{}, {}]", Percent(*rate.value), Points(rate.interval->low), Points(rate.interval->high));
+}
+
+std::string NumberWithInterval(const Estimate& estimate) {
+  if (!estimate.value) return "undefined: " + estimate.value.reason();
+  if (!estimate.interval)
+    return fmt::format("{} (interval undefined: {})", Plain(*estimate.value), estimate.interval.reason());
+  return fmt::format("{} [{}, {}]", Plain(*estimate.value), Plain(estimate.interval->low),
+                     Plain(estimate.interval->high));
+}
+
+std::string Plain(double value) {
+  const std::string text = fmt::format("{:.2f}", value);
+  if ((text == "1.00" || text == "-1.00") && std::abs(value) != 1) return fmt::format("{:.3f}", value);
+  return text == "-0.00" ? "0.00" : text;
+}
+
+std::string PValue(double p) {
+  if (p < 0.001) return "p < 0.001";
+  return p < 0.01 ? fmt::format("p = {:.3f}", p) : fmt::format("p = {:.2f}", p);
+}
+
+std::string Counted(std::int64_t count, const std::string& singular, const std::string& plural) {
+  if (count == 1) return "1 " + singular;
+  return fmt::format("{} {}", count, plural.empty() ? singular + "s" : plural);
+}
+
+}  // namespace evac

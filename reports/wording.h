@@ -1,0 +1,23 @@
+#pragma once
+
+#include <string>
+
+#include "core/statistics/estimate.h"
+
+/// How numbers are written for people. Nothing undefined becomes a digit.
+namespace evac {
+
+/// "90 %", "0 %"; one decimal below 1 % and above 99 % where it would otherwise read 0 or 100.
+std::string Percent(double share);
+/// "90 % [70, 97]"; "undefined: no trials".
+std::string PercentWithInterval(const Estimate& rate);
+/// "0.91 [0.78, 0.97]"; "0.91 (interval undefined: …)"; "undefined: …".
+std::string NumberWithInterval(const Estimate& estimate);
+/// "0.91", "-0.05": two decimals, no "-0.00"; a third where it would otherwise read as a perfect 1.00.
+std::string Plain(double value);
+/// "p = 0.04", "p < 0.001".
+std::string PValue(double p);
+/// "1 episode", "3 episodes".
+std::string Counted(std::int64_t count, const std::string& singular, const std::string& plural = "");
+
+}  // namespace evac
