@@ -10,7 +10,7 @@ namespace evac {
 
 /// A camera that one side offers or needs.
 struct CameraNeed {
-  std::string name;
+  std::string name{};
   int width_px = 0;   ///< 0: any
   int height_px = 0;  ///< 0: any
   bool operator==(const CameraNeed&) const = default;
@@ -20,19 +20,19 @@ struct CameraNeed {
 /// first episode: a silent difference here is what most "cannot reproduce" reports of this field turn out to be.
 /// The defaults are this project's own conventions; a policy that differs says so and is refused, never converted silently.
 struct PolicySpec {
-  std::string name;
-  std::string checkpoint;
+  std::string name{};
+  std::string checkpoint{};
   std::string action_space = "absolute";   ///< "absolute" targets, or "delta" to the pose before
   std::string frame = "base";              ///< what targets and arm states are relative to
   std::string quaternion_order = "xyzw";
   std::string image_format = "RGB";
   double gripper_open = 0;                 ///< the number that means open …
   double gripper_closed = 1;               ///< … and closed: range and sense in one
-  std::vector<std::string> arms;           ///< in order: {right}, or {left, right}; empty in a policy: any
+  std::vector<std::string> arms{};         ///< in order: {right}, or {left, right}; empty in a policy: any
   double period_s = 0;                     ///< between two targets; 0 in a policy: any
   int chunk_size = 1;                      ///< harness: targets it executes per chunk; policy: targets it sends per chunk
-  std::vector<CameraNeed> cameras;         ///< empty in a policy that needs images: all the task has
-  std::set<std::string> needs;             ///< of kKnownNeeds; a policy's only
+  std::vector<CameraNeed> cameras{};       ///< empty in a policy that needs images: all the task has
+  std::set<std::string> needs{};           ///< of kKnownNeeds; a policy's only
   bool operator==(const PolicySpec&) const = default;
 };
 
