@@ -12,7 +12,7 @@ namespace evac {
 namespace {
 
 Number BiasCorrection(const Resampled& resampled, std::span<const double> sorted) {
-  const auto [first, last] = std::ranges::equal_range(sorted, resampled.theta);
+  const auto [first, last] = std::equal_range(sorted.begin(), sorted.end(), resampled.theta);
   const double less = static_cast<double>(first - sorted.begin()), leq = static_cast<double>(last - sorted.begin());
   const double share = (less + leq) / (2 * static_cast<double>(sorted.size()));
   if (share == 0 || share == 1) return Undefined{"all replicates lie on one side of the estimate"};
