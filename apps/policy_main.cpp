@@ -1,0 +1,91 @@
+#include <fmt/core.h>
+
+#include <CLI/CLI.hpp>
+#include <cstdio>
+
+#include "core/error.h"
+#include "core/recording.h"
+#include "core/version.h"
+#include "policies/hold_policy.h"
+#include "policies/policy_server.h"
+#include "policies/replay_policy.h"
+
+namespace evac {
+namespace {
+
+/// What every policy is asked for; the harness sets the environment of the policies it starts.
+struct Common {
+  LcmAddress address;
+  std::string checkpoint = "default";
+  int chunk_size = 16;
+  double period_s = 0;
+
+  PolicySpec Spec(const std::string& name) const {
+    return {.name = name, .checkpoint = checkpoint, .period_s = period_s, .chunk_size = chunk_size};
+  }
+};
+
+CLI::App* AddPolicy(CLI::App& app, const std::string& name, const std::string& description, Common& common) {
+  CLI::App* command = app.add_subcommand(name, description);
+  command->add_option("--checkpoint", common.checkpoint, "name that tells apart two of this policy in a run")->capture_default_str();
+  command->add_option("--chunk-size", common.chunk_size, "targets per chunk")->envname("EVAC_CHUNK_SIZE")->check(CLI::PositiveNumber)->capture_default_str();
+  command->add_option("--period-s", common.period_s, "seconds between two targets; 0: any")->check(CLI::NonNegativeNumber)->capture_default_str();
+  command->add_option("--url", common.address.url, "where to listen")->envname("EVAC_LCM_URL")->capture_default_str();
+  command->add_option("--token", common.address.token, "word inside the channels' names")->envname("EVAC_TOKEN")->capture_default_str();
+  return command;
+}
+
+void AddHold(CLI::App& app, Common& common, int& exit_code) {
+  CLI::App* command = AddPolicy(app, "hold", "Never moves: answers where the arms are.", common);
+  command->footer("Example:\n  evac-policy hold --chunk-size 8");
+  command->callback([&] {
+    HoldPolicy policy(common.chunk_size);
+    PolicySpec spec = common.Spec("hold");
+    spec.needs = {"arms"};
+    exit_code = ServePolicy(policy, spec, common.address);
+  });
+}
+
+void AddReplay(CLI::App& app, Common& common, int& exit_code) {
+  CLI::App* command = AddPolicy(app, "replay", "Plays a recorded trajectory.", common);
+  auto folder = std::make_shared<std::string>();
+  auto every_nth = std::make_shared<int>(1);
+  command->add_option("--recording", *folder, "folder of the recording (docs/formats/recording.md)")->required();
+  command->add_option("--every-nth", *every_nth, "keep every nth recorded step")->check(CLI::PositiveNumber)->capture_default_str();
+  command->footer("Example:\n  evac-policy replay --recording agibot_examples/0 --chunk-size 16");
+  command->callback([&common, &exit_code, folder, every_nth] {
+    Recording recording = ReadRecording(*folder, {.every_nth = *every_nth, .cameras = {}, .count_video_frames = false});
+    PolicySpec spec = common.Spec("replay");
+    spec.arms = recording.arm_names;
+    spec.period_s = recording.period_s;
+    spec.needs = {"whole_chunks"};
+    ReplayPolicy policy(std::move(recording), common.chunk_size);
+    exit_code = ServePolicy(policy, spec, common.address);
+  });
+}
+
+}  // namespace
+}  // namespace evac
+
+int main(int argc, char** argv) {
+  CLI::App app("evac-policy: the policies that come with evac, each served over LCM until SIGTERM.", "evac-policy");
+  app.set_version_flag("--version", EVAC_VERSION);
+  app.require_subcommand(1);
+  app.footer("A policy of your own: docs/write_a_policy.md.\nExit codes: 0 stopped, 2 invalid input, 4 internal error.");
+  evac::Common common;
+  int exit_code = 0;
+  try {
+    evac::AddHold(app, common, exit_code);
+    evac::AddReplay(app, common, exit_code);
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& error) {
+    return app.exit(error) == 0 ? 0 : static_cast<int>(evac::ExitCode::kInvalidInput);
+  } catch (const evac::Error& error) {
+    fmt::print(stderr, "evac-policy: {}\n", error.what());
+    return static_cast<int>(error.exit_code());
+  } catch (const std::exception& error) {
+    fmt::print(stderr, "evac-policy: internal error: {}\n", error.what());
+    return static_cast<int>(evac::ExitCode::kInternal);
+  }
+  return exit_code;
+}
