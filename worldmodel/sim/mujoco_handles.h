@@ -1,0 +1,38 @@
+#pragma once
+
+#include <mujoco/mujoco.h>
+
+#include <Eigen/Geometry>
+#include <filesystem>
+#include <memory>
+#include <string>
+
+/// MuJoCo's C objects, owned; its row-major arrays as Eigen values.
+namespace evac::sim {
+
+struct DeleteModel {
+  void operator()(mjModel* model) const { mj_deleteModel(model); }
+};
+struct DeleteData {
+  void operator()(mjData* data) const { mj_deleteData(data); }
+};
+using ModelPtr = std::unique_ptr<mjModel, DeleteModel>;
+using DataPtr = std::unique_ptr<mjData, DeleteData>;
+
+/// Compiles a scene. Not thread-safe (MuJoCo's compiler is not). @throws InvalidInput with MuJoCo's own words.
+ModelPtr LoadModel(const std::filesystem::path& path);
+ModelPtr CopyModel(const mjModel& model);
+DataPtr MakeData(const mjModel& model);
+
+/// The number of a named thing. @throws InvalidInput if the scene has none of that name.
+int IdOf(const mjModel& model, mjtObj kind, const std::string& name);
+std::string NameOf(const mjModel& model, mjtObj kind, int id);
+
+/// Position and row-major rotation, e.g. data.site_xpos + 3 * id and data.site_xmat + 9 * id.
+Eigen::Isometry3d PoseOf(const mjtNum* position, const mjtNum* rotation);
+
+/// Sends MuJoCo's warnings nowhere (each scene reads its own counts) and its fatal errors to stderr and exit code 4; without this
+/// it would write files into the working directory and wait for a key. Process-wide; call before the first model.
+void QuietenMujoco();
+
+}  // namespace evac::sim

@@ -1,0 +1,50 @@
+#include "worldmodel/sim/privileged.h"
+
+#include <algorithm>
+#include <map>
+#include <utility>
+
+namespace evac::sim {
+namespace {
+
+bool IsReported(const mjModel& model, int body) {
+  const std::string name = NameOf(model, mjOBJ_BODY, body);
+  const bool is_free = model.body_jntnum[body] == 1 && model.jnt_type[model.body_jntadr[body]] == mjJNT_FREE;
+  return is_free || name == "table" || name == "finger_left" || name == "finger_right";
+}
+
+std::string BodyOfGeom(const mjModel& model, int geom) {
+  const int body = model.geom_bodyid[geom];
+  return body == 0 ? "floor" : NameOf(model, mjOBJ_BODY, body);
+}
+
+std::map<std::pair<std::string, std::string>, double> NormalForces(const mjModel& model, const mjData& data) {
+  std::map<std::pair<std::string, std::string>, double> forces_n;
+  for (int i = 0; i < data.ncon; ++i) {
+    std::pair bodies(BodyOfGeom(model, data.contact[i].geom1), BodyOfGeom(model, data.contact[i].geom2));
+    if (bodies.second < bodies.first) std::swap(bodies.first, bodies.second);
+    mjtNum force_n[6];
+    mj_contactForce(&model, &data, i, force_n);  // the first is along the contact's normal
+    forces_n[bodies] += force_n[0];
+  }
+  return forces_n;
+}
+
+}  // namespace
+
+PrivilegedFrame ReadPrivileged(const mjModel& model, const mjData& data) {
+  PrivilegedFrame frame;
+  const int gripper = IdOf(model, mjOBJ_SITE, "gripper");
+  frame.bodies.push_back({"gripper", PoseOf(data.site_xpos + 3 * gripper, data.site_xmat + 9 * gripper)});
+  for (int body = 1; body < model.nbody; ++body) {
+    if (!IsReported(model, body)) continue;
+    frame.bodies.push_back({NameOf(model, mjOBJ_BODY, body), PoseOf(data.xpos + 3 * body, data.xmat + 9 * body)});
+  }
+  std::sort(frame.bodies.begin(), frame.bodies.end(), [](const auto& a, const auto& b) { return a.name < b.name; });
+  for (const auto& [bodies, force_n] : NormalForces(model, data)) {
+    if (force_n > 1e-6) frame.contacts.push_back({bodies.first, bodies.second, force_n});
+  }
+  return frame;
+}
+
+}  // namespace evac::sim

@@ -1,0 +1,84 @@
+#include "worldmodel/sim/scene_page.h"
+
+#include "core/config.h"
+#include "core/geometry.h"
+
+namespace evac::sim {
+namespace {
+
+std::vector<double> ReadNumbers(const Config& page, const std::string& key, std::size_t count) {
+  auto numbers = page.Get<std::vector<double>>(key);
+  page.Require(numbers.size() == count, key, fmt::format("{} numbers", count));
+  return numbers;
+}
+
+Range ReadRange(const Config& page, const std::string& key) {
+  const auto ends = ReadNumbers(page, key, 2);
+  page.Require(ends[0] <= ends[1], key, "[low, high] with low <= high");
+  return {ends[0], ends[1]};
+}
+
+Eigen::Isometry3d ReadHome(const Config& page) {
+  page.AllowOnly({"position_m", "quat_xyzw"});
+  const auto xyz = ReadNumbers(page, "position_m", 3);
+  const auto quat = ReadNumbers(page, "quat_xyzw", 4);
+  return FromXyzQuat({xyz[0], xyz[1], xyz[2]}, {quat[0], quat[1], quat[2], quat[3]});
+}
+
+Placement ReadPlacement(const Config& page) {
+  page.AllowOnly({"body", "inside", "x_m", "y_m", "z_m", "yaw_deg"});
+  Placement placement;
+  placement.body = page.Get<std::string>("body");
+  placement.inside = page.Get<std::string>("inside", "");
+  placement.x_m = ReadRange(page, "x_m");
+  placement.y_m = ReadRange(page, "y_m");
+  placement.z_m = page.Get<double>("z_m");
+  placement.yaw_deg = ReadRange(page, "yaw_deg");
+  return placement;
+}
+
+ColourVariation ReadColour(const Config& page) {
+  page.AllowOnly({"materials", "hue_deg", "saturation", "value"});
+  return {page.Get<std::vector<std::string>>("materials"), ReadRange(page, "hue_deg"), ReadRange(page, "saturation"),
+          ReadRange(page, "value")};
+}
+
+LightVariation ReadLight(const Config& page) {
+  page.AllowOnly({"strength", "azimuth_deg", "warmth"});
+  return {ReadRange(page, "strength"), ReadRange(page, "azimuth_deg"), ReadRange(page, "warmth")};
+}
+
+Clutter ReadClutter(const Config& page) {
+  page.AllowOnly({"bodies", "chance", "places_m", "spread_m"});
+  Clutter clutter;
+  clutter.bodies = page.Get<std::vector<std::string>>("bodies");
+  clutter.chance = page.Get<double>("chance");
+  page.Require(clutter.chance >= 0 && clutter.chance <= 1, "chance", "a probability");
+  for (const Config& place : page.List("places_m")) {
+    const auto xy = place.Value<std::vector<double>>();
+    place.Require(xy.size() == 2, "", "two numbers [x, y]");
+    clutter.places_m.emplace_back(xy[0], xy[1]);
+  }
+  page.Require(clutter.places_m.size() >= clutter.bodies.size(), "places_m", "at least as many places as bodies");
+  clutter.spread_m = page.Get<double>("spread_m");
+  return clutter;
+}
+
+}  // namespace
+
+ScenePage ReadScenePage(const Task& task) {
+  const Config task_page = Config::FromText(task.page, task.page_path);
+  if (!task_page.Has("mujoco")) throw InvalidInput("{}: found no section 'mujoco', wanted one: see docs/add_a_task.md", task.page_path);
+  const Config page = task_page.Section("mujoco");
+  page.AllowOnly({"scene", "home", "objects", "colours", "light", "clutter"});
+  ScenePage scene;
+  scene.scene = page.Path("scene");
+  scene.base_from_home = ReadHome(page.Section("home"));
+  for (const Config& item : page.List("objects")) scene.placements.push_back(ReadPlacement(item));
+  for (const Config& item : page.List("colours")) scene.colours.push_back(ReadColour(item));
+  scene.light = ReadLight(page.Section("light"));
+  scene.clutter = ReadClutter(page.Section("clutter"));
+  return scene;
+}
+
+}  // namespace evac::sim
