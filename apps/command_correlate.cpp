@@ -1,10 +1,12 @@
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <cstdio>
-#include <map>
+#include <initializer_list>
 #include <memory>
 #include <string>
+#include <vector>
 
 #include "apps/commands.h"
 #include "core/file.h"
@@ -40,6 +42,17 @@ std::vector<CorrelationGroup> GroupsOf(const CorrelateArguments& arguments) {
   return CorrelatePoints(csv.points, arguments.options.correlation);
 }
 
+/// The value of that name.
+template <typename Enum>
+Enum Named(const char* option, const std::string& name, std::initializer_list<Enum> values) {
+  std::vector<std::string> names;
+  for (const Enum value : values) {
+    if (name == Name(value)) return value;
+    names.push_back(Name(value));
+  }
+  throw InvalidInput("{}: found \"{}\", wanted {}", option, name, fmt::join(names, " or "));
+}
+
 void Correlate(const CorrelateArguments& arguments) {
   if (arguments.run.empty() == arguments.pairs.empty()) {
     throw InvalidInput("correlate: found {}, wanted either a RUN or --pairs FILE.csv",
@@ -59,19 +72,24 @@ void AddCorrelate(CLI::App& app, ExitCode& exit_code) {
   command->add_option("RUN", arguments->run, "folder of a run: its real world against each other");
   command->add_option("--pairs", arguments->pairs, "CSV of rates instead: group,task,policy,real_sr,sim_sr")
       ->type_name("FILE.csv");
+  MmrvConvention& convention = options.correlation.convention;
   command
-      ->add_option("--mmrv", options.correlation.convention.gap,
-                   "what a wrong order of two policies costs: the difference of their real, or of their sim rates")
-      ->transform(
-          CLI::Transformer(std::map<std::string, MmrvGap>{{"real_gap", MmrvGap::kReal}, {"sim_gap", MmrvGap::kSim}}))
+      ->add_option_function<std::string>(
+          "--mmrv",
+          [&](const std::string& name) {
+            convention.gap = Named("--mmrv", name, {MmrvGap::kReal, MmrvGap::kSim});
+          },
+          "what a wrong order of two policies costs: the difference of their real, or of their sim rates")
       ->type_name("real_gap|sim_gap")
       ->default_str("real_gap");
   command
-      ->add_option("--ties", options.correlation.convention.ties,
-                   "when an order counts as wrong: code, SIMPLER's (S_i > S_j) != (R_i > R_j); sign, opposite signs; "
-                   "leq, with <=")
-      ->transform(CLI::Transformer(std::map<std::string, MmrvTies>{
-          {"code", MmrvTies::kCode}, {"sign", MmrvTies::kSign}, {"leq", MmrvTies::kLeq}}))
+      ->add_option_function<std::string>(
+          "--ties",
+          [&](const std::string& name) {
+            convention.ties = Named("--ties", name, {MmrvTies::kCode, MmrvTies::kSign, MmrvTies::kLeq});
+          },
+          "when an order counts as wrong: code, SIMPLER's (S_i > S_j) != (R_i > R_j); sign, opposite signs; leq, with "
+          "<=")
       ->type_name("code|sign|leq")
       ->default_str("code");
   command->add_option("--judge", options.judge, "whose verdicts are counted")->capture_default_str();

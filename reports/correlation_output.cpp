@@ -1,10 +1,11 @@
 #include "reports/correlation_output.h"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
+#include <map>
 #include <nlohmann/json.hpp>
-#include <set>
 #include <string_view>
 
 namespace evac {
@@ -133,31 +134,46 @@ std::string PointTable(const std::vector<CorrelationGroup>& groups) {
   return text;
 }
 
+/// What is said below the tables: a sentence and the groups it holds for, each sentence once.
+using Notes = std::map<std::string, std::vector<std::string>>;
+
+void NoteEstimate(const std::string& group, const char* name, const Estimate& estimate, Notes& notes) {
+  if (!estimate.value) {
+    notes[fmt::format("{} is undefined: {}", name, estimate.value.reason())].push_back(group);
+  } else if (!estimate.interval) {
+    notes[fmt::format("{} has no interval: {}", name, estimate.interval.reason())].push_back(group);
+  } else {
+    notes[fmt::format("95 % interval of {}: {}", name, estimate.method)].push_back(group);
+  }
+}
+
+void NoteBootstrap(const CorrelationGroup& group, Notes& notes) {
+  for (const std::string& point : group.left_out) notes[fmt::format("left out: {}", point)].push_back(group.group);
+  if (group.undefined_replicates == 0) return;
+  notes[fmt::format("Pearson is undefined in {} of {} replicates, which are dropped", group.undefined_replicates,
+                    group.options.bootstrap.replicates)]
+      .push_back(group.group);
+}
+
 std::string Footnotes(const std::vector<CorrelationGroup>& groups) {
-  std::set<std::string> methods, undefined, left_out;
+  Notes notes;
   std::int64_t ties = 0;
   for (const CorrelationGroup& group : groups) {
     ties += group.ranks.ties;
-    left_out.insert(group.left_out.begin(), group.left_out.end());
-    const auto note = [&](const char* name, const Estimate& estimate) {
-      if (!estimate.value)
-        undefined.insert(fmt::format("{}: {} is undefined: {}", group.group, name, estimate.value.reason()));
-      if (estimate.value && !estimate.interval)
-        undefined.insert(fmt::format("{}: {} has no interval: {}", group.group, name, estimate.interval.reason()));
-      if (estimate.interval) methods.insert(fmt::format("{}: {}", name, estimate.method));
-    };
-    note("Pearson", group.pearson);
-    note("Spearman", group.spearman);
-    note("MMRV", group.mmrv);
+    NoteEstimate(group.group, "Pearson", group.pearson, notes);
+    NoteEstimate(group.group, "Spearman", group.spearman, notes);
+    NoteEstimate(group.group, "MMRV", group.mmrv, notes);
+    NoteBootstrap(group, notes);
   }
   std::string text = "\n";
-  for (const std::string& method : methods) text += fmt::format("95 % interval of {}\n", method);
   if (!groups.empty()) {
     text += fmt::format("MMRV (0 is best): {}; {} pair{} of points tied\n", Name(groups[0].options.convention), ties,
                         ties == 1 ? "" : "s");
   }
-  for (const std::string& line : undefined) text += fmt::format("{}\n", line);
-  for (const std::string& line : left_out) text += fmt::format("left out: {}\n", line);
+  for (const auto& [note, holds_for] : notes) {
+    const bool for_all = holds_for.size() == groups.size();
+    text += for_all ? fmt::format("{}\n", note) : fmt::format("{} ({})\n", note, fmt::join(holds_for, ", "));
+  }
   return text;
 }
 

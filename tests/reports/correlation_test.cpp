@@ -157,7 +157,7 @@ TEST(CorrelationText, ShowsIntervalsTheirMethodAndTheReasonsForWhatIsMissing) {
       CorrelationText(GroupsOf("good,t,1,.1,.1\ngood,t,2,.2,.3\ngood,t,3,.4,.3\ngood,t,4,.9,.8\nlone,t,1,0,1\n"));
   EXPECT_THAT(text, HasSubstr("Fisher z"));
   EXPECT_THAT(text, HasSubstr("real_gap, ties code; 1 pair of points tied"));
-  EXPECT_THAT(text, HasSubstr("lone: Pearson is undefined: 1 point, wanted at least 3"));
+  EXPECT_THAT(text, HasSubstr("Pearson is undefined: 1 point, wanted at least 3 (lone)"));
 }
 
 // --- a run
