@@ -23,6 +23,8 @@ void Sync(const fs::path& path, int flags) {
   if (!synced) throw InternalError("{}: cannot be synced to disk: {}", path.string(), std::strerror(error));
 }
 
+void SyncFolder(const fs::path& folder) { Sync(folder.empty() ? fs::path(".") : folder, O_RDONLY | O_DIRECTORY); }
+
 }  // namespace
 
 std::string ReadFile(const fs::path& path) {
@@ -36,7 +38,16 @@ std::string ReadFile(const fs::path& path) {
 void SyncAndRename(const fs::path& from, const fs::path& to) {
   Sync(from, O_RDONLY);
   if (::rename(from.c_str(), to.c_str()) != 0) throw InternalError("{}: cannot be renamed from {}: {}", to.string(), from.string(), std::strerror(errno));
-  Sync(to.parent_path().empty() ? fs::path(".") : to.parent_path(), O_RDONLY | O_DIRECTORY);
+  SyncFolder(to.parent_path());
+}
+
+void MakeFolders(const fs::path& folder) {
+  if (folder.empty() || fs::is_directory(folder)) return;
+  MakeFolders(folder.parent_path());
+  std::error_code error;
+  fs::create_directory(folder, error);
+  if (error) throw InternalError("{}: cannot be made: {}", folder.string(), error.message());
+  SyncFolder(folder.parent_path());
 }
 
 void WriteFileAtomically(const fs::path& path, std::string_view bytes) {

@@ -16,4 +16,7 @@ void WriteFileAtomically(const std::filesystem::path& path, std::string_view byt
 /// Syncs a finished file to disk, renames it to its final name and syncs that folder.
 void SyncAndRename(const std::filesystem::path& from, const std::filesystem::path& to);
 
+/// Makes a folder and those above it, as far as they are missing, each of them synced into the one above.
+void MakeFolders(const std::filesystem::path& folder);
+
 }  // namespace evac

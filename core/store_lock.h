@@ -1,0 +1,20 @@
+#pragma once
+
+#include <filesystem>
+
+namespace evac {
+
+/// RUN/lock, held by the one process that may write the run. The kernel releases it with the process, however that ends.
+class RunLock {
+ public:
+  /// @throws InvalidInput naming the holder's process number, if there is one.
+  explicit RunLock(const std::filesystem::path& file);
+  ~RunLock();
+  RunLock(const RunLock&) = delete;
+  RunLock& operator=(const RunLock&) = delete;
+
+ private:
+  int descriptor_ = -1;
+};
+
+}  // namespace evac

@@ -1,0 +1,47 @@
+#pragma once
+
+#include <map>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "core/store.h"
+#include "core/store_sqlite.h"
+#include "core/types.h"
+
+/// The store's tables as nouns: what one row means, and the SQL for it. Each write is part of the caller's transaction.
+namespace evac::rows {
+
+void InsertRun(sqlite::Connection& connection, const RunInfo& run);
+std::optional<RunInfo> SelectRun(sqlite::Connection& connection);
+
+/// @throws InvalidInput if something else is stored under the name.
+void DeclareTask(sqlite::Connection& connection, const Task& task);
+void DeclareWorld(sqlite::Connection& connection, const WorldInfo& world);
+void DeclarePolicy(sqlite::Connection& connection, const PolicyInfo& policy);
+std::vector<Task> SelectTasks(sqlite::Connection& connection);
+std::vector<WorldInfo> SelectWorlds(sqlite::Connection& connection);
+std::vector<PolicyInfo> SelectPolicies(sqlite::Connection& connection);
+
+void InsertEpisode(sqlite::Connection& connection, const Episode& episode);
+void InsertSteps(sqlite::Connection& connection, const Episode& episode);
+void InsertPrivileged(sqlite::Connection& connection, const std::string& episode_id, const PrivilegedTrack& track);
+/// In pair-key order, then world.
+std::vector<Episode> SelectEpisodes(sqlite::Connection& connection);
+std::optional<Episode> SelectEpisode(sqlite::Connection& connection, const std::string& episode_id);
+void SelectSteps(sqlite::Connection& connection, Episode& episode);
+PrivilegedTrack SelectPrivileged(sqlite::Connection& connection, const std::string& episode_id);
+void DeleteFailedEpisode(sqlite::Connection& connection, const std::string& episode_id);
+
+/// Stored unless a scene of a lower (seed, policy, checkpoint) is there.
+void UpsertInitialScene(sqlite::Connection& connection, const PairKey& pair, const InitialScene& scene);
+std::optional<InitialScene> SelectInitialScene(sqlite::Connection& connection, const std::string& task, const std::string& initial_state);
+
+void InsertVerdict(sqlite::Connection& connection, const Verdict& verdict);
+std::vector<Verdict> SelectVerdicts(sqlite::Connection& connection);
+
+void AddToCounters(sqlite::Connection& connection, const std::string& policy, const Counters& counters);
+std::map<std::string, Counters> SelectCounters(sqlite::Connection& connection);
+
+}  // namespace evac::rows
