@@ -18,7 +18,8 @@ struct PolicyProcessOptions {
   std::filesystem::path log;                       ///< its stdout and stderr are appended here
   double first_restart_after_s = 0.2;              ///< back-off after a death; doubles with each …
   double longest_back_off_s = 5;                   ///< … up to this
-  int restarts = 5;                                ///< more deaths than this within `window_s`: given up
+  int restarts = 5;                                ///< more deaths than this within `window_s`: given up; at once after exit
+                                                   ///< code 127 (not found) or 2 (refuses its options)
   double window_s = 60;
   double grace_s = 3;                              ///< between SIGTERM and SIGKILL
 };
@@ -42,7 +43,7 @@ class PolicyProcess {
   /// SIGTERM to all of it, `grace_s`, SIGKILL; returns when nothing is left. Idempotent.
   void Stop();
 
-  /// Why it is not coming back: "it ended 6 times within 60 s, the last time with exit code 3: <log's last line> (policy.log)".
+  /// Why it is not coming back: "its process ended 6 times within 60 s, at last with exit code 3: <log's last line> (policy.log)".
   /// Nothing while it runs or is about to be restarted, and after Stop. Thread-safe.
   std::optional<std::string> WhyGone() const;
 
