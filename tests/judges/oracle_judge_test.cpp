@@ -68,7 +68,12 @@ class OracleJudgeTest : public testing::Test {
   std::string Add(const Task& task, const PrivilegedTrack& track, StopReason stop = StopReason::kStill) {
     store_.AddTask(task);
     EpisodeRecord record;
-    record.episode.key = {{task.id, fmt::format("1-{:04}", ++count_), "hold", "a", 0}, "real"};
+    PairKey& pair = record.episode.key.pair;
+    pair.task = task.id;
+    pair.initial_state = fmt::format("1-{:04}", ++count_);
+    pair.policy = "hold";
+    pair.checkpoint = "a";
+    record.episode.key.world = "real";
     record.episode.stop = stop;
     const std::size_t steps = std::max<std::size_t>(1, track.size());
     for (std::size_t k = 0; k < steps; ++k) record.episode.observations.push_back({{}, {ArmState{}}, false});
