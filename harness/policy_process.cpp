@@ -52,7 +52,7 @@ std::vector<std::string> Environment(const std::map<std::string, std::string>& a
     const std::string text = *entry;
     if (!additions.contains(text.substr(0, text.find('=')))) entries.push_back(text);
   }
-  for (const auto& [name, value] : additions) entries.push_back(name + "=" + value);
+  for (const auto& [name, value] : additions) entries.push_back(fmt::format("{}={}", name, value));
   return entries;
 }
 
@@ -74,7 +74,7 @@ int OpenLog(const std::filesystem::path& log) {
 PolicyProcess::PolicyProcess(PolicyProcessOptions options) : options_(std::move(options)) {
   if (options_.command.empty()) throw InvalidInput("a policy's command is empty, wanted a program and its arguments");
   ::close(OpenLog(options_.log));
-  options_.environment.insert_or_assign("EVAC_SUPERVISED", "1");  // it may end itself when its parent is gone
+  options_.environment.insert_or_assign("EVAC_SUPERVISED", std::string("1"));  // it may end itself when its parent is gone
   supervisor_ = std::thread([this] {
     try {
       Supervise();
