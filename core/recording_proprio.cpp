@@ -1,5 +1,6 @@
 #include <hdf5.h>
 
+#include <algorithm>
 #include <array>
 #include <limits>
 
@@ -12,6 +13,8 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr hsize_t kMaxSteps = 1'000'000;  // nine hours at 30 Hz
+constexpr std::size_t kMaxNumberBytes = 8;
+constexpr hsize_t kMaxChunkNumbers = hsize_t{1} << 24;  // the library allocates whole chunks
 constexpr int kArms = 2;
 
 /// Owns an identifier of the HDF5 library.
@@ -70,13 +73,29 @@ hsize_t StepsOf(const Handle& data, hsize_t width, const std::string& where) {
   return shape[0];
 }
 
+/// The library believes what a file says of its numbers' and chunks' sizes and allocates accordingly: we do not.
+void CheckSizes(const Handle& data, const std::string& where) {
+  const Handle type(H5Dget_type(data.id()), H5Tclose);
+  const H5T_class_t kind = type.valid() ? H5Tget_class(type.id()) : H5T_NO_CLASS;
+  if (kind != H5T_FLOAT && kind != H5T_INTEGER) throw InvalidInput("{}: it holds no numbers", where);
+  const std::size_t bytes = H5Tget_size(type.id());
+  if (bytes == 0 || bytes > kMaxNumberBytes) throw InvalidInput("{}: numbers of {} bytes, wanted at most {}", where, bytes, kMaxNumberBytes);
+  const Handle creation(H5Dget_create_plist(data.id()), H5Pclose);
+  if (!creation.valid() || H5Pget_layout(creation.id()) != H5D_CHUNKED) return;
+  std::array<hsize_t, 3> chunk = {1, 1, 1};
+  const int rank = H5Pget_chunk(creation.id(), static_cast<int>(chunk.size()), chunk.data());
+  hsize_t numbers = 1;
+  for (const hsize_t side : chunk) {
+    if (numbers <= kMaxChunkNumbers) numbers = side > kMaxChunkNumbers ? side : numbers * std::max<hsize_t>(1, side);
+  }
+  if (rank < 0 || rank > 3 || numbers > kMaxChunkNumbers) throw InvalidInput("{}: its chunks are too large", where);
+}
+
 Track ReadTrack(const Handle& file, const char* name, hsize_t width, const std::string& path) {
   const std::string where = fmt::format("{}: {}", path, name);
   const Handle data(H5Dopen2(file.id(), name, H5P_DEFAULT), H5Dclose);
   if (!data.valid()) throw InvalidInput("{}: there is no such data set", where);
-  const Handle type(H5Dget_type(data.id()), H5Tclose);
-  const H5T_class_t kind = type.valid() ? H5Tget_class(type.id()) : H5T_NO_CLASS;
-  if (kind != H5T_FLOAT && kind != H5T_INTEGER) throw InvalidInput("{}: it holds no numbers", where);
+  CheckSizes(data, where);
   Track track{StepsOf(data, width, where), width, {}};
   // What the file does not fill stays NaN and is refused as such.
   track.values.assign(track.steps * kArms * width, std::numeric_limits<double>::quiet_NaN());
