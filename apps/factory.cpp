@@ -91,7 +91,7 @@ void Declare(const Suite& suite, Store& store) {
 
 std::unique_ptr<World> MakeWorld(const SuiteWorld& world, const Suite& suite) {
   if (world.type == "echo") return std::make_unique<EchoWorld>(ReadRecording(*suite.recording));
-  return std::make_unique<MujocoWorld>(MujocoWorldOptions{.name = world.name, .profile = world.profile, .threads = Threads(suite)});
+  return std::make_unique<sim::MujocoWorld>(sim::MujocoWorldOptions{.name = world.name, .profile = world.profile, .threads = Threads(suite)});
 }
 
 std::vector<std::string> CommandLine(const SuitePolicy& policy, const Suite& suite) {

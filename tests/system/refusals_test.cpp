@@ -1,0 +1,73 @@
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <fstream>
+
+#include "tests/support/command.h"
+#include "tests/support/temp_folder.h"
+
+namespace evac {
+namespace {
+
+using ::testing::AllOf;
+using ::testing::HasSubstr;
+
+const std::string kSuite = EVAC_SOURCE_DIR "/tests/system/small.yaml";
+
+class Refusals : public ::testing::Test {
+ protected:
+  CommandResult Run(const std::vector<std::string>& assignments) {
+    std::vector<std::string> words = {Binary("evac"), "run", kSuite, "--out", (folder_ / "run").string()};
+    for (const std::string& assignment : assignments) words.insert(words.end(), {"--set", assignment});
+    return RunCommand(words);
+  }
+  TempFolder folder_;
+};
+
+TEST_F(Refusals, ATypoInASuiteIsNamedAndNothingIsWritten) {
+  const CommandResult result = Run({"initial_state={seed: 1, count: 1}"});
+  EXPECT_EQ(result.exit_code, 2);
+  EXPECT_THAT(result.err, AllOf(HasSubstr("initial_state"), HasSubstr("'initial_states'")));
+  EXPECT_FALSE(std::filesystem::exists(folder_ / "run"));
+}
+
+TEST_F(Refusals, AMissingSuiteOrProgramOrRunIsInvalidInput) {
+  EXPECT_EQ(RunCommand({Binary("evac"), "run", "/nowhere/suite.yaml", "--out", (folder_ / "run").string()}).exit_code, 2);
+  EXPECT_EQ(RunCommand({Binary("evac"), "ls", (folder_ / "nothing").string()}).exit_code, 2);
+  EXPECT_EQ(RunCommand({Binary("evac"), "frobnicate"}).exit_code, 2);
+  const CommandResult program = Run({"policies.0.command=[no-such-policy]"});
+  EXPECT_EQ(program.exit_code, 2);
+  EXPECT_THAT(program.err, HasSubstr("no-such-policy"));
+}
+
+TEST_F(Refusals, APolicyWithAnotherPeriodEndsTheRunBeforeItStartsWithBothDeclarations) {
+  const CommandResult result = Run({"policies.0.command=[evac-policy, hold, --period-s, \"0.25\"]"});
+  EXPECT_EQ(result.exit_code, 2);
+  EXPECT_THAT(result.err, AllOf(HasSubstr("period"), HasSubstr("0.25"), HasSubstr("0.1")));
+}
+
+TEST_F(Refusals, AProgramThatIsNoPolicyIsRefusedAfterItsTimeToStart) {
+  const CommandResult result = Run({"policies.0.command=[sleep, \"60\"]", "transport={start_s: 1}"});
+  EXPECT_EQ(result.exit_code, 2);
+  EXPECT_THAT(result.err, HasSubstr("1"));
+}
+
+TEST_F(Refusals, APolicyThatHangsFailsItsEpisodesAndTheBudgetEndsTheRunSayingSo) {
+  std::ofstream(folder_ / "freeze") << "#!/bin/sh\n"
+                                    << Binary("evac-policy") << " hold &\nsleep 3; kill -STOP $!; sleep 600\n";
+  std::filesystem::permissions(folder_ / "freeze", std::filesystem::perms::owner_all);
+  const CommandResult result = Run({"policies.0.command=[" + (folder_ / "freeze").string() + "]", "transport={deadline_s: 1, repeat_after_s: 0.3}",
+                                    "error_budget=0", "initial_states.count=40", "lanes=2"});
+  EXPECT_EQ(result.exit_code, 4);
+  EXPECT_THAT(result.err, AllOf(HasSubstr("error budget"), HasSubstr("evac resume")));
+}
+
+TEST_F(Refusals, AValidSuiteIsCalledValidWithItsNumberOfEpisodes) {
+  const CommandResult result = RunCommand({Binary("evac"), "validate", kSuite});
+  EXPECT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_THAT(result.out, HasSubstr("= 16 episodes"));
+}
+
+}  // namespace
+}  // namespace evac
