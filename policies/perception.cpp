@@ -10,9 +10,9 @@
 namespace evac {
 namespace {
 
-constexpr double kReferencePercentile = 0.8;  // of the chroma of the pixels of a hue: what counts as fully covered
-constexpr float kHalf = 0.5f;
-constexpr float kTouches = 0.2f;              // pixels covered less than this neither connect nor count
+constexpr double kReferencePercentile = 0.8;  // of the saturation of a hue's pixels: what counts as fully covered
+constexpr double kTint = 0.6;                 // of the minimal saturation: a background less tinted than this counts as grey
+constexpr float kTouches = 0.2f;              // pixels covered less than this do not connect patches
 
 double HueDistance(double a_deg, double b_deg) {
   const double distance = std::fmod(std::abs(a_deg - b_deg), 360.0);
@@ -26,22 +26,20 @@ double HueMatch(double hue_deg, const ColourModel& colour) {
 }
 
 bool IsOfColour(const cv::Vec3f& hsv, const ColourModel& colour) {
-  return hsv[1] >= colour.min_saturation && hsv[1] <= colour.max_saturation && hsv[2] >= colour.min_value &&
+  return hsv[1] >= colour.min_saturation && hsv[2] >= colour.min_value &&
          HueDistance(hsv[0], colour.hue_deg) <= colour.hue_tolerance_deg;
 }
 
-float Chroma(const cv::Vec3f& hsv) { return hsv[1] * hsv[2]; }
-
-/// The chroma of a fully covered pixel in this picture, or 0 if none has the colour.
-float ReferenceChroma(const cv::Mat3f& hsv, const ColourModel& colour) {
-  std::vector<float> chromas;
+/// The saturation of a fully covered pixel in this picture, or 0 if none has the colour.
+double ReferenceSaturation(const cv::Mat3f& hsv, const ColourModel& colour) {
+  std::vector<float> saturations;
   for (const cv::Vec3f& pixel : hsv) {
-    if (IsOfColour(pixel, colour)) chromas.push_back(Chroma(pixel));
+    if (IsOfColour(pixel, colour)) saturations.push_back(pixel[1]);
   }
-  if (chromas.empty()) return 0;
-  const auto reference = chromas.begin() + static_cast<std::ptrdiff_t>(kReferencePercentile * (chromas.size() - 1));
-  std::nth_element(chromas.begin(), reference, chromas.end());
-  return *reference;
+  if (saturations.empty()) return 0;
+  const auto rank = static_cast<std::ptrdiff_t>(kReferencePercentile * (saturations.size() - 1));
+  std::nth_element(saturations.begin(), saturations.begin() + rank, saturations.end());
+  return saturations[rank];
 }
 
 cv::Mat3f ToHsv(const cv::Mat& rgb) {
@@ -52,32 +50,20 @@ cv::Mat3f ToHsv(const cv::Mat& rgb) {
   return hsv;
 }
 
-/// Weighted mean and covariance of the pixel centres.
-void SetMoments(Blob& blob) {
-  const cv::Moments m = cv::moments(blob.cover);
-  blob.weight_px = m.m00;
-  blob.centroid_px = Eigen::Vector2d(m.m10 / m.m00 + 0.5, m.m01 / m.m00 + 0.5);
-  Eigen::Matrix2d covariance;
-  covariance << m.mu20, m.mu11, m.mu11, m.mu02;
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> solver(covariance / m.m00);
-  blob.minor_sd_px = std::sqrt(std::max(0.0, solver.eigenvalues()[0]));
-  blob.major_sd_px = std::sqrt(std::max(0.0, solver.eigenvalues()[1]));
-  blob.major_axis = solver.eigenvectors().col(1);
-  if (blob.major_axis.x() < 0) blob.major_axis = -blob.major_axis;
-}
-
 }  // namespace
 
 cv::Mat Cover(const cv::Mat& rgb, const ColourModel& colour) {
   const cv::Mat3f hsv = ToHsv(rgb);
-  const float reference = ReferenceChroma(hsv, colour);
+  const double full = ReferenceSaturation(hsv, colour);
+  const double none = kTint * colour.min_saturation;
   cv::Mat1f cover(rgb.size(), 0.f);
-  if (reference <= 0) return cover;
+  if (full <= none) return cover;
   for (int v = 0; v < rgb.rows; ++v) {
     for (int u = 0; u < rgb.cols; ++u) {
       const cv::Vec3f& pixel = hsv(v, u);
-      if (pixel[1] > colour.max_saturation || pixel[2] < 0.5 * colour.min_value) continue;
-      cover(v, u) = static_cast<float>(HueMatch(pixel[0], colour)) * std::min(1.f, Chroma(pixel) / reference);
+      if (pixel[2] < colour.min_value) continue;
+      const double share = std::clamp((pixel[1] - none) / (full - none), 0.0, 1.0);
+      cover(v, u) = static_cast<float>(HueMatch(pixel[0], colour) * share);
     }
   }
   return cover;
@@ -91,10 +77,11 @@ std::vector<Blob> FindBlobs(const cv::Mat& rgb, const ColourModel& colour, doubl
   for (int label = 1; label < count; ++label) {
     Blob blob;
     cover.copyTo(blob.cover, labels == label);
-    blob.box = cv::boundingRect(blob.cover >= kHalf);
-    if (blob.box.empty()) continue;
-    SetMoments(blob);
-    if (blob.weight_px >= min_weight_px) blobs.push_back(std::move(blob));
+    const cv::Moments m = cv::moments(blob.cover);
+    if (m.m00 < min_weight_px) continue;
+    blob.weight_px = m.m00;
+    blob.centroid_px = {m.m10 / m.m00 + 0.5, m.m01 / m.m00 + 0.5};
+    blobs.push_back(std::move(blob));
   }
   std::stable_sort(blobs.begin(), blobs.end(), [](const Blob& a, const Blob& b) { return a.weight_px > b.weight_px; });
   return blobs;
@@ -108,13 +95,6 @@ std::optional<Eigen::Vector3d> OnPlane(const Camera& camera, const Eigen::Isomet
   const double distance_m = (height_m - origin.z()) / direction.z();
   if (distance_m <= 0) return std::nullopt;
   return origin + distance_m * direction;
-}
-
-Eigen::Vector2d TopCentroid(const Blob& blob, double fraction) {
-  const int rows = std::max(1, static_cast<int>(std::lround(fraction * blob.box.height)));
-  const cv::Rect top(0, std::max(0, blob.box.y - 1), blob.cover.cols, rows + std::min(1, blob.box.y));
-  const cv::Moments m = cv::moments(blob.cover(top));
-  return {m.m10 / m.m00 + 0.5, m.m01 / m.m00 + 0.5 + top.y};
 }
 
 }  // namespace evac

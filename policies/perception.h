@@ -17,7 +17,6 @@ struct ColourModel {
   double hue_deg = 0;             ///< [0, 360): 0 red, 120 green, 240 blue
   double hue_tolerance_deg = 20;  ///< beyond it a pixel is another colour
   double min_saturation = 0.25;   ///< [0, 1] of HSV; what is greyer is no colour at all
-  double max_saturation = 1.0;    ///< [0, 1]; tells brown bread from an orange box
   double min_value = 0.1;         ///< [0, 1] of HSV; what is darker is shadow
 };
 
@@ -25,14 +24,11 @@ struct ColourModel {
 struct Blob {
   double weight_px = 0;           ///< its area, where a pixel covered by half counts half
   Eigen::Vector2d centroid_px;    ///< weighted; pixel centres at integer + 0.5, as in Camera
-  Eigen::Vector2d major_axis;     ///< unit vector along its longest extent, right-pointing (x ≥ 0)
-  double major_sd_px = 0, minor_sd_px = 0;  ///< standard deviations along and across `major_axis`
-  cv::Rect box;                   ///< of the pixels covered by at least half
   cv::Mat cover;                  ///< CV_32F, image-sized, in [0, 1]: how much of a pixel belongs to it
 };
 
-/// How much of each pixel is of this colour, CV_32F in [0, 1]. Colourfulness is measured against the most colourful
-/// pixels of that hue in the picture, so a pixel half on a grey ground counts about half, in any light.
+/// How much of each pixel is of this colour, CV_32F in [0, 1]. Saturation is measured against the most saturated pixels of
+/// that hue in the picture: a pixel half on a grey ground counts about half, and shade changes little.
 /// @param rgb  CV_8UC3, RGB.
 cv::Mat Cover(const cv::Mat& rgb, const ColourModel& colour);
 
@@ -42,9 +38,5 @@ std::vector<Blob> FindBlobs(const cv::Mat& rgb, const ColourModel& colour, doubl
 /// Where the ray through a pixel meets the horizontal plane at `height_m` (base frame), or nothing if it does not.
 std::optional<Eigen::Vector3d> OnPlane(const Camera& camera, const Eigen::Isometry3d& base_from_camera,
                                        const Eigen::Vector2d& pixel, double height_m);
-
-/// Part of a blob, as one: the weighted centroid of its rows from the topmost down to `fraction` of its height.
-/// In a picture of a standing thing these rows show its upper end.
-Eigen::Vector2d TopCentroid(const Blob& blob, double fraction);
 
 }  // namespace evac

@@ -1,30 +1,53 @@
 #pragma once
 
-#include "core/types.h"
+#include <Eigen/Geometry>
+#include <optional>
+#include <vector>
 
 namespace evac {
 
-/// How fast an arm may be told to move.
+/// How fast a gripper may be told to move: peaks, not means.
 struct SpeedLimits {
-  double translation_mps = 0.30;  ///< peak, not mean
-  double rotation_radps = 1.5;
-  double closure_per_s = 2.5;     ///< of the gripper: closed in 0.4 s
+  double translation_mps = 0.38;
+  double rotation_radps = 2.4;
 };
 
-/// A straight move from one arm state to another that starts and ends at rest: minimum jerk in time (Flash and Hogan
-/// 1985), the rotation by slerp, the gripper linear at its own speed.
-class Move {
+/// A path of straight moves and pauses for one gripper, as a function of time. Each move starts and ends at rest: minimum
+/// jerk in time (Flash and Hogan 1985), rotations by slerp.
+class Timeline {
  public:
-  Move(const ArmState& from, const ArmState& to, const SpeedLimits& limits);
+  /// Begins at `base_from_gripper`, at time 0.
+  Timeline(const Eigen::Isometry3d& base_from_gripper, const SpeedLimits& limits);
 
-  /// Where the arm is told to be `time_s` after the move's start; the end of it from `duration_s` on.
-  ArmState At(double time_s) const;
-  double duration_s() const { return duration_s_; }
+  void MoveTo(const Eigen::Isometry3d& base_from_gripper);
+  void Pause(double duration_s);
+
+  /// Where the gripper is at `time_s`; the first pose before the beginning, the last after the end.
+  Eigen::Isometry3d At(double time_s) const;
+  /// Of everything appended so far: the time at which the next move would begin.
+  double duration_s() const { return segments_.empty() ? 0 : segments_.back().end_s; }
 
  private:
-  ArmState from_, to_;
-  double duration_s_ = 0;
-  double closure_s_ = 0;
+  struct Segment {
+    double begin_s, end_s;
+    Eigen::Isometry3d from, to;
+  };
+  const Eigen::Isometry3d& Last() const { return segments_.empty() ? start_ : segments_.back().to; }
+
+  Eigen::Isometry3d start_;
+  SpeedLimits limits_;
+  std::vector<Segment> segments_;
+};
+
+/// When the hand closes and opens again, on the clock of a Timeline.
+struct HandSchedule {
+  double start_closure = 0;        ///< [0, 1], where the hand is before anything happens
+  std::optional<double> close_s;   ///< begins to close
+  std::optional<double> open_s;    ///< begins to open; a hand told to open never closes again
+
+  /// What the hand is told at `time_s`: it goes from open to closed in `kTravel_s`.
+  double At(double time_s) const;
+  static constexpr double kTravel_s = 0.3;
 };
 
 }  // namespace evac

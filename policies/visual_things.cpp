@@ -1,0 +1,119 @@
+#include "policies/visual_things.h"
+
+#include <numbers>
+
+#include "core/error.h"
+
+namespace evac {
+namespace {
+
+constexpr double kRadians = std::numbers::pi / 180;
+constexpr double kSmallestPatchPx = 4;   // in a picture 96 wide; grows with the area
+constexpr double kSecondPatch = 0.25;    // of the largest patch: a thing cut in two by what stands before it is still one
+constexpr double kPoorestOverlap = 0.2;  // below it the patch is something else
+
+double SmallestPatchPx(const View& view) { return kSmallestPatchPx * (view.rgb->cols / 96.0) * (view.rgb->cols / 96.0); }
+
+/// The large patches of the colour, as one.
+cv::Mat MainCover(const std::vector<Blob>& blobs) {
+  cv::Mat cover = blobs.front().cover.clone();
+  for (std::size_t i = 1; i < blobs.size(); ++i) {
+    if (blobs[i].weight_px >= kSecondPatch * blobs.front().weight_px) cover += blobs[i].cover;
+  }
+  return cover;
+}
+
+Thing Bottle() {
+  Thing bottle;
+  bottle.colour = {.hue_deg = 143, .hue_tolerance_deg = 32, .min_saturation = 0.3, .min_value = 0.08};
+  bottle.shape = {Frustum(0.091, 0.028, 0.104, 0.028), Frustum(0.104, 0.028, 0.126, 0.019),
+                  Frustum(0.12, 0.014, 0.168, 0.014), Frustum(0.168, 0.0148, 0.186, 0.0148)};
+  bottle.shape.back().coloured = false;  // the white cap
+  bottle.height_m = 0.004;
+  bottle.middle_m = 0.12;
+  return bottle;
+}
+
+PickKnowledge TakeBottle() {
+  PickKnowledge knowledge;
+  knowledge.thing = knowledge.held = Bottle();
+  knowledge.usual.xy_m = {0.44, -0.12};
+  knowledge.grasp_m = 0.155;
+  knowledge.hover_m = 0.26;
+  knowledge.lift_m = 0.13;
+  knowledge.usual_target.xy_m = {0.44, 0.12};
+  knowledge.drop_m = 0.003;
+  return knowledge;
+}
+
+Thing Toast() {
+  Thing toast;
+  toast.colour = {.hue_deg = 31, .hue_tolerance_deg = 22, .min_saturation = 0.4, .min_value = 0.15};
+  toast.shape = {Cuboid({-0.007, -0.035, 0.038}, {0.007, 0.035, 0.080})};
+  toast.height_m = 0.006;
+  toast.middle_m = 0.06;
+  toast.yaw_reach_rad = 10 * kRadians;
+  return toast;
+}
+
+Thing Plate() {
+  Thing plate;
+  plate.colour = {.hue_deg = 216, .hue_tolerance_deg = 28, .min_saturation = 0.42, .min_value = 0.15};
+  plate.shape = {Cuboid({-0.095, -0.095, 0}, {0.095, 0.095, 0.014}), Cuboid({-0.083, -0.083, 0.011}, {0.083, 0.083, 0.013})};
+  plate.shape.back().coloured = false;  // the white floor within the blue rim
+  plate.middle_m = 0.01;
+  plate.yaw_reach_rad = 6 * kRadians;
+  return plate;
+}
+
+PickKnowledge TakeToast() {
+  PickKnowledge knowledge;
+  knowledge.thing = knowledge.held = Toast();
+  knowledge.usual.xy_m = {0.44, -0.14};
+  knowledge.grasp_m = 0.070;
+  knowledge.hover_m = 0.165;
+  knowledge.lift_m = 0.12;
+  knowledge.turn_rad = std::numbers::pi / 2;
+  knowledge.target = Plate();
+  knowledge.usual_target.xy_m = {0.45, 0.14};
+  knowledge.target_floor_m = 0.008;
+  knowledge.drop_m = 0.006;
+  knowledge.tilt_rad = 33 * kRadians;
+  knowledge.fall_m = 0.035;
+  return knowledge;
+}
+
+}  // namespace
+
+std::optional<ShapeFit> Locate(const View& view, const Thing& thing, const std::optional<Placement>& expected) {
+  const std::vector<Blob> blobs = FindBlobs(*view.rgb, thing.colour, SmallestPatchPx(view));
+  if (blobs.empty()) return std::nullopt;
+  ShapeFit start;
+  if (expected) {
+    start.placement = *expected;
+  } else {
+    const auto point_m = OnPlane(view.camera, view.base_from_camera, blobs.front().centroid_px, thing.height_m + thing.middle_m);
+    if (!point_m) return std::nullopt;
+    start.placement.xy_m = point_m->head<2>();
+  }
+  FitOptions options;
+  options.reach_yaw_rad = thing.yaw_reach_rad;
+  options.height_m = thing.height_m;
+  const ShapeFit fit = FitShape(MainCover(blobs), thing.shape, view.camera, view.base_from_camera, start, options);
+  if (fit.overlap < kPoorestOverlap) return std::nullopt;
+  return fit;
+}
+
+double VisibleShare(const View& view, const Thing& thing, const Eigen::Isometry3d& base_from_thing) {
+  const cv::Mat silhouette = Silhouette(thing.shape, view.camera, view.base_from_camera.inverse() * base_from_thing);
+  const double area = cv::sum(silhouette)[0];
+  return area > 0 ? cv::sum(cv::min(silhouette, Cover(*view.rgb, thing.colour)))[0] / area : 0;
+}
+
+PickKnowledge KnowledgeOf(const std::string& task_id) {
+  if (task_id == "take_bottle") return TakeBottle();
+  if (task_id == "take_toast") return TakeToast();
+  throw InvalidInput("visual_pick: found task {}, wanted take_bottle or take_toast", task_id);
+}
+
+}  // namespace evac
