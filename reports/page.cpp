@@ -26,7 +26,7 @@ std::string Subtitle(const RunSummary& summary) {
 }
 
 std::string Navigation() {
-  return "<nav aria-label=\"Sections\"><a href=\"#rates\">Rates</a><a href=\"#worlds\">Worlds compared</a><a "
+  return "<nav aria-label=\"Sections\"><a href=\"#rates\">Rates</a><a href=\"#worlds\">Worlds</a><a "
          "href=\"#flips\">Flips</a>"
          "<a href=\"#clips\">Clips</a><a href=\"#errors\">Errors</a><a href=\"#provenance\">Provenance</a></nav>";
 }

@@ -93,7 +93,7 @@ std::string CounterTable(const RunSummary& summary) {
 std::string ClipsPart(const RunSummary& summary, const PageOptions& options) {
   std::string html = "<section id=\"clips\"><h2>Clips</h2>" + Filters(summary) + "<div class=\"clips\">";
   for (const JudgedEpisode& judged : summary.episodes) html += Clip(summary, judged, options) + "\n";
-  return html + "</div></section>";
+  return html + "</div><button type=\"button\" class=\"more\" hidden>Show all</button></section>";
 }
 
 std::string ErrorsPart(const RunSummary& summary) {

@@ -1,5 +1,8 @@
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <map>
+
 #include "reports/charts.h"
 #include "reports/html.h"
 #include "reports/page_parts.h"
@@ -40,6 +43,24 @@ std::string Row(const RunSummary& summary, const RateCell& cell) {
       apart.empty() ? "<span class=\"none\">–</span>" : apart);
 }
 
+/// The best in the real world first, over all tasks, so that every task shows them in the same order.
+std::vector<std::string> ByRealRate(const RunSummary& summary) {
+  std::map<std::string, std::pair<double, int>> sums;
+  for (const RateCell& cell : summary.rates) {
+    if (cell.world != summary.reference || !cell.rate.value) continue;
+    sums[cell.policy].first += *cell.rate.value;
+    ++sums[cell.policy].second;
+  }
+  const auto mean = [&sums](const std::string& policy) {
+    const auto found = sums.find(policy);
+    return found == sums.end() ? -1.0 : found->second.first / found->second.second;
+  };
+  std::vector<std::string> policies = summary.policies;
+  std::stable_sort(policies.begin(), policies.end(),
+                   [&mean](const std::string& a, const std::string& b) { return mean(a) > mean(b); });
+  return policies;
+}
+
 std::string TaskTable(const RunSummary& summary, const Task& task) {
   std::string html = fmt::format(
       "<div class=\"task\"><h3>{}</h3><p class=\"quiet\">“{}”</p><table class=\"rates\"><thead><tr><th "
@@ -49,7 +70,7 @@ std::string TaskTable(const RunSummary& summary, const Task& task) {
       "<th scope=\"col\" class=\"num rate\">success [{:.0f} %]</th><th scope=\"col\" "
       "class=\"apart\">apart</th></tr></thead>",
       Escaped(task.id), Escaped(task.instruction), RateScale(), 100 * summary.options.confidence);
-  for (const std::string& policy : summary.policies) {
+  for (const std::string& policy : ByRealRate(summary)) {
     std::string rows;
     for (const RateCell& cell : summary.rates) {
       if (cell.task == task.id && cell.policy == policy) rows += Row(summary, cell);

@@ -31,17 +31,29 @@ std::string StatisticRow(const std::string& name, const Estimate& estimate, cons
   return fmt::format(
       "<tr><th scope=\"row\">{}<small>{}</small></th><td class=\"num big\">{}</td><td class=\"num\">{}{}</td><td "
       "class=\"num\">{}</td></tr>",
-      name, remark, value, interval, reason.empty() ? "" : "<small>" + Escaped(reason) + "</small>", estimate.n);
+      name, remark, value, interval, reason.empty() ? "" : "<small class=\"why\">" + Escaped(reason) + "</small>",
+      estimate.n);
 }
 
 /// A value with its interval, or the reason why there is none, below it.
 std::string StackedCell(const Estimate& estimate) {
-  const std::string value = estimate.value ? Plain(*estimate.value) : "undefined";
-  const std::string& reason = estimate.value ? estimate.interval.reason() : estimate.value.reason();
-  const std::string below = estimate.value && estimate.interval
-                                ? fmt::format("[{}, {}]", Plain(estimate.interval->low), Plain(estimate.interval->high))
-                                : Escaped(reason);
-  return fmt::format("<td class=\"num\">{}<small>{}</small></td>", value, below);
+  if (!estimate.value)
+    return "<td class=\"num\">undefined<small class=\"why\">" + Escaped(estimate.value.reason()) + "</small></td>";
+  if (!estimate.interval) {
+    return fmt::format("<td class=\"num\">{}<small class=\"why\">{}</small></td>", Plain(*estimate.value),
+                       Escaped(estimate.interval.reason()));
+  }
+  return fmt::format("<td class=\"num\">{}<small>[{}, {}]</small></td>", Plain(*estimate.value),
+                     Plain(estimate.interval->low), Plain(estimate.interval->high));
+}
+
+/// "90 % [70, 97]", its interval on a line of its own where there is little room.
+std::string RateCellOf(const Estimate& rate) {
+  const std::string words = PercentWithInterval(rate);
+  const std::size_t interval = words.find('[');
+  if (interval == std::string::npos) return "<td class=\"num\">" + Escaped(words) + "</td>";
+  return "<td class=\"num\">" + words.substr(0, interval) + "<span class=\"ci\">" + words.substr(interval) +
+         "</span></td>";
 }
 
 std::string StatisticsTable(const WorldComparison& comparison) {
@@ -82,9 +94,9 @@ std::string PointsTable(const WorldComparison& comparison, const std::vector<Poi
     const ComparedPoint& point = comparison.points[i];
     html += fmt::format(
         "<tr><td class=\"key\"><b>{}</b>{}</td><th scope=\"row\">{} <span class=\"quiet\">{}</span></th>"
-        "<td class=\"num\">{}</td><td class=\"num\">{}</td><td class=\"num\">{}</td></tr>",
-        point.letter, PointIcon(styles[i]), Escaped(point.policy), Escaped(point.task), PercentWithInterval(point.real),
-        PercentWithInterval(point.other), point.real.n);
+        "{}{}<td class=\"num\">{}</td></tr>",
+        point.letter, PointIcon(styles[i]), Escaped(point.policy), Escaped(point.task), RateCellOf(point.real),
+        RateCellOf(point.other), point.real.n);
   }
   return html + "</tbody></table>";
 }

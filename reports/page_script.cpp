@@ -2,26 +2,34 @@
 
 namespace evac {
 
+namespace {
+
 // Three things, none of which the page needs in order to be read: filters, videos in place, two videos in step.
-std::string PageScript() {
-  return R"js(
+constexpr const char* kScript = R"js(
 "use strict";
 const all = (selector, inside = document) => [...inside.querySelectorAll(selector)];
 
-// Filters: a clip is shown when it has every chosen value.
+// Filters: a clip is shown when it has every chosen value; many are shown only when asked for.
 const filters = document.querySelector(".filters");
 if (filters) {
   const clips = all(".clip"), chosen = all("select", filters), output = filters.querySelector("output");
+  const more = document.querySelector(".more"), first = 30;
+  let everything = false;
   const apply = () => {
-    let shown = 0;
+    let fit = 0;
     for (const clip of clips) {
-      clip.hidden = chosen.some(s => s.value && clip.dataset[s.dataset.filter] !== s.value);
-      if (!clip.hidden) ++shown;
+      const fits = chosen.every(s => !s.value || clip.dataset[s.dataset.filter] === s.value);
+      if (fits) ++fit;
+      clip.hidden = !fits || (fit > first && !everything);
     }
-    output.textContent = shown === clips.length ? `${shown} clips` : `${shown} of ${clips.length} clips`;
+    output.textContent = fit === clips.length ? `${fit} clips` : `${fit} of ${clips.length} clips`;
+    more.hidden = everything || fit <= first;
+    more.textContent = `Show all ${fit}`;
   };
   filters.hidden = false;
   filters.addEventListener("change", apply);
+  filters.addEventListener("everything", () => { everything = true; apply(); });
+  more.addEventListener("click", () => filters.dispatchEvent(new Event("everything")));
   apply();
 }
 
@@ -69,12 +77,15 @@ const reveal = () => {
   const target = document.getElementById(decodeURIComponent(location.hash.slice(1)));
   if (!target || !target.matches(".pair, .clip")) return;
   for (let d = target.closest("details"); d; d = d.parentElement.closest("details")) d.open = true;
-  if (target.hidden && filters) { filters.reset(); filters.dispatchEvent(new Event("change")); }
+  if (target.hidden && filters) { filters.reset(); filters.dispatchEvent(new Event("everything")); }
   target.scrollIntoView({block: "center"});
 };
 addEventListener("hashchange", reveal);
 reveal();
 )js";
-}
+
+}  // namespace
+
+std::string PageScript() { return kScript; }
 
 }  // namespace evac

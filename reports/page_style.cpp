@@ -15,7 +15,7 @@ constexpr const char* kColours = R"css(
 
 constexpr const char* kText = R"css(
 *{box-sizing:border-box}
-html{-webkit-text-size-adjust:100%;scroll-padding-top:3.4rem}
+html{-webkit-text-size-adjust:100%;scroll-padding-top:2.55rem}
 body{margin:0 auto;max-width:72rem;padding:2.2rem 1.5rem 4rem;background:var(--ground);color:var(--ink);
 font:15px/1.5 system-ui,-apple-system,"Segoe UI",Roboto,"Helvetica Neue",Arial,sans-serif;font-variant-numeric:tabular-nums;overflow-wrap:break-word}
 h1{font-size:1.75rem;line-height:1.2;font-weight:650;letter-spacing:-.015em;margin:0}
@@ -37,9 +37,9 @@ nav + section{border-top:0;margin-top:1rem}
 .notice{background:var(--notice);border:1px solid var(--notice-rule);border-radius:6px;padding:.7rem 1rem;margin:1.2rem 0}
 .findings{border:0;padding:0;margin-top:1.5rem}
 .findings dl{margin:0;display:grid;gap:.9rem}
-.findings dt{font-size:.87rem;color:var(--quiet);padding-left:6.6rem}
-.findings dd{margin:.05rem 0 0;display:grid;grid-template-columns:5.6rem minmax(0,1fr);gap:1rem;align-items:start;font-size:1.05rem;line-height:1.45;max-width:62rem}.findings dd p{margin:0}
-.tag{justify-self:end;margin-top:.16rem;font-size:.76rem;font-weight:650;line-height:1.3;padding:.08rem .5rem;border-radius:99px;border:1.5px solid var(--quiet);color:var(--quiet);white-space:nowrap}
+.findings dt{font-size:.87rem;color:var(--quiet);padding-left:7.2rem}
+.findings dd{margin:.05rem 0 0;display:grid;grid-template-columns:6.2rem minmax(0,1fr);gap:1rem;align-items:start;font-size:1.05rem;line-height:1.45;max-width:62rem}.findings dd p{margin:0}
+.tag{justify-self:start;margin-top:.16rem;font-size:.76rem;font-weight:650;line-height:1.3;padding:.08rem .5rem;border-radius:99px;border:1.5px solid var(--quiet);color:var(--quiet);white-space:nowrap}
 .tag.yes{background:var(--good);border-color:var(--good);color:var(--ground)}
 .tag.no{background:var(--bad);border-color:var(--bad);color:var(--ground)}
 .tag.not-decided{border-style:dashed}
@@ -49,14 +49,14 @@ nav + section{border-top:0;margin-top:1rem}
 
 constexpr const char* kTablesAndCharts = R"css(
 table{border-collapse:collapse;text-align:left}th{font-weight:400}thead th{color:var(--quiet);font-size:.82rem;font-weight:400}
-.num{text-align:right;white-space:nowrap}small{display:block;white-space:normal;font-size:.8rem;color:var(--quiet);line-height:1.3}
+.num{text-align:right;white-space:nowrap}small{display:block;font-size:.8rem;color:var(--quiet);line-height:1.3}
 .tasks{display:grid;grid-template-columns:repeat(auto-fit,minmax(min(100%,29rem),1fr));gap:1rem 3rem}
 .rates{width:100%;table-layout:auto;font-size:.9rem;margin-top:.5rem}
 .rates td,.rates th{padding:0 .45rem;height:24px;line-height:24px;white-space:nowrap}
 .rates th[scope=row],.rates thead th:first-child{padding-left:0;width:1%;color:var(--quiet)}
 .rates .group th{padding:.55rem 0 .05rem;height:auto;font-weight:600;line-height:1.5;white-space:normal}
-.rates .plot{width:99%;padding:0 .9rem}.rates .apart{font-size:.82rem;color:var(--quiet);padding-right:0;width:1%}.aside{display:none}
-.none{opacity:.5}
+.rates .plot{width:99%;padding:0 .9rem}.rates .rate{min-width:8.2rem}.rates .apart{font-size:.74rem;color:var(--quiet);padding-right:0;width:1%;min-width:5.4rem;white-space:normal;line-height:12px}.aside{display:none}
+.none{opacity:.5}.num .why{white-space:normal;min-width:6rem}.ci{white-space:nowrap}.stats+.quiet{margin:.6rem 0 1rem}
 .strip{display:block;width:100%;overflow:visible}.strip .grid{stroke:var(--grid)}.scale text{font-size:11px;fill:var(--quiet)}
 .icon{vertical-align:-3px;margin-right:.25rem;overflow:visible}
 .range{stroke-width:1.8;stroke:currentColor}.dot{stroke-width:2;stroke:currentColor;fill:var(--ground)}
@@ -77,7 +77,7 @@ table{border-collapse:collapse;text-align:left}th{font-weight:400}thead th{color
 )css";
 
 constexpr const char* kEpisodes = R"css(
-.cards{display:grid;grid-template-columns:repeat(auto-fit,minmax(min(100%,29rem),1fr));gap:1rem}
+.cards{margin-top:.8rem;display:grid;grid-template-columns:repeat(auto-fit,minmax(min(100%,29rem),1fr));gap:1rem}
 .card{border:1px solid var(--rule);border-radius:8px;padding:.9rem 1rem;min-width:0}.card:has(details[open]){grid-column:1/-1}
 .overview{display:flex;gap:1.3rem;align-items:center;margin-top:.6rem}.overview p{font-size:.87rem;color:var(--quiet);margin:0;min-width:0}.card>.states{margin-top:.5rem}
 .two{font-size:.85rem;flex:none}.two th{color:var(--quiet);padding:0 .45rem;font-size:.8rem;white-space:nowrap;max-width:6rem;overflow:hidden;text-overflow:ellipsis}
@@ -99,7 +99,7 @@ video,.play img{display:block;width:100%;height:auto;background:#000;border-radi
 .filters{display:flex;flex-wrap:wrap;gap:.6rem 1rem;align-items:end;margin:.6rem 0 1rem}.filters[hidden],[hidden]{display:none!important}
 .filters label{display:grid;gap:.15rem;font-size:.8rem;color:var(--quiet)}.filters select{max-width:13rem}.filters output{font-size:.87rem;color:var(--quiet);padding-bottom:.25rem}
 .clips{display:grid;grid-template-columns:repeat(auto-fill,minmax(11rem,1fr));gap:1.1rem .9rem}
-.clip{margin:0;min-width:0;content-visibility:auto;contain-intrinsic-size:auto 11rem}.clip figcaption{font-size:.8rem;line-height:1.35;margin-top:.3rem;color:var(--ink)}.clip p{margin:0}.clip .quiet{font-size:.8rem}
+.more{margin-top:1.2rem}.clip{margin:0;min-width:0;content-visibility:auto;contain-intrinsic-size:auto 11rem}.clip figcaption{font-size:.8rem;line-height:1.35;margin-top:.3rem;color:var(--ink)}.clip p{margin:0}.clip .quiet{font-size:.8rem}
 .clip:target{outline:2px solid var(--c0);outline-offset:4px;border-radius:2px}
 .facts{margin:.6rem 0}.facts>div{display:grid;grid-template-columns:9rem minmax(0,1fr);gap:.2rem 1rem;padding:.55rem 0;border-bottom:1px solid var(--rule)}
 .facts dt{color:var(--quiet)}.facts dd{margin:0;min-width:0;font-size:.92rem}.folded{margin:.1rem 0}
@@ -108,11 +108,11 @@ video,.play img{display:block;width:100%;height:auto;background:#000;border-radi
 constexpr const char* kSmallAndPrint = R"css(
 @media(max-width:760px){.comparison{grid-template-columns:minmax(0,1fr)}}
 @media(max-width:560px){body{padding:1.3rem 1rem 3rem;font-size:14.5px}h1{font-size:1.45rem}section{margin-top:1.9rem;padding-top:1.1rem}
-nav{gap:.1rem .9rem;font-size:.83rem}html{scroll-padding-top:4.6rem}
+nav{gap:.1rem .7rem;font-size:.8rem}html{scroll-padding-top:2.35rem}
 .findings dt{padding-left:0}.findings dd{grid-template-columns:minmax(0,1fr);gap:.25rem}.tag{justify-self:start}.findings dl{gap:1.1rem}
 .rates{font-size:.82rem}.rates td,.rates th{padding:0 .25rem}.rates .plot{padding:0 .6rem}.rates .apart{display:none}.aside{display:block;margin-top:-.25rem;padding-bottom:.2rem}
 .points .quiet{display:block;margin:0;font-size:.78rem}
-.stats td,.stats th,.points td,.points th{padding:.3rem .3rem}.stats,.points{font-size:.83rem}.points .num{white-space:normal}
+.stats td,.stats th,.points td,.points th{padding:.3rem .3rem}.stats,.points{font-size:.83rem}.ci{display:block}.points th{overflow-wrap:anywhere}.overview{flex-direction:column;align-items:flex-start;gap:.6rem}.sides{grid-template-columns:minmax(0,1fr)}.num small{font-size:.74rem}.rates .rate{min-width:0}
 .clips{grid-template-columns:repeat(auto-fill,minmax(8.6rem,1fr));gap:.9rem .7rem}
 .facts>div{grid-template-columns:minmax(0,1fr)}.filters label{flex:1 1 40%}.filters select{max-width:none;width:100%}}
 @media print{nav,.filters,button{display:none!important}body{max-width:none;padding:0}.card,.clip,figure{break-inside:avoid}}

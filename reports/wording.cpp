@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 
 namespace evac {
@@ -33,7 +34,8 @@ std::string NumberWithInterval(const Estimate& estimate) {
 
 std::string Plain(double value) {
   const std::string text = fmt::format("{:.2f}", value);
-  if ((text == "1.00" || text == "-1.00") && std::abs(value) != 1) return fmt::format("{:.3f}", value);
+  if ((text == "1.00" || text == "-1.00") && std::abs(value) < 1)
+    return fmt::format("{:.3f}", std::clamp(value, -0.999, 0.999));
   return text == "-0.00" ? "0.00" : text;
 }
 

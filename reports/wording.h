@@ -13,7 +13,8 @@ std::string Percent(double share);
 std::string PercentWithInterval(const Estimate& rate);
 /// "0.91 [0.78, 0.97]"; "0.91 (interval undefined: …)"; "undefined: …".
 std::string NumberWithInterval(const Estimate& estimate);
-/// "0.91", "-0.05": two decimals, no "-0.00"; a third where it would otherwise read as a perfect 1.00.
+/// "0.91", "-0.05": two decimals, no "-0.00"; "0.999" and less, cut, where it would otherwise
+/// read as a perfect 1.00.
 std::string Plain(double value);
 /// "p = 0.04", "p < 0.001".
 std::string PValue(double p);

@@ -71,7 +71,9 @@ class Blanker {
   void BlankRawString() {
     const std::size_t open = text_.find('(', at_);
     if (open == std::string::npos) return Blank();
-    BlankUpTo(")" + text_.substr(at_ + 2, open - at_ - 2) + "\"", open);
+    std::string end(1, ')');
+    end.append(text_, at_ + 2, open - at_ - 2).push_back('"');
+    BlankUpTo(end, open);
   }
   void BlankQuoted(char quote) {
     Blank();
@@ -100,7 +102,10 @@ std::size_t CloseOf(const std::string& code, std::size_t open) {
 std::string Collapsed(const std::string& text) {
   std::istringstream words(text);
   std::string word, joined;
-  while (words >> word) joined += (joined.empty() ? "" : " ") + word;
+  while (words >> word) {
+    if (!joined.empty()) joined += ' ';
+    joined += word;
+  }
   return joined;
 }
 

@@ -1,0 +1,93 @@
+#include "reports/findings.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "reports/wording.h"
+#include "tests/reports/sample_run.h"
+
+namespace evac {
+namespace {
+
+using testing::HasSubstr;
+using testing::Not;
+
+Finding FirstOf(const std::vector<SampleCell>& cells) { return FindingsOf(SampleRun(cells).Summary()).front(); }
+
+TEST(Findings, AWorldThatFollowsIsSaidToFollowWithItsInterval) {
+  const Finding finding = FindingsOf(LargeRun().Summary()).front();
+  EXPECT_EQ(finding.decision, Decision::kYes);
+  EXPECT_THAT(finding.answer, HasSubstr("sim follows real closely: Pearson 0.9"));
+  EXPECT_THAT(finding.answer, HasSubstr("over 8 (task, policy) points"));
+}
+
+TEST(Findings, AnIntervalThatHoldsZeroIsNotDecided) {
+  const Finding finding = FirstOf({{"a", "pick", "1", "sfsfs", "fsfff"},
+                                   {"a", "pick", "2", "ssfff", "sfsfs"},
+                                   {"a", "pick", "3", "sffff", "ssfff"},
+                                   {"a", "pick", "4", "ffsfs", "fsfsf"}});
+  EXPECT_EQ(finding.decision, Decision::kNotDecided);
+  EXPECT_THAT(finding.answer, HasSubstr("holds 0"));
+}
+
+TEST(Findings, TooFewPointsAreNotDecidedAndNoNumberIsGiven) {
+  const Finding finding = FirstOf({{"a", "pick", "1", "ssf", "ssf"}, {"a", "pick", "2", "fff", "fff"}});
+  EXPECT_EQ(finding.decision, Decision::kNotDecided);
+  EXPECT_THAT(finding.answer, HasSubstr("undefined"));
+  EXPECT_THAT(finding.answer, Not(HasSubstr("1.00")));
+}
+
+TEST(Findings, EqualRatesAreNotDecidedWithTheReason) {
+  const Finding finding =
+      FirstOf({{"a", "pick", "1", "ss", "sf"}, {"a", "pick", "2", "ss", "ff"}, {"a", "pick", "3", "ss", "ss"}});
+  EXPECT_EQ(finding.decision, Decision::kNotDecided);
+  EXPECT_THAT(finding.answer, HasSubstr("equal"));
+}
+
+TEST(Findings, AWorldThatTurnsTheOrderAroundIsSaidToRunAgainst) {
+  const std::string all(12, 's'), none(12, 'f');
+  const Finding finding = FirstOf({{"a", "pick", "1", all, none},
+                                   {"a", "pick", "2", "ssssssffffff", "ssssssffffff"},
+                                   {"a", "pick", "3", none, all}});
+  EXPECT_EQ(finding.decision, Decision::kNo);
+  EXPECT_THAT(finding.answer, HasSubstr("runs against"));
+}
+
+TEST(Findings, TheBestPolicyIsNamedOnlyWhereTheSharedStatesDecide) {
+  const std::vector<Finding> clear = FindingsOf(
+      SampleRun({{"a", "pick", "1", "ssssssssss", "ssssssssss"}, {"a", "pick", "2", "ffffffffff", "ffffffffff"}})
+          .Summary());
+  EXPECT_EQ(clear[2].decision, Decision::kYes);
+  EXPECT_THAT(clear[2].answer, HasSubstr("pick@1 10/10"));
+  EXPECT_THAT(clear[2].answer, HasSubstr("ahead of pick@2 0/10"));
+  const std::vector<Finding> close =
+      FindingsOf(SampleRun({{"a", "pick", "1", "sss", "sss"}, {"a", "pick", "2", "ssf", "ssf"}}).Summary());
+  EXPECT_EQ(close[2].decision, Decision::kNotDecided);
+  EXPECT_THAT(close[2].answer, HasSubstr("3 shared initial states"));
+}
+
+TEST(Findings, WhatIsInNoRateIsSaid) {
+  const Finding last = FindingsOf(SampleRun({{"a", "pick", "1", "see?", "ssuu"}}).Summary()).back();
+  EXPECT_EQ(last.decision, Decision::kNo);
+  EXPECT_EQ(last.answer, "3 of 8 episodes count. In no rate: 2 errors, 1 cannot tell, 2 not judged.");
+}
+
+TEST(Wording, NothingLooksMorePerfectThanItIs) {
+  EXPECT_EQ(Plain(1), "1.00");
+  EXPECT_EQ(Plain(0.9998), "0.999");
+  EXPECT_EQ(Plain(-0.001), "0.00");
+  EXPECT_EQ(Percent(0.999), "99.9 %");
+  EXPECT_EQ(Percent(0.001), "0.1 %");
+  EXPECT_EQ(Percent(0), "0 %");
+  EXPECT_EQ(PValue(0.0001), "p < 0.001");
+}
+
+TEST(Wording, UndefinedIsAReasonAndNotADigit) {
+  Estimate estimate;
+  estimate.value = Undefined{"no trials"};
+  EXPECT_EQ(PercentWithInterval(estimate), "undefined: no trials");
+  EXPECT_EQ(NumberWithInterval(estimate), "undefined: no trials");
+}
+
+}  // namespace
+}  // namespace evac

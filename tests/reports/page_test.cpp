@@ -1,0 +1,175 @@
+#include "reports/page.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <regex>
+#include <set>
+
+#include "reports/html.h"
+#include "tests/reports/sample_run.h"
+
+namespace evac {
+namespace {
+
+using testing::HasSubstr;
+using testing::Not;
+
+const PageOptions kBeside{"", "evac test"};
+
+std::vector<std::string> Matches(const std::string& text, const std::string& pattern) {
+  const std::regex regex(pattern);
+  std::vector<std::string> found;
+  for (auto it = std::sregex_iterator(text.begin(), text.end(), regex); it != std::sregex_iterator(); ++it)
+    found.push_back((*it)[1]);
+  return found;
+}
+
+/// The tags left open, or closed without having been opened.
+std::vector<std::string> UnbalancedTags(std::string page) {
+  static const std::set<std::string> kVoid = {"meta", "img", "link", "br", "input", "path", "line", "rect", "circle"};
+  page = std::regex_replace(page, std::regex("<(style|script)>[^]*?</\\1>"), "");
+  std::vector<std::string> open;
+  const std::regex tag("<(/?)([a-z0-9]+)((?:[^>\"]|\"[^\"]*\")*)>");
+  for (auto it = std::sregex_iterator(page.begin(), page.end(), tag); it != std::sregex_iterator(); ++it) {
+    const std::string name = (*it)[2];
+    if (kVoid.count(name) > 0) continue;
+    if ((*it)[1] == "") {
+      open.push_back(name);
+    } else if (!open.empty() && open.back() == name) {
+      open.pop_back();
+    } else {
+      open.push_back("/" + name);
+      return open;
+    }
+  }
+  return open;
+}
+
+std::string PathOf(std::string link) {
+  const std::regex escape("%([0-9A-F]{2})");
+  std::string path;
+  for (std::smatch match; std::regex_search(link, match, escape); link = match.suffix()) {
+    path += match.prefix().str() + static_cast<char>(std::stoi(match[1], nullptr, 16));
+  }
+  return path + link;
+}
+
+TEST(Page, TheSameRunGivesTheSameBytes) {
+  const SampleRun& run = LargeRun();
+  EXPECT_EQ(ReportPage(run.Summary(), kBeside), ReportPage(run.Summary(), kBeside));
+}
+
+TEST(Page, EveryTagIsClosed) {
+  EXPECT_THAT(UnbalancedTags("<p><b>x</p>"), Not(testing::IsEmpty())) << "the check can fail";
+  EXPECT_THAT(UnbalancedTags(ReportPage(LargeRun().Summary(), kBeside)), testing::IsEmpty());
+  EXPECT_THAT(UnbalancedTags(ReportPage(SampleRun({{"a", "pick", "1", "sue?if", "f-"}}).Summary(), kBeside)),
+              testing::IsEmpty());
+}
+
+TEST(Page, EveryVideoAndPictureItNamesIsThere) {
+  SampleRun run({{"take bottle", "pick#1", "50%", "sf?", "fse"}});
+  const std::string page = ReportPage(run.Summary(), kBeside);
+  std::vector<std::string> links = Matches(page, "(?:src|poster)=\"([^\"]+)\"");
+  for (const std::string& link : Matches(page, "class=\"play\" href=\"([^\"]+)\"")) links.push_back(link);
+  ASSERT_EQ(links.size(), 6u + 6u + 4u + 4u) << "6 clips and their pictures, 2 flips of 2 videos with posters";
+  for (const std::string& link : links) EXPECT_TRUE(std::filesystem::exists(run.folder() / PathOf(link))) << link;
+}
+
+TEST(Page, LinksFollowWhereThePageStands) {
+  const std::string page =
+      ReportPage(SampleRun({{"a", "pick", "1", "s", "f"}}).Summary(), {"../runs/one", "evac test"});
+  for (const std::string& link : Matches(page, "<video[^>]* src=\"([^\"]+)\""))
+    EXPECT_THAT(link, testing::StartsWith("../runs/one/"));
+}
+
+TEST(Page, EveryInnerLinkHasItsTarget) {
+  const std::string page = ReportPage(SampleRun({{"take bottle", "pick", "1", "sf?e", "fss-"}}).Summary(), kBeside);
+  const std::vector<std::string> ids = Matches(page, " id=\"([^\"]+)\"");
+  const std::set<std::string> targets(ids.begin(), ids.end());
+  EXPECT_EQ(ids.size(), targets.size()) << "an id is given twice";
+  const std::vector<std::string> links = Matches(page, "href=\"#([^\"]+)\"");
+  EXPECT_GT(links.size(), 6u);
+  for (const std::string& link : links) EXPECT_TRUE(targets.count(link) == 1) << link;
+}
+
+TEST(Page, NeedsNoNetworkAndLoadsNoVideoByItself) {
+  const std::string page = ReportPage(LargeRun().Summary(), kBeside);
+  for (const char* remote : {"http:", "https:", "src=\"//", "@import", "url("})
+    EXPECT_THAT(page, Not(HasSubstr(remote)));
+  EXPECT_EQ(Matches(page, "(<video)").size(), Matches(page, "<video[^>]*(preload=\"none\")").size());
+}
+
+TEST(Page, TextFromOutsideIsNeverMarkup) {
+  const std::string bad = "<script>alert('x')</script>\"&";
+  RunData data = ReadRun(SampleRun({{"t", "pick", "1", "sfe", "fss"}}).store());
+  data.run = {bad, bad, bad, bad};
+  data.tasks[0].instruction = data.tasks[0].rubric.success = data.tasks[0].rubric.version = bad;
+  data.tasks[0].rubric.stages[0].name = bad;
+  data.policies[0].declaration = bad;
+  data.counters[bad][bad] = 1;
+  for (WorldInfo& world : data.worlds) world.type = world.profile_hash = bad;
+  for (Episode& episode : data.episodes)
+    episode.stop_reason = episode.failure = episode.video = episode.thumbnail = bad;
+  for (auto& [episode, verdicts] : data.verdicts) {
+    for (auto& [judge, verdict] : verdicts)
+      verdict.reason = verdict.rubric_version = bad, verdict.stages = {{bad, true}};
+  }
+  const std::string page = ReportPage(Summarise(data, {}), {"", bad});
+  EXPECT_THAT(page, Not(HasSubstr("<script>alert")));
+  EXPECT_THAT(page, HasSubstr("&lt;script&gt;alert"));
+  EXPECT_EQ(Matches(page, "(<script)").size(), 1u) << "our own";
+}
+
+TEST(Page, NamesFromOutsideAreNeverMarkup) {
+  const std::string bad = "<img src=x onerror=\"alert(1)\">";
+  RunData data = ReadRun(SampleRun({{"t", "pick", "1", "sf", "fs"}}).store());
+  data.tasks[0].id = data.policies[0].name = bad;
+  data.worlds[1].name = bad;
+  std::map<std::string, std::map<std::string, Verdict>> verdicts;
+  for (Episode& episode : data.episodes) {
+    const std::string id = episode.key.Id();
+    episode.key.pair.task = episode.key.pair.policy = episode.key.pair.initial_state = bad;
+    if (episode.key.world != "real") episode.key.world = bad;
+    verdicts[episode.key.Id()] = data.verdicts[id];
+  }
+  data.verdicts = verdicts;
+  const std::string page = ReportPage(Summarise(data, {}), kBeside);
+  EXPECT_THAT(page, Not(HasSubstr("<img src=x")));
+  EXPECT_THAT(UnbalancedTags(page), testing::IsEmpty());
+}
+
+TEST(Page, MissingVerdictsAreSaidWithTheCommandThatGivesThem) {
+  const std::string page = ReportPage(SampleRun({{"a", "pick", "1", "uu", "uu"}}).Summary(), kBeside);
+  EXPECT_THAT(page, HasSubstr("4 episodes have no verdict by oracle."));
+  EXPECT_THAT(page, HasSubstr("evac judge RUN --judge oracle"));
+  EXPECT_THAT(page, HasSubstr("undefined: no verdict"));
+  EXPECT_THAT(ReportPage(SampleRun({{"a", "pick", "1", "s", "s"}}).Summary(), kBeside),
+              Not(HasSubstr("evac judge RUN")));
+}
+
+TEST(Page, ARunWithoutEpisodesOrWithoutARealWorldStillHasAPage) {
+  RunData data = ReadRun(SampleRun({{"a", "pick", "1", "s", "s"}}).store());
+  data.worlds[0].is_real = false;
+  EXPECT_THAT(ReportPage(Summarise(data, {}), kBeside), HasSubstr("No world of this run is marked real"));
+  data.episodes.clear();
+  EXPECT_THAT(ReportPage(Summarise(data, {}), kBeside), HasSubstr("The run holds no episodes yet."));
+}
+
+TEST(Html, EscapesWhatMarksUpAndWhatIsNoUtf8) {
+  EXPECT_EQ(Escaped("<a href='x'>&\"ü€"), "&lt;a href=&#39;x&#39;&gt;&amp;&quot;ü€");
+  EXPECT_EQ(Escaped(std::string("a\xff\xc0\x80z\x01", 6)), "a\xEF\xBF\xBD\xEF\xBF\xBD\xEF\xBF\xBDz\xEF\xBF\xBD");
+}
+
+TEST(Html, AnchorsOfDifferentNamesDiffer) {
+  EXPECT_EQ(Anchor("a/b"), "a_2fb");
+  EXPECT_NE(Anchor("a_2fb"), Anchor("a/b"));
+}
+
+TEST(Html, LinksKeepFoldersAndEncodeTheRest) {
+  EXPECT_EQ(Link("videos/a b@1/c#d%?.mp4"), "videos/a%20b@1/c%23d%25%3F.mp4");
+}
+
+}  // namespace
+}  // namespace evac

@@ -1,0 +1,118 @@
+#include "reports/summary.h"
+
+#include <gtest/gtest.h>
+
+#include "core/error.h"
+#include "core/statistics/rates.h"
+#include "reports/run_correlation.h"
+#include "tests/reports/sample_run.h"
+
+namespace evac {
+namespace {
+
+const RateCell& CellOf(const RunSummary& summary, const std::string& policy, const std::string& world) {
+  for (const RateCell& cell : summary.rates) {
+    if (cell.policy == policy && cell.world == world) return cell;
+  }
+  throw InternalError("no cell {} {}", policy, world);
+}
+
+TEST(Summary, OnlySuccessesAndFailuresAreInARate) {
+  SampleRun run({{"take_bottle", "pick", "good", "sssf?ieu", "ssss"}});
+  const RunSummary summary = run.Summary();
+  const RateCell& real = CellOf(summary, "pick@good", "real");
+  EXPECT_EQ(real.rate.n, 4);
+  EXPECT_EQ(*real.rate.value, 0.75);
+  EXPECT_EQ(real.rate.interval->low, WilsonInterval(3, 4).interval->low);
+  EXPECT_EQ(real.Of(Outcome::kCannotTell), 1);
+  EXPECT_EQ(real.Of(Outcome::kInvalid), 1);
+  EXPECT_EQ(real.Of(Outcome::kError), 1);
+  EXPECT_EQ(real.Of(Outcome::kUnjudged), 1);
+  EXPECT_EQ(real.Apart(), 4);
+}
+
+TEST(Summary, ARateWithoutVerdictsIsUndefinedAndNotZero) {
+  SampleRun run({{"take_bottle", "pick", "good", "uue", "sf"}});
+  const RateCell& real = CellOf(run.Summary(), "pick@good", "real");
+  EXPECT_FALSE(real.rate.value);
+  EXPECT_FALSE(real.rate.value.reason().empty());
+}
+
+TEST(Summary, AnErrorStaysAnErrorWhateverAJudgeSays) {
+  SampleRun run({{"take_bottle", "pick", "good", "es", "ss"}});
+  Verdict verdict;
+  verdict.episode_id = EpisodeKey{{"take_bottle", "41-0000", "pick", "good", 1}, "real"}.Id();
+  verdict.judge = "oracle";
+  verdict.label = Label::kSuccess;
+  run.store().AddVerdict(verdict);
+  EXPECT_EQ(CellOf(run.Summary(), "pick@good", "real").Of(Outcome::kError), 1);
+}
+
+TEST(Summary, CountsOneJudgeAndItsLastWord) {
+  SampleRun run({{"take_bottle", "pick", "good", "ss", "ss"}});
+  Verdict verdict;
+  verdict.episode_id = EpisodeKey{{"take_bottle", "41-0000", "pick", "good", 1}, "real"}.Id();
+  verdict.judge = "human";
+  verdict.label = Label::kFailure;
+  run.store().AddVerdict(verdict);
+  EXPECT_EQ(*CellOf(run.Summary(), "pick@good", "real").rate.value, 1.0);
+  EXPECT_EQ(*CellOf(run.Summary({.judge = "human"}), "pick@good", "real").rate.value, 0.0);
+  verdict.judge = "oracle";
+  run.store().AddVerdict(verdict);
+  EXPECT_EQ(*CellOf(run.Summary(), "pick@good", "real").rate.value, 0.5);
+  EXPECT_EQ(run.Summary().judges, (std::vector<std::string>{"human", "oracle"}));
+}
+
+TEST(Summary, RefusesAnImpossibleConfidence) {
+  SampleRun run({{"take_bottle", "pick", "good", "s", "s"}});
+  EXPECT_THROW(run.Summary({.confidence = 1.0}), Error);
+  EXPECT_THROW(run.Summary({.bootstrap_replicates = 0}), Error);
+}
+
+TEST(Comparison, PairsAreMadeByKeyAndCountedInFourCells) {
+  SampleRun run({{"take_bottle", "pick", "good", "ssffsse-s", "sfsff?ss-"}});
+  const RunSummary summary = run.Summary();
+  ASSERT_EQ(summary.comparisons.size(), 1u);
+  ASSERT_EQ(summary.comparisons[0].tables.size(), 1u);
+  const PairTable& table = summary.comparisons[0].tables[0];
+  EXPECT_EQ(table.both_succeed, 1);
+  EXPECT_EQ(table.real_only, 2);
+  EXPECT_EQ(table.other_only, 1);
+  EXPECT_EQ(table.both_fail, 1);
+  EXPECT_EQ(table.uncounted, 2) << "one error, one cannot tell";
+  EXPECT_EQ(table.unpaired, 2) << "one in each world";
+  EXPECT_EQ(table.test.p_exact, 1.0);
+  EXPECT_EQ(*table.agreement.value, 0.4);
+  for (const EpisodePair& pair : table.pairs) {
+    EXPECT_EQ(summary.episodes[pair.real].episode.key.pair, summary.episodes[pair.other].episode.key.pair);
+    EXPECT_EQ(summary.episodes[pair.real].episode.key.world, "real");
+    EXPECT_EQ(summary.episodes[pair.other].episode.key.world, "sim");
+  }
+}
+
+TEST(Comparison, TheReportSaysWhatCorrelateSays) {
+  std::vector<SampleCell> cells = FourPoliciesTwoTasks();
+  cells[1].real = "sssssseff?";  // states that do not count, in one world only
+  SampleRun run(cells);
+  const CorrelationGroup report = run.Summary().comparisons.at(0).correlation;
+  const CorrelationGroup command = CorrelateRun(run.store()).at(0);
+  ASSERT_TRUE(report.pearson.value && report.pearson.interval);
+  EXPECT_EQ(report.points.size(), 8u);
+  EXPECT_EQ(*report.pearson.value, *command.pearson.value);
+  EXPECT_EQ(report.pearson.interval->low, command.pearson.interval->low);
+  EXPECT_EQ(report.pearson.interval->high, command.pearson.interval->high);
+  EXPECT_EQ(*report.mmrv.value, *command.mmrv.value);
+  EXPECT_EQ(report.mmrv.interval->high, command.mmrv.interval->high);
+  EXPECT_EQ(report.pearson.method, command.pearson.method);
+}
+
+TEST(Comparison, ThePointsRatesAreThoseOfTheirPairs) {
+  SampleRun run({{"take_bottle", "pick", "good", "sse", "sfs"}});
+  const ComparedPoint& point = run.Summary().comparisons.at(0).points.at(0);
+  EXPECT_EQ(point.real.n, 2);
+  EXPECT_EQ(*point.real.value, 1.0);
+  EXPECT_EQ(*point.other.value, 0.5);
+}
+
+}  // namespace
+}  // namespace evac
