@@ -135,6 +135,7 @@ bool VideoReader::Decoder::Feed() {
 cv::Mat VideoReader::Decoder::Next() {
   for (;;) {
     const int received = avcodec_receive_frame(codec_.get(), frame_.get());
+    if (received == AVERROR_EOF && format_ == AV_PIX_FMT_NONE) throw InvalidInput("{}: has no frames", name_);
     if (received == AVERROR_EOF) return {};
     if (received != AVERROR(EAGAIN)) {
       Demand(received, "a frame is damaged");
@@ -168,7 +169,7 @@ VideoReader::~VideoReader() = default;
 
 cv::Mat VideoReader::Next() { return decoder_->Next(); }
 double VideoReader::time_s() const { return decoder_->time_s_; }
-int VideoReader::width_px() const { return decoder_->codec_->width; }
-int VideoReader::height_px() const { return decoder_->codec_->height; }
+int VideoReader::width_px() const { return decoder_->rgb_ ? decoder_->rgb_->width : decoder_->codec_->width; }
+int VideoReader::height_px() const { return decoder_->rgb_ ? decoder_->rgb_->height : decoder_->codec_->height; }
 
 }  // namespace evac
