@@ -7,7 +7,7 @@ namespace {
 
 Arms At(double x_m, double closure = 0) {
   ArmState arm;
-  arm.base_from_gripper.translation() = {x_m, 0, 0};
+  arm.base_from_gripper.translation() = Eigen::Vector3d(x_m, 0, 0);
   arm.closure = closure;
   return {arm};
 }
