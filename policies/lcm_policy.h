@@ -14,14 +14,14 @@
 namespace evac {
 
 struct LcmPolicyOptions {
-  LcmAddress address;
+  LcmAddress address{};
   double deadline_s = 20;       ///< from a request's first sending to giving it up as policy_timeout
   double repeat_after_s = 0.5;  ///< before the first repeat of what was not answered; doubles with each
   bool raw_images = false;      ///< exact pixels instead of JPEG; for tests
   int jpeg_quality = 95;        ///< 0 … 100
-  Pacing pacing;
+  Pacing pacing{};
   /// Asked while waiting: why nobody will ever answer (PolicyProcess::WhyGone), so that nobody waits for the deadline.
-  std::function<std::optional<std::string>()> why_gone;
+  std::function<std::optional<std::string>()> why_gone{};
 };
 
 /// A policy in another process, at the end of an LCM link (docs/formats/policy_wire.md).
