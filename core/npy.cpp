@@ -19,7 +19,8 @@ namespace evac {
 namespace {
 
 namespace fs = std::filesystem;
-static_assert(std::endian::native == std::endian::little, "numbers are copied from and to little-endian files as they are");
+static_assert(std::endian::native == std::endian::little,
+              "numbers are copied from and to little-endian files as they are");
 
 constexpr std::string_view kMagic = "\x93NUMPY";
 constexpr std::uintmax_t kMaxFileBytes = 1u << 30;
@@ -45,11 +46,18 @@ class HeaderParser {
     while (!Accept('}')) {
       const std::string key = String();
       Expect(':');
-      if (key == "descr" && !has_dtype) header.dtype = String(), has_dtype = true;
-      else if (key == "fortran_order" && !has_order) header.fortran_order = Bool(), has_order = true;
-      else if (key == "shape" && !has_shape) header.shape = Tuple(), has_shape = true;
-      else throw Broken();
-      if (!Accept(',')) { Expect('}'); break; }
+      if (key == "descr" && !has_dtype)
+        header.dtype = String(), has_dtype = true;
+      else if (key == "fortran_order" && !has_order)
+        header.fortran_order = Bool(), has_order = true;
+      else if (key == "shape" && !has_shape)
+        header.shape = Tuple(), has_shape = true;
+      else
+        throw Broken();
+      if (!Accept(',')) {
+        Expect('}');
+        break;
+      }
     }
     SkipSpace();
     if (!text_.empty() || !has_dtype || !has_order || !has_shape) throw Broken();
@@ -104,7 +112,10 @@ class HeaderParser {
     while (!Accept(')')) {
       if (shape.size() == kMaxDimensions) throw InvalidInput("{}: more than {} dimensions", name_, kMaxDimensions);
       shape.push_back(Number());
-      if (!Accept(',')) { Expect(')'); break; }
+      if (!Accept(',')) {
+        Expect(')');
+        break;
+      }
     }
     return shape;
   }
@@ -123,7 +134,8 @@ double NumberAt(const char* at) {
 template <typename T>
 void AppendNumber(std::string& bytes, double number) {
   if constexpr (std::is_integral_v<T>) {  // !(…): a NaN is refused too
-    const double low = static_cast<double>(std::numeric_limits<T>::min()), beyond = std::ldexp(1.0, std::numeric_limits<T>::digits);
+    const double low = static_cast<double>(std::numeric_limits<T>::min()),
+                 beyond = std::ldexp(1.0, std::numeric_limits<T>::digits);
     if (!(number >= low && number < beyond)) throw InvalidInput("array: {} does not fit its integer type", number);
   }
   const T value = static_cast<T>(number);
@@ -213,14 +225,16 @@ NpyArray ParseNpy(std::string_view bytes, const std::string& name) {
 NpyArray ReadNpy(const fs::path& path) {
   std::error_code error;
   const std::uintmax_t size = fs::file_size(path, error);
-  if (!error && size > kMaxFileBytes) throw InvalidInput("{}: {} bytes, wanted at most {}", path.string(), size, kMaxFileBytes);
+  if (!error && size > kMaxFileBytes)
+    throw InvalidInput("{}: {} bytes, wanted at most {}", path.string(), size, kMaxFileBytes);
   return ParseNpy(ReadFile(path), path.string());
 }
 
 std::string NpyBytes(const NpyArray& array) {
   const Type& type = TypeOf(array.dtype, "array");
   if (CountOf(array.shape) != array.values.size()) {
-    throw InvalidInput("array: {} numbers do not fill the shape ({})", array.values.size(), fmt::join(array.shape, ", "));
+    throw InvalidInput("array: {} numbers do not fill the shape ({})", array.values.size(),
+                       fmt::join(array.shape, ", "));
   }
   std::string text = fmt::format("{{'descr': '{}', 'fortran_order': False, 'shape': ({}{}), }}", array.dtype,
                                  fmt::join(array.shape, ", "), array.shape.size() == 1 ? "," : "");

@@ -14,7 +14,8 @@ namespace fs = std::filesystem;
 /// Safe in a path and in a URL.
 std::string SafeName(std::string name) {
   for (char& letter : name) {
-    if (!std::isalnum(static_cast<unsigned char>(letter)) && letter != '-' && letter != '_' && letter != '.') letter = '_';
+    if (!std::isalnum(static_cast<unsigned char>(letter)) && letter != '-' && letter != '_' && letter != '.')
+      letter = '_';
   }
   return name.empty() || name.front() == '.' ? "recording" + name : name;
 }
@@ -24,15 +25,19 @@ ClipFolders TreeFolders(const fs::path& episode) {
   const fs::path task = episode.parent_path().filename(), number = episode.filename();
   const fs::path root = episode.parent_path().parent_path().parent_path();
   return {fmt::format("{}-{}", task.string(), number.string()), episode / "videos",
-          root / "parameters" / task / number / "parameters" / "camera", root / "proprio_stats" / task / number / "proprio_stats.h5"};
+          root / "parameters" / task / number / "parameters" / "camera",
+          root / "proprio_stats" / task / number / "proprio_stats.h5"};
 }
 
 bool IsTreeEpisode(const fs::path& folder) { return folder.parent_path().parent_path().filename() == "observations"; }
 
 void CheckOptions(const RecordingOptions& options) {
   if (options.every_nth < 1) throw InvalidInput("recording: every_nth is {}, wanted 1 or more", options.every_nth);
-  const auto twice = [&](const std::string& name) { return std::count(options.cameras.begin(), options.cameras.end(), name) > 1; };
-  if (std::any_of(options.cameras.begin(), options.cameras.end(), twice)) throw InvalidInput("recording: a camera is named twice");
+  const auto twice = [&](const std::string& name) {
+    return std::count(options.cameras.begin(), options.cameras.end(), name) > 1;
+  };
+  if (std::any_of(options.cameras.begin(), options.cameras.end(), twice))
+    throw InvalidInput("recording: a camera is named twice");
 }
 
 Recording ReadLayout(const fs::path& folder, const RecordingOptions& options) {
@@ -44,8 +49,10 @@ Recording ReadLayout(const fs::path& folder, const RecordingOptions& options) {
   if (IsTreeEpisode(folder.parent_path()) && folder.filename() == "videos") {
     return ReadClipLayout(TreeFolders(folder.parent_path()), options);
   }
-  throw InvalidInput("{}: no recording; wanted a folder with action.npy, one with proprio_stats.h5, or an episode of an AgiBot World "
-                     "tree: ROOT/observations/<task>/<episode>", folder.string());
+  throw InvalidInput(
+      "{}: no recording; wanted a folder with action.npy, one with proprio_stats.h5, or an episode of an AgiBot World "
+      "tree: ROOT/observations/<task>/<episode>",
+      folder.string());
 }
 
 }  // namespace
@@ -83,6 +90,8 @@ Task TaskFromRecording(const Recording& recording, double margin_m) {
   return task;
 }
 
-InitialScene InitialSceneOf(const Recording& recording) { return {recording.first_images, recording.arms.front(), recording.cameras}; }
+InitialScene InitialSceneOf(const Recording& recording) {
+  return {recording.first_images, recording.arms.front(), recording.cameras};
+}
 
 }  // namespace evac

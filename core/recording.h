@@ -12,12 +12,12 @@ namespace evac {
 
 /// How a recording is read; the defaults read all of it.
 struct RecordingOptions {
-  int every_nth = 1;                 ///< keep every nth recorded step: the period grows by as much (30 Hz and 3: 0.1 s)
-  double recorded_period_s = 0;      ///< between recorded steps; 0: the layout's (example .1 s, else the video's or 1/30 s)
+  int every_nth = 1;             ///< keep every nth recorded step: the period grows by as much (30 Hz and 3: 0.1 s)
+  double recorded_period_s = 0;  ///< between recorded steps; 0: the layout's (example .1 s, else the video's or 1/30 s)
   std::vector<std::string> cameras = {};  ///< which, by name and in this order; empty: all that are there, head first
   double camera_tolerance_m = 0.02;  ///< how far a camera may move against its mount and still count as fixed to it …
   double camera_tolerance_rad = 0.05;  ///< … and how far it may turn
-  bool count_video_frames = true;    ///< false: believe that the videos are long enough (a policy that needs no image)
+  bool count_video_frames = true;  ///< false: believe that the videos are long enough (a policy that needs no image)
 };
 
 /// What one robot did, from one folder (docs/formats/recording.md): the arms at every step, and the cameras' images, at
@@ -26,12 +26,12 @@ struct Recording {
   std::string id;      ///< the folder's name, or <task>-<episode> in an AgiBot World tree; safe as a path
   std::string source;  ///< one sentence: folder, layout, steps, period
   double period_s = 0;
-  std::vector<std::string> arm_names;       ///< {left, right}
-  std::vector<Arms> arms;                   ///< [T], T >= 1, one per period: arms[0] is the start, arms[1 …] what followed
-  std::vector<Camera> cameras;              ///< sizes are those of the images
-  std::vector<cv::Mat> first_images;        ///< CV_8UC3 RGB, in the order of `cameras`
+  std::vector<std::string> arm_names;  ///< {left, right}
+  std::vector<Arms> arms;              ///< [T], T >= 1, one per period: arms[0] is the start, arms[1 …] what followed
+  std::vector<Camera> cameras;         ///< sizes are those of the images
+  std::vector<cv::Mat> first_images;   ///< CV_8UC3 RGB, in the order of `cameras`
   std::vector<std::filesystem::path> videos;  ///< in the order of `cameras`, or empty: there is only the first frame
-  int every_nth = 1;                        ///< step k is frame k * every_nth of a video
+  int every_nth = 1;                          ///< step k is frame k * every_nth of a video
 };
 
 /// Reads a recording in one of three layouts, recognised by the files that are there:
@@ -40,9 +40,10 @@ struct Recording {
 ///              proprio_stats.h5, all in one folder; also hand_left_color.mp4 and hand_right_color.mp4 with their pages
 ///   tree       the same files in AgiBot World's tree; `folder` is ROOT/observations/<task>/<episode>
 /// Gripper units become closures (raw 0 open … 120 closed), quaternions rotations.
-/// @throws InvalidInput naming file, field, what was found and what was wanted: a file missing or broken, a video shorter than
-///   the arms' track, values that are not finite, quaternions that are not unit, distorted intrinsics, a camera that moves
-///   against its mount.
+/// @throws InvalidInput naming file, field, what was found and what was wanted: a file missing or broken, a video
+/// shorter than
+///   the arms' track, values that are not finite, quaternions that are not unit, distorted intrinsics, a camera that
+///   moves against its mount.
 Recording ReadRecording(const std::filesystem::path& folder, const RecordingOptions& options = {});
 
 /// One walk through a recording's images, front to back. Each has its own decoders: any number walk at once.
@@ -53,8 +54,8 @@ class RecordedFrames {
   RecordedFrames(RecordedFrames&&) noexcept;
   RecordedFrames& operator=(RecordedFrames&&) noexcept;
 
-  /// The images of the next step, in the order of `cameras`; first those of step 0. After the last step, and where there are no
-  /// videos, the last ones again. The Mats are shared: do not write into them.
+  /// The images of the next step, in the order of `cameras`; first those of step 0. After the last step, and where
+  /// there are no videos, the last ones again. The Mats are shared: do not write into them.
   /// @throws Error if a video ends early or is broken.
   const std::vector<cv::Mat>& Next();
 
@@ -63,8 +64,9 @@ class RecordedFrames {
   std::unique_ptr<Walk> walk_;
 };
 
-/// The task "do what was recorded": id, arms, cameras and period of the recording, the stop rule switched off, enough chunks
-/// for all steps whatever their length, and a workspace `margin_m` wider on all sides than where the grippers went.
+/// The task "do what was recorded": id, arms, cameras and period of the recording, the stop rule switched off, enough
+/// chunks for all steps whatever their length, and a workspace `margin_m` wider on all sides than where the grippers
+/// went.
 Task TaskFromRecording(const Recording& recording, double margin_m = 0.5);
 
 /// Its first frame as the initial scene of imagined episodes.

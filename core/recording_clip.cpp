@@ -47,8 +47,12 @@ Mount MountOf(const std::string& camera) {
   return camera == "hand_right" ? Mount::kRightGripper : Mount::kBase;
 }
 
-fs::path VideoOf(const ClipFolders& folders, const std::string& camera) { return folders.images / (camera + "_color.mp4"); }
-fs::path IntrinsicsOf(const ClipFolders& folders, const std::string& camera) { return folders.pages / (camera + "_intrinsic_params.json"); }
+fs::path VideoOf(const ClipFolders& folders, const std::string& camera) {
+  return folders.images / (camera + "_color.mp4");
+}
+fs::path IntrinsicsOf(const ClipFolders& folders, const std::string& camera) {
+  return folders.pages / (camera + "_intrinsic_params.json");
+}
 
 /// The cameras asked for, or all that have a video; head always.
 std::vector<std::string> ChooseCameras(const ClipFolders& folders, const RecordingOptions& options) {
@@ -59,7 +63,8 @@ std::vector<std::string> ChooseCameras(const ClipFolders& folders, const Recordi
     if (fs::exists(VideoOf(folders, name))) {
       names.push_back(name);
     } else if (has_videos && fs::exists(IntrinsicsOf(folders, name))) {
-      throw InvalidInput("{}: there is a page for camera {}, but no video {}", folders.pages.string(), name, VideoOf(folders, name).string());
+      throw InvalidInput("{}: there is a page for camera {}, but no video {}", folders.pages.string(), name,
+                         VideoOf(folders, name).string());
     }
   }
   return names;
@@ -89,11 +94,12 @@ Camera ReadCamera(const Context& context, const std::string& name, const cv::Mat
 /// @throws InvalidInput if a video is too short for the steps, or its rate differs from that of the videos before it.
 void CheckVideo(const VideoFacts& facts, const fs::path& path, const Context& context, double period_s) {
   if (context.options.count_video_frames && facts.frames < context.arms.size()) {
-    throw InvalidInput("{}: {} frames, wanted one for each of the {} steps of {}", path.string(), facts.frames, context.arms.size(),
-                       context.folders.proprio.string());
+    throw InvalidInput("{}: {} frames, wanted one for each of the {} steps of {}", path.string(), facts.frames,
+                       context.arms.size(), context.folders.proprio.string());
   }
   if (period_s > 0 && std::abs(facts.period_s / period_s - 1) > kRateTolerance) {
-    throw InvalidInput("{}: {:.2f} frames per second, wanted {:.2f} as the video before it", path.string(), 1 / facts.period_s, 1 / period_s);
+    throw InvalidInput("{}: {:.2f} frames per second, wanted {:.2f} as the video before it", path.string(),
+                       1 / facts.period_s, 1 / period_s);
   }
 }
 
@@ -113,7 +119,8 @@ double AddVideoCamera(const Context& context, const std::string& name, double pe
 void AddStillCamera(const Context& context, const std::vector<std::string>& names, Recording& recording) {
   const fs::path frame = context.folders.images / "frame.png";
   if (names != std::vector<std::string>{"head"} || !fs::exists(frame)) {
-    throw InvalidInput("{}: missing: camera {} has no video", VideoOf(context.folders, names.back()).string(), names.back());
+    throw InvalidInput("{}: missing: camera {} has no video", VideoOf(context.folders, names.back()).string(),
+                       names.back());
   }
   recording.first_images = {ReadPng(frame)};
   recording.cameras = {ReadCamera(context, "head", recording.first_images[0])};

@@ -17,7 +17,8 @@ struct RecordedFrames::Walk {
   void Read(std::size_t camera) {
     for (int skipped = next == 0 ? every_nth - 1 : 0; skipped < every_nth; ++skipped) {
       images[camera] = videos[camera].Next();
-      if (images[camera].empty()) throw InvalidInput("{}: the video ends before step {} of {}", paths[camera].string(), next, steps);
+      if (images[camera].empty())
+        throw InvalidInput("{}: the video ends before step {} of {}", paths[camera].string(), next, steps);
     }
   }
 };

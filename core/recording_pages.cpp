@@ -44,8 +44,10 @@ void RefuseDistortion(const Json& intrinsic, const std::string& file) {
     if (!NamesDistortion(name)) continue;
     for (const Json& coefficient : value.is_array() ? value : Json::array({value})) {
       if (coefficient.is_number() && coefficient.get<double>() != 0) {
-        throw InvalidInput("{}: intrinsic.{} holds {}, wanted 0: a distorted camera is no pinhole; undistort its images first, or "
-                           "leave the camera out", file, name, coefficient.get<double>());
+        throw InvalidInput(
+            "{}: intrinsic.{} holds {}, wanted 0: a distorted camera is no pinhole; undistort its images first, or "
+            "leave the camera out",
+            file, name, coefficient.get<double>());
       }
     }
   }
@@ -56,7 +58,9 @@ void RefuseDistortion(const Json& intrinsic, const std::string& file) {
 Camera ParseIntrinsics(const std::string& json, const std::string& file) {
   const Json page = Parse(json, file);
   const Json& intrinsic = Field(page, "intrinsic", file);
-  const auto number = [&](const char* name) { return Number(Field(intrinsic, name, file), file + ": intrinsic." + name); };
+  const auto number = [&](const char* name) {
+    return Number(Field(intrinsic, name, file), file + ": intrinsic." + name);
+  };
   Camera camera;
   camera.fx_px = number("fx");
   camera.fy_px = number("fy");

@@ -13,7 +13,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr double kClosedGripper = 120;                        // AgiBot's raw reading of a closed gripper
+constexpr double kClosedGripper = 120;                         // AgiBot's raw reading of a closed gripper
 constexpr double kLowestGripper = -10, kHighestGripper = 140;  // beyond these it is another unit
 constexpr double kUnitTolerance = 1e-3;
 constexpr unsigned kMaxSide_px = 8192;
@@ -39,12 +39,13 @@ ArmState ArmFromRaw(const RawArm& raw, const std::string& where) {
   return {FromXyzQuat(raw.xyz_m, raw.quat_xyzw), std::clamp(raw.gripper / kClosedGripper, 0.0, 1.0)};
 }
 
-Eigen::Isometry3d RigidOrThrow(const Eigen::Matrix3d& rotation, const Eigen::Vector3d& translation_m, const std::string& where) {
+Eigen::Isometry3d RigidOrThrow(const Eigen::Matrix3d& rotation, const Eigen::Vector3d& translation_m,
+                               const std::string& where) {
   if (!rotation.allFinite() || !translation_m.allFinite()) throw InvalidInput("{}: the pose is not finite", where);
   const double off = (rotation * rotation.transpose() - Eigen::Matrix3d::Identity()).norm();
   if (!(off < kUnitTolerance && rotation.determinant() > 0)) {
-    throw InvalidInput("{}: the rotation matrix is no rotation (R Rᵀ is {:.4f} from the identity, determinant {:.4f})", where, off,
-                       rotation.determinant());
+    throw InvalidInput("{}: the rotation matrix is no rotation (R Rᵀ is {:.4f} from the identity, determinant {:.4f})",
+                       where, off, rotation.determinant());
   }
   Eigen::Isometry3d pose = Eigen::Isometry3d::Identity();
   pose.linear() = Eigen::Quaterniond(rotation).normalized().toRotationMatrix();
@@ -56,17 +57,19 @@ void CheckPinhole(const Camera& camera, const std::string& where) {
   if (!(camera.fx_px > 0 && camera.fy_px > 0 && std::isfinite(camera.fx_px) && std::isfinite(camera.fy_px))) {
     throw InvalidInput("{}: focal lengths {}, {} px, wanted positive numbers", where, camera.fx_px, camera.fy_px);
   }
-  const bool inside = camera.cx_px > 0 && camera.cx_px < camera.width_px && camera.cy_px > 0 && camera.cy_px < camera.height_px;
+  const bool inside =
+      camera.cx_px > 0 && camera.cx_px < camera.width_px && camera.cy_px > 0 && camera.cy_px < camera.height_px;
   if (!inside) {
-    throw InvalidInput("{}: principal point ({:.1f}, {:.1f}) px, wanted one inside the image of {}x{}", where, camera.cx_px,
-                       camera.cy_px, camera.width_px, camera.height_px);
+    throw InvalidInput("{}: principal point ({:.1f}, {:.1f}) px, wanted one inside the image of {}x{}", where,
+                       camera.cx_px, camera.cy_px, camera.width_px, camera.height_px);
   }
 }
 
 cv::Mat ReadPng(const fs::path& path) {
   const std::string bytes = ReadFile(path);
   constexpr std::size_t kWidthAt = 16, kHeightAt = 20, kHeaderEnd = 24;
-  if (bytes.size() < kHeaderEnd || bytes.compare(0, 8, "\x89PNG\r\n\x1a\n") != 0) throw InvalidInput("{}: no PNG file", path.string());
+  if (bytes.size() < kHeaderEnd || bytes.compare(0, 8, "\x89PNG\r\n\x1a\n") != 0)
+    throw InvalidInput("{}: no PNG file", path.string());
   const unsigned width_px = PngSide(bytes, kWidthAt), height_px = PngSide(bytes, kHeightAt);
   if (width_px == 0 || height_px == 0 || width_px > kMaxSide_px || height_px > kMaxSide_px) {
     throw InvalidInput("{}: {}x{} pixels, wanted 1 … {} each", path.string(), width_px, height_px, kMaxSide_px);
@@ -98,9 +101,11 @@ Eigen::Isometry3d FixedMount(const CameraTrack& track, const RecordingOptions& o
     const Eigen::Isometry3d now = mount_from_camera(k);
     const double moved_m = (now.translation() - first.translation()).norm(), turned_rad = RotationBetween(now, first);
     if (moved_m <= options.camera_tolerance_m && turned_rad <= options.camera_tolerance_rad) continue;
-    throw InvalidInput("{}: at step {} the camera is {:.3f} m and {:.3f} rad from where it was at step 0 on its mount ({}); wanted "
-                       "at most {} m and {} rad: a camera that moves on its mount cannot be described", file, k, moved_m, turned_rad,
-                       track.mount == Mount::kBase ? "the base" : "the gripper", options.camera_tolerance_m, options.camera_tolerance_rad);
+    throw InvalidInput(
+        "{}: at step {} the camera is {:.3f} m and {:.3f} rad from where it was at step 0 on its mount ({}); wanted "
+        "at most {} m and {} rad: a camera that moves on its mount cannot be described",
+        file, k, moved_m, turned_rad, track.mount == Mount::kBase ? "the base" : "the gripper",
+        options.camera_tolerance_m, options.camera_tolerance_rad);
   }
   return first;
 }

@@ -20,40 +20,47 @@ struct RawArm {
 };
 
 /// @param where  "FILE: step 17, left arm", for messages.
-/// @throws InvalidInput if a value is not finite, |quaternion| is not 1 within 1e-3, or the gripper reads outside -10 … 140.
+/// @throws InvalidInput if a value is not finite, |quaternion| is not 1 within 1e-3, or the gripper reads outside -10 …
+/// 140.
 ArmState ArmFromRaw(const RawArm& raw, const std::string& where);
 
 /// @throws InvalidInput unless finite and a rotation within 1e-3; it comes back orthonormal.
-Eigen::Isometry3d RigidOrThrow(const Eigen::Matrix3d& rotation, const Eigen::Vector3d& translation_m, const std::string& where);
+Eigen::Isometry3d RigidOrThrow(const Eigen::Matrix3d& rotation, const Eigen::Vector3d& translation_m,
+                               const std::string& where);
 
-/// @throws InvalidInput unless the focal lengths are positive and the principal point lies inside the image (else the intrinsics
+/// @throws InvalidInput unless the focal lengths are positive and the principal point lies inside the image (else the
+/// intrinsics
 ///   belong to an image of another size).
 void CheckPinhole(const Camera& camera, const std::string& where);
 
 /// An 8-bit RGB image of at most 8192 x 8192 from a PNG file.
 cv::Mat ReadPng(const std::filesystem::path& path);
 
-/// `{camera}_intrinsic_params.json`: {"intrinsic": {"fx", "fy", "ppx", "ppy"}} in pixels; a camera of that name, without size and pose.
-/// @throws InvalidInput also for distortion: any of k1 … k6, p1, p2, or a list whose name contains "dist" or "coeff", not 0.
+/// `{camera}_intrinsic_params.json`: {"intrinsic": {"fx", "fy", "ppx", "ppy"}} in pixels; a camera of that name,
+/// without size and pose.
+/// @throws InvalidInput also for distortion: any of k1 … k6, p1, p2, or a list whose name contains "dist" or "coeff",
+/// not 0.
 Camera ParseIntrinsics(const std::string& json, const std::string& file);
 
-/// `{camera}_extrinsic_params_aligned.json`: a list of {"extrinsic": {"rotation_matrix", "translation_vector"}}, one per step or
-/// one for all. base_from_camera, OpenCV axes.
+/// `{camera}_extrinsic_params_aligned.json`: a list of {"extrinsic": {"rotation_matrix", "translation_vector"}}, one
+/// per step or one for all. base_from_camera, OpenCV axes.
 std::vector<Eigen::Isometry3d> ParseExtrinsics(const std::string& json, const std::string& file);
 
-/// `proprio_stats.h5`: state/effector/position [T, 2], state/end/position [T, 2, 3] m, state/end/orientation [T, 2, 4] xyzw;
-/// index 0 left, 1 right. HDF5 keeps state of its own: call from one thread at a time.
+/// `proprio_stats.h5`: state/effector/position [T, 2], state/end/position [T, 2, 3] m, state/end/orientation [T, 2, 4]
+/// xyzw; index 0 left, 1 right. HDF5 keeps state of its own: call from one thread at a time.
 /// @returns [T], left and right arm at every step.
 std::vector<Arms> ReadProprio(const std::filesystem::path& path);
 
 /// The pose of a camera on its mount, from where it was at every step.
 struct CameraTrack {
   Mount mount = Mount::kBase;
-  const std::vector<Eigen::Isometry3d>& base_from_camera;  ///< one per step, or one for all (then the mount is the base)
-  const std::vector<Arms>& arms;                           ///< [T]
+  const std::vector<Eigen::Isometry3d>&
+      base_from_camera;           ///< one per step, or one for all (then the mount is the base)
+  const std::vector<Arms>& arms;  ///< [T]
 };
 /// @returns mount_from_camera at step 0.
-/// @throws InvalidInput if it is not the same at all steps within the options' tolerance; names the first step that is off.
+/// @throws InvalidInput if it is not the same at all steps within the options' tolerance; names the first step that is
+/// off.
 Eigen::Isometry3d FixedMount(const CameraTrack& track, const RecordingOptions& options, const std::string& file);
 
 /// Every nth of the steps.

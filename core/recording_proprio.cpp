@@ -69,7 +69,8 @@ hsize_t StepsOf(const Handle& data, hsize_t width, const std::string& where) {
     throw InvalidInput("{}: its shape is not [T, 2{}]: one row per step, left and right arm", where,
                        width == 1 ? "" : fmt::format(", {}", width));
   }
-  if (shape[0] == 0 || shape[0] > kMaxSteps) throw InvalidInput("{}: {} steps, wanted 1 … {}", where, shape[0], kMaxSteps);
+  if (shape[0] == 0 || shape[0] > kMaxSteps)
+    throw InvalidInput("{}: {} steps, wanted 1 … {}", where, shape[0], kMaxSteps);
   return shape[0];
 }
 
@@ -79,7 +80,8 @@ void CheckSizes(const Handle& data, const std::string& where) {
   const H5T_class_t kind = type.valid() ? H5Tget_class(type.id()) : H5T_NO_CLASS;
   if (kind != H5T_FLOAT && kind != H5T_INTEGER) throw InvalidInput("{}: it holds no numbers", where);
   const std::size_t bytes = H5Tget_size(type.id());
-  if (bytes == 0 || bytes > kMaxNumberBytes) throw InvalidInput("{}: numbers of {} bytes, wanted at most {}", where, bytes, kMaxNumberBytes);
+  if (bytes == 0 || bytes > kMaxNumberBytes)
+    throw InvalidInput("{}: numbers of {} bytes, wanted at most {}", where, bytes, kMaxNumberBytes);
   const Handle creation(H5Dget_create_plist(data.id()), H5Pclose);
   if (!creation.valid() || H5Pget_layout(creation.id()) != H5D_CHUNKED) return;
   std::array<hsize_t, 3> chunk = {1, 1, 1};
@@ -115,16 +117,19 @@ std::vector<Arms> ReadProprio(const fs::path& path) {
   const Track position = ReadTrack(file, "state/end/position", 3, path.string());
   const Track orientation = ReadTrack(file, "state/end/orientation", 4, path.string());
   if (gripper.steps != position.steps || gripper.steps != orientation.steps) {
-    throw InvalidInput("{}: state/effector/position has {} steps, state/end/position {}, state/end/orientation {}; wanted the same",
-                       path.string(), gripper.steps, position.steps, orientation.steps);
+    throw InvalidInput(
+        "{}: state/effector/position has {} steps, state/end/position {}, state/end/orientation {}; wanted the same",
+        path.string(), gripper.steps, position.steps, orientation.steps);
   }
   std::vector<Arms> arms;
   arms.reserve(gripper.steps);
   for (hsize_t step = 0; step < gripper.steps; ++step) {
     Arms both;
     for (int arm = 0; arm < kArms; ++arm) {
-      const RawArm raw{Eigen::Vector3d(position.At(step, arm)), Eigen::Vector4d(orientation.At(step, arm)), *gripper.At(step, arm)};
-      both.push_back(ArmFromRaw(raw, fmt::format("{}: step {}, {} arm", path.string(), step, arm == 0 ? "left" : "right")));
+      const RawArm raw{Eigen::Vector3d(position.At(step, arm)), Eigen::Vector4d(orientation.At(step, arm)),
+                       *gripper.At(step, arm)};
+      both.push_back(
+          ArmFromRaw(raw, fmt::format("{}: step {}, {} arm", path.string(), step, arm == 0 ? "left" : "right")));
     }
     arms.push_back(std::move(both));
   }

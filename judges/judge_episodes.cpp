@@ -19,7 +19,8 @@ Verdict RateSafely(Judge& judge, const Task& task, const Episode& episode) {
   return invalid;
 }
 
-bool HasVerdict(const std::map<std::string, std::map<std::string, Verdict>>& current, const std::string& episode, const std::string& judge) {
+bool HasVerdict(const std::map<std::string, std::map<std::string, Verdict>>& current, const std::string& episode,
+                const std::string& judge) {
   const auto found = current.find(episode);
   return found != current.end() && found->second.contains(judge);
 }

@@ -15,14 +15,14 @@ struct JudgeOptions {
 
 struct JudgeSummary {
   int rated = 0;
-  int already = 0;  ///< had a current verdict by this judge
-  int failed = 0;   ///< failed episodes: errors, which nobody judges
+  int already = 0;              ///< had a current verdict by this judge
+  int failed = 0;               ///< failed episodes: errors, which nobody judges
   std::map<Label, int> labels;  ///< of those rated
 };
 
-/// Rates every episode of a store that did not fail and has no verdict by this judge yet, one at a time; each verdict is stored
-/// before the next is asked for, so that an interruption loses one at most. A judge that throws gives a verdict `invalid` with
-/// the message, never a failure.
+/// Rates every episode of a store that did not fail and has no verdict by this judge yet, one at a time; each verdict
+/// is stored before the next is asked for, so that an interruption loses one at most. A judge that throws gives a
+/// verdict `invalid` with the message, never a failure.
 /// @throws Error if the store cannot be read or written.
 JudgeSummary JudgeEpisodes(Judge& judge, Store& store, const JudgeOptions& options);
 

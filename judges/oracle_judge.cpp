@@ -21,10 +21,13 @@ void JudgeTrack(const Rubric& rubric, const TrackView& track, Verdict& verdict) 
     if (!outcome.reached && all) verdict.reason = outcome.why_not;
     all = all && outcome.reached;
     from = outcome.at_frame;
-    if (all) story += fmt::format("{}{} at {:.1f} s", story.empty() ? "" : ", ", stage.name, static_cast<double>(from) * track.period_s);
+    if (all)
+      story += fmt::format("{}{} at {:.1f} s", story.empty() ? "" : ", ", stage.name,
+                           static_cast<double>(from) * track.period_s);
   }
   verdict.label = all ? Label::kSuccess : Label::kFailure;
-  verdict.reason = all ? "every stage was reached: " + story : verdict.reason + (story.empty() ? "" : " (before it: " + story + ")");
+  verdict.reason =
+      all ? "every stage was reached: " + story : verdict.reason + (story.empty() ? "" : " (before it: " + story + ")");
 }
 
 std::optional<std::string> WhatIsWrong(const Condition& condition) {
@@ -32,7 +35,8 @@ std::optional<std::string> WhatIsWrong(const Condition& condition) {
   if (!kind) return fmt::format("unknown kind of condition '{}'", condition.kind);
   if (condition.a.empty()) return fmt::format("{} needs a body a", condition.kind);
   if (kind->needs_b && condition.b.empty()) return fmt::format("{} needs a body b", condition.kind);
-  if (!kind->needs_b && !condition.b.empty()) return fmt::format("{} is about one body, found b: '{}'", condition.kind, condition.b);
+  if (!kind->needs_b && !condition.b.empty())
+    return fmt::format("{} is about one body, found b: '{}'", condition.kind, condition.b);
   if (!condition.above && !condition.below) return fmt::format("{} has neither above nor below", condition.kind);
   if ((condition.above && !std::isfinite(*condition.above)) || (condition.below && !std::isfinite(*condition.below))) {
     return fmt::format("{} has a bound that is not finite", condition.kind);
@@ -55,7 +59,8 @@ std::optional<std::string> WhatIsWrong(const Rubric& rubric) {
     if (stage.name.empty()) return "a stage has no name";
     if (!names.insert(stage.name).second) return fmt::format("stage {} is there twice", stage.name);
     if (stage.all_of.empty()) return fmt::format("stage {} has no conditions", stage.name);
-    if (!(stage.hold_s >= 0 && std::isfinite(stage.hold_s))) return fmt::format("stage {}: hold_s is {}, wanted 0 or more", stage.name, stage.hold_s);
+    if (!(stage.hold_s >= 0 && std::isfinite(stage.hold_s)))
+      return fmt::format("stage {}: hold_s is {}, wanted 0 or more", stage.name, stage.hold_s);
     for (const Condition& condition : stage.all_of) {
       if (const auto wrong = WhatIsWrong(condition)) return fmt::format("stage {}: {}", stage.name, *wrong);
     }
@@ -69,7 +74,8 @@ std::optional<std::string> WhatIsWrong(const Rubric& rubric, const PrivilegedFra
     for (const Condition& condition : stage.all_of) {
       for (const std::string& body : {condition.a, condition.b}) {
         if (!body.empty() && !HasBody(frame, body)) {
-          return fmt::format("stage {}: {} names the body '{}', which the world does not have", stage.name, condition.kind, body);
+          return fmt::format("stage {}: {} names the body '{}', which the world does not have", stage.name,
+                             condition.kind, body);
         }
       }
     }
@@ -88,7 +94,8 @@ Verdict OracleJudge::Rate(const Task& task, const Episode& episode) {
     return verdict;
   };
   try {
-    if (IsFailure(episode.stop)) return say(Label::kInvalid, fmt::format("a failed episode ({}) is not judged", evac::Name(episode.stop)));
+    if (IsFailure(episode.stop))
+      return say(Label::kInvalid, fmt::format("a failed episode ({}) is not judged", evac::Name(episode.stop)));
     if (task.rubric.stages.empty()) return say(Label::kCannotTell, "the task's rubric has no stages");
     const PrivilegedTrack track = store_.LoadPrivileged(verdict.episode_id);
     if (track.empty()) return say(Label::kCannotTell, "the world has no physics: there is no privileged track");

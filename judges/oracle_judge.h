@@ -8,13 +8,15 @@
 
 namespace evac {
 
-/// Judges an episode by what physics says: the privileged track against the task's rubric. The only reader of that track.
+/// Judges an episode by what physics says: the privileged track against the task's rubric. The only reader of that
+/// track.
 ///
-/// Stages are reached in order. A stage is reached at the first frame, not before the one where the stage before it was reached,
-/// from which on all its conditions hold for `hold_s` without a break; the frame where that time is full is when it was reached.
-/// A stage `at_end` must besides hold at the last frame. Success: every stage was reached.
+/// Stages are reached in order. A stage is reached at the first frame, not before the one where the stage before it was
+/// reached, from which on all its conditions hold for `hold_s` without a break; the frame where that time is full is
+/// when it was reached. A stage `at_end` must besides hold at the last frame. Success: every stage was reached.
 ///
-/// A condition measures body `a` (and `b`) at one frame and holds if the value is > `above` and < `below`, as far as given:
+/// A condition measures body `a` (and `b`) at one frame and holds if the value is > `above` and < `below`, as far as
+/// given:
 ///   distance             m, between the origins of a and b
 ///   horizontal_distance  m, the same without z
 ///   height               m, z of a's origin in the base frame (table top 0)
@@ -24,8 +26,8 @@ namespace evac {
 ///   tilt                 degrees in [0, 180] between the z axes of a and of the base
 ///   speed                m/s of a's origin since the frame before; 0 at the first
 ///
-/// Verdicts: `success` or `failure` with a sentence that holds the numbers, `cannot_tell` where the world had no physics or the
-/// task has no stages, `invalid` for a rubric that names a kind or a body that is not there.
+/// Verdicts: `success` or `failure` with a sentence that holds the numbers, `cannot_tell` where the world had no
+/// physics or the task has no stages, `invalid` for a rubric that names a kind or a body that is not there.
 class OracleJudge : public Judge {
  public:
   /// @param store  outlives this.
@@ -38,8 +40,9 @@ class OracleJudge : public Judge {
   const Store& store_;
 };
 
-/// What is wrong with a rubric, as a sentence, or nothing: stages without a name or with one twice, without conditions, an unknown
-/// kind, a body missing or too many, neither `above` nor `below`, bounds that exclude each other, a negative hold_s.
+/// What is wrong with a rubric, as a sentence, or nothing: stages without a name or with one twice, without conditions,
+/// an unknown kind, a body missing or too many, neither `above` nor `below`, bounds that exclude each other, a negative
+/// hold_s.
 std::optional<std::string> WhatIsWrong(const Rubric& rubric);
 /// The same, and every body it names must be in `frame` (the first of any episode).
 std::optional<std::string> WhatIsWrong(const Rubric& rubric, const PrivilegedFrame& frame);

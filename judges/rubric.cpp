@@ -11,9 +11,10 @@
 namespace evac {
 namespace {
 
-constexpr MeasureKind kKinds[] = {
-    {"distance", "m", true},      {"horizontal_distance", "m", true}, {"height", "m", false}, {"height_gain", "m", false},
-    {"displacement", "m", false}, {"contact", "N", true},             {"tilt", "deg", false}, {"speed", "m/s", false}};
+constexpr MeasureKind kKinds[] = {{"distance", "m", true},      {"horizontal_distance", "m", true},
+                                  {"height", "m", false},       {"height_gain", "m", false},
+                                  {"displacement", "m", false}, {"contact", "N", true},
+                                  {"tilt", "deg", false},       {"speed", "m/s", false}};
 
 const Eigen::Isometry3d& PoseOf(const std::string& body, const PrivilegedFrame& frame) {
   for (const PrivilegedFrame::Body& found : frame.bodies) {
@@ -43,7 +44,9 @@ struct Standing {
   int unmet = 0;
   double shortfall = 0;
 
-  bool NearerThan(const Standing& other) const { return std::tie(unmet, shortfall) < std::tie(other.unmet, other.shortfall); }
+  bool NearerThan(const Standing& other) const {
+    return std::tie(unmet, shortfall) < std::tie(other.unmet, other.shortfall);
+  }
 };
 
 Standing StandingAt(const Stage& stage, const TrackView& track, std::size_t frame) {
@@ -76,7 +79,8 @@ std::size_t HoldFrames(const Stage& stage, double period_s) {
 }  // namespace
 
 const MeasureKind* FindMeasure(const std::string& kind) {
-  const auto found = std::find_if(std::begin(kKinds), std::end(kKinds), [&](const MeasureKind& known) { return known.name == kind; });
+  const auto found =
+      std::find_if(std::begin(kKinds), std::end(kKinds), [&](const MeasureKind& known) { return known.name == kind; });
   return found == std::end(kKinds) ? nullptr : found;
 }
 
@@ -96,7 +100,8 @@ double Measure(const Condition& condition, const TrackView& track, std::size_t f
 }
 
 bool Holds(const Condition& condition, double value) {
-  return !std::isnan(value) && (!condition.above || value > *condition.above) && (!condition.below || value < *condition.below);
+  return !std::isnan(value) && (!condition.above || value > *condition.above) &&
+         (!condition.below || value < *condition.below);
 }
 
 double Shortfall(const Condition& condition, double value) {
@@ -111,8 +116,8 @@ std::string Describe(const Condition& condition, double value) {
   std::string wanted;
   if (condition.above) wanted = fmt::format("above {}", *condition.above);
   if (condition.below) wanted += fmt::format("{}below {}", wanted.empty() ? "" : " and ", *condition.below);
-  return fmt::format("{} of {}{} was {:.3g} {}, wanted {}", condition.kind, condition.a, kind->needs_b ? " and " + condition.b : "", value,
-                     kind->unit, wanted);
+  return fmt::format("{} of {}{} was {:.3g} {}, wanted {}", condition.kind, condition.a,
+                     kind->needs_b ? " and " + condition.b : "", value, kind->unit, wanted);
 }
 
 StageOutcome Follow(const Stage& stage, const TrackView& track, std::size_t from) {
@@ -126,15 +131,18 @@ StageOutcome Follow(const Stage& stage, const TrackView& track, std::size_t from
     longest = std::max(longest, run);
     if (run <= wanted) continue;
     if (!stage.at_end || StandingAt(stage, track, last).unmet == 0) return {true, frame, ""};
-    return {false, 0, fmt::format("stage {} held at {:.1f} s, but not at the end: {}", stage.name,
-                                  static_cast<double>(frame) * track.period_s, Unmet(stage, track, last))};
+    return {false, 0,
+            fmt::format("stage {} held at {:.1f} s, but not at the end: {}", stage.name,
+                        static_cast<double>(frame) * track.period_s, Unmet(stage, track, last))};
   }
   if (longest > 0) {
-    return {false, 0, fmt::format("stage {} held for {:.1f} s at most, wanted {:.1f} s", stage.name,
-                                  static_cast<double>(longest - 1) * track.period_s, stage.hold_s)};
+    return {false, 0,
+            fmt::format("stage {} held for {:.1f} s at most, wanted {:.1f} s", stage.name,
+                        static_cast<double>(longest - 1) * track.period_s, stage.hold_s)};
   }
-  return {false, 0, fmt::format("stage {} was not reached; nearest at {:.1f} s: {}", stage.name,
-                                static_cast<double>(nearest.frame) * track.period_s, Unmet(stage, track, nearest.frame))};
+  return {false, 0,
+          fmt::format("stage {} was not reached; nearest at {:.1f} s: {}", stage.name,
+                      static_cast<double>(nearest.frame) * track.period_s, Unmet(stage, track, nearest.frame))};
 }
 
 }  // namespace evac

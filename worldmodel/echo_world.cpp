@@ -9,18 +9,20 @@ namespace {
 
 void CheckMatches(const Task& task, const Recording& recording) {
   if (task.arms != recording.arm_names) {
-    throw InvalidInput("task {}: arms {}, wanted those of the recording {}: {}", task.id, fmt::join(task.arms, ", "), recording.id,
-                       fmt::join(recording.arm_names, ", "));
+    throw InvalidInput("task {}: arms {}, wanted those of the recording {}: {}", task.id, fmt::join(task.arms, ", "),
+                       recording.id, fmt::join(recording.arm_names, ", "));
   }
   if (task.cameras.size() != recording.cameras.size()) {
-    throw InvalidInput("task {}: {} cameras, wanted those of the recording {}: {}", task.id, task.cameras.size(), recording.id,
-                       recording.cameras.size());
+    throw InvalidInput("task {}: {} cameras, wanted those of the recording {}: {}", task.id, task.cameras.size(),
+                       recording.id, recording.cameras.size());
   }
   for (std::size_t i = 0; i < task.cameras.size(); ++i) {
     const Camera &asked = task.cameras[i], &recorded = recording.cameras[i];
-    if (asked.name == recorded.name && asked.width_px == recorded.width_px && asked.height_px == recorded.height_px) continue;
-    throw InvalidInput("task {}: camera {} of {}x{}, the recording {} has {} of {}x{}", task.id, asked.name, asked.width_px,
-                       asked.height_px, recording.id, recorded.name, recorded.width_px, recorded.height_px);
+    if (asked.name == recorded.name && asked.width_px == recorded.width_px && asked.height_px == recorded.height_px)
+      continue;
+    throw InvalidInput("task {}: camera {} of {}x{}, the recording {} has {} of {}x{}", task.id, asked.name,
+                       asked.width_px, asked.height_px, recording.id, recorded.name, recorded.width_px,
+                       recorded.height_px);
   }
 }
 
@@ -40,7 +42,8 @@ Advanced Echo(RecordedFrames& frames, const ActionChunk& chunk) {
 
 }  // namespace
 
-EchoWorld::EchoWorld(Recording recording, std::string name) : recording_(std::move(recording)), name_(std::move(name)) {}
+EchoWorld::EchoWorld(Recording recording, std::string name)
+    : recording_(std::move(recording)), name_(std::move(name)) {}
 
 WorldStep EchoWorld::Reset(SceneId scene, const Task& task, const InitialState&, std::uint64_t) {
   CheckMatches(task, recording_);

@@ -10,18 +10,20 @@
 
 namespace evac {
 
-/// Answers any commands with a recording's frames in time order, or with its frozen first one where there are none; the last
-/// frame stays when they run out. It predicts nothing: it proves a format reader, a policy's wire and the loop on real robot data.
+/// Answers any commands with a recording's frames in time order, or with its frozen first one where there are none; the
+/// last frame stays when they run out. It predicts nothing: it proves a format reader, a policy's wire and the loop on
+/// real robot data.
 ///
-/// Observed arms are the commanded ones and say so; at Reset they are the recorded start. There is no physics, so no privileged
-/// track. Every scene walks through the recording on its own.
+/// Observed arms are the commanded ones and say so; at Reset they are the recorded start. There is no physics, so no
+/// privileged track. Every scene walks through the recording on its own.
 class EchoWorld : public World {
  public:
   explicit EchoWorld(Recording recording, std::string name = "echo");
 
   std::string Name() const override { return name_; }
 
-  /// @param task  its arms and its cameras' names and sizes must be the recording's (TaskFromRecording). `initial` and `seed` change
+  /// @param task  its arms and its cameras' names and sizes must be the recording's (TaskFromRecording). `initial` and
+  /// `seed` change
   ///   nothing.
   /// @throws InvalidInput if they are not.
   WorldStep Reset(SceneId scene, const Task& task, const InitialState& initial, std::uint64_t seed) override;

@@ -15,7 +15,8 @@ using testing::HasSubstr;
 /// A file with a header of the test's own.
 std::string WithHeader(const std::string& header, const std::string& data, int version = 1) {
   std::string bytes = "\x93NUMPY";
-  bytes += {static_cast<char>(version), '\0', static_cast<char>(header.size() & 0xff), static_cast<char>(header.size() >> 8)};
+  bytes += {static_cast<char>(version), '\0', static_cast<char>(header.size() & 0xff),
+            static_cast<char>(header.size() >> 8)};
   if (version > 1) bytes += std::string(2, '\0');
   return bytes + header + data;
 }
@@ -64,19 +65,27 @@ TEST(Npy, FortranOrderIsReadAsTheSameMatrix) {
 
 TEST(Npy, HeadersOfAllThreeFormatsAreRead) {
   for (const int version : {1, 2, 3}) {
-    EXPECT_THAT(ParseNpy(WithHeader("{'shape': (2,), 'fortran_order': False, 'descr': '|u1'}", "\x01\x02", version), "v").values, ElementsAre(1, 2));
+    EXPECT_THAT(
+        ParseNpy(WithHeader("{'shape': (2,), 'fortran_order': False, 'descr': '|u1'}", "\x01\x02", version), "v")
+            .values,
+        ElementsAre(1, 2));
   }
 }
 
 TEST(Npy, AFileCutOffAnywhereIsRefused) {
   const std::string whole = NpyBytes({"<f4", {2, 2}, {1, 2, 3, 4}});
-  for (std::size_t length = 0; length < whole.size(); ++length) EXPECT_NE(ErrorOf(whole.substr(0, length)), "it was read") << length;
+  for (std::size_t length = 0; length < whole.size(); ++length)
+    EXPECT_NE(ErrorOf(whole.substr(0, length)), "it was read") << length;
 }
 
 TEST(Npy, AShapeThatLiesIsRefusedBeforeAnythingIsAllocated) {
-  for (const std::string shape : {"(3,)", "(1, 1)", "(4611686018427387904, 4)", "(18446744073709551615, 18446744073709551615)",
-                                  "(99999999999999999999,)", "(-1,)", "(2305843009213693952, 1)", "(1, 1, 1, 1, 1, 1, 1, 1, 2)"}) {
-    EXPECT_NE(ErrorOf(WithHeader("{'descr': '<f8', 'fortran_order': False, 'shape': " + shape + ", }", std::string(16, '\0'))), "it was read") << shape;
+  for (const std::string shape :
+       {"(3,)", "(1, 1)", "(4611686018427387904, 4)", "(18446744073709551615, 18446744073709551615)",
+        "(99999999999999999999,)", "(-1,)", "(2305843009213693952, 1)", "(1, 1, 1, 1, 1, 1, 1, 1, 2)"}) {
+    EXPECT_NE(ErrorOf(WithHeader("{'descr': '<f8', 'fortran_order': False, 'shape': " + shape + ", }",
+                                 std::string(16, '\0'))),
+              "it was read")
+        << shape;
   }
 }
 
@@ -85,7 +94,8 @@ TEST(Npy, OtherTypesAndBrokenHeadersAreRefusedByName) {
   EXPECT_THAT(with("{'descr': '>f8', 'fortran_order': False, 'shape': (1,), }"), HasSubstr("'>f8', wanted one of"));
   EXPECT_THAT(with("{'descr': '|O', 'fortran_order': False, 'shape': (1,), }"), HasSubstr("'|O'"));
   EXPECT_THAT(with("{'descr': '<f8', 'shape': (1,), }"), HasSubstr("header is broken"));
-  EXPECT_THAT(with("{'descr': '<f8', 'fortran_order': False, 'shape': (1,), } os.system()"), HasSubstr("header is broken"));
+  EXPECT_THAT(with("{'descr': '<f8', 'fortran_order': False, 'shape': (1,), } os.system()"),
+              HasSubstr("header is broken"));
   EXPECT_THAT(ErrorOf("PNG no numpy"), HasSubstr("no .npy file"));
   EXPECT_THAT(ErrorOf(WithHeader("{}", "", 9)), HasSubstr("format 9"));
 }

@@ -75,7 +75,8 @@ TEST(Recording, AGripperThatReadsALittlePastClosedIsClosedAndFarPastIsRefused) {
   EXPECT_EQ(ReadRecording(folder / "a").arms[0][0].closure, 1);
   actions.values[16 + 15] = 900;
   WriteNpy(folder / "a" / "action.npy", actions);
-  EXPECT_THAT(ErrorOf(folder / "a"), AllOf(HasSubstr("action.npy: row 1, right arm"), HasSubstr("900"), HasSubstr("120")));
+  EXPECT_THAT(ErrorOf(folder / "a"),
+              AllOf(HasSubstr("action.npy: row 1, right arm"), HasSubstr("900"), HasSubstr("120")));
 }
 
 TEST(Recording, ABrokenExampleIsRefusedWithTheFileAndTheRow) {
@@ -84,7 +85,8 @@ TEST(Recording, ABrokenExampleIsRefusedWithTheFileAndTheRow) {
   NpyArray actions = Actions(3);
   actions.values[2 * 16 + 6] = 0.5;
   WriteExample(bad, actions);
-  EXPECT_THAT(ErrorOf(bad), AllOf(HasSubstr("action.npy: row 2, left arm"), HasSubstr("length 0.5"), HasSubstr("wanted 1")));
+  EXPECT_THAT(ErrorOf(bad),
+              AllOf(HasSubstr("action.npy: row 2, left arm"), HasSubstr("length 0.5"), HasSubstr("wanted 1")));
   actions.values[2 * 16 + 1] = std::nan("");
   WriteExample(bad, actions);
   EXPECT_THAT(ErrorOf(bad), HasSubstr("not finite"));
@@ -118,7 +120,8 @@ TEST(Recording, AClipAndATreeHoldTheSameRecording) {
     EXPECT_EQ(recording.id, "327-648642");
     EXPECT_NEAR(recording.period_s, 1.0 / 30, 1e-12);
     ASSERT_EQ(recording.arms.size(), 6u);
-    for (const int arm : {0, 1}) EXPECT_TRUE(recording.arms[4][arm].base_from_gripper.isApprox(clip.BaseFromGripper(4, arm), 1e-9));
+    for (const int arm : {0, 1})
+      EXPECT_TRUE(recording.arms[4][arm].base_from_gripper.isApprox(clip.BaseFromGripper(4, arm), 1e-9));
     EXPECT_NEAR(recording.arms[3][0].closure, 30.0 / 120, 1e-6);
     ASSERT_EQ(recording.videos.size(), 3u);
     EXPECT_NEAR(GreyOf(recording.first_images[0]), SyntheticClip::FrameGrey(0), 2);
@@ -164,7 +167,8 @@ TEST(Recording, ItsFramesComeInOrderAndTheLastOneStays) {
     RecordedFrames frames(recording);
     for (std::size_t step = 0; step < 10; ++step) {
       const int frame = static_cast<int>(std::min(step, recording.arms.size() - 1)) * every_nth;
-      EXPECT_NEAR(GreyOf(frames.Next()[0]), SyntheticClip::FrameGrey(frame), 3) << "step " << step << " of every " << every_nth;
+      EXPECT_NEAR(GreyOf(frames.Next()[0]), SyntheticClip::FrameGrey(frame), 3)
+          << "step " << step << " of every " << every_nth;
     }
   }
 }
@@ -242,16 +246,26 @@ TEST(Recording, CameraPagesAreCheckedFieldByField) {
     }
     return std::string("it was read");
   };
-  EXPECT_EQ(intrinsics(R"({"intrinsic": {"fx": 1, "fy": 1, "ppx": 1, "ppy": 1, "k1": 0, "distortion_model": "none"}})"), "it was read");
-  EXPECT_THAT(intrinsics(R"({"intrinsic": {"fx": 1, "fy": 1, "ppx": 1, "ppy": 1, "k1": 0.1}})"), HasSubstr("intrinsic.k1 holds 0.1"));
-  EXPECT_THAT(intrinsics(R"({"intrinsic": {"fx": 1, "fy": 1, "ppx": 1, "ppy": 1, "dist_coeffs": [0, 0.2]}})"), HasSubstr("0.2"));
-  EXPECT_THAT(intrinsics(R"({"intrinsic": {"fx": 1, "fy": "2", "ppx": 1, "ppy": 1}})"), HasSubstr("intrinsic.fy: found string"));
+  EXPECT_EQ(intrinsics(R"({"intrinsic": {"fx": 1, "fy": 1, "ppx": 1, "ppy": 1, "k1": 0, "distortion_model": "none"}})"),
+            "it was read");
+  EXPECT_THAT(intrinsics(R"({"intrinsic": {"fx": 1, "fy": 1, "ppx": 1, "ppy": 1, "k1": 0.1}})"),
+              HasSubstr("intrinsic.k1 holds 0.1"));
+  EXPECT_THAT(intrinsics(R"({"intrinsic": {"fx": 1, "fy": 1, "ppx": 1, "ppy": 1, "dist_coeffs": [0, 0.2]}})"),
+              HasSubstr("0.2"));
+  EXPECT_THAT(intrinsics(R"({"intrinsic": {"fx": 1, "fy": "2", "ppx": 1, "ppy": 1}})"),
+              HasSubstr("intrinsic.fy: found string"));
   EXPECT_THAT(intrinsics(R"({"intrinsic": {"fx": 1}})"), HasSubstr("field fy is missing"));
   EXPECT_THAT(intrinsics("[1]"), HasSubstr("field intrinsic is missing"));
   EXPECT_THAT(intrinsics("{"), HasSubstr("page.json: no JSON"));
   EXPECT_THROW(ParseExtrinsics("[]", "page.json"), Error);
-  EXPECT_THROW(ParseExtrinsics(R"([{"extrinsic": {"rotation_matrix": [[1,0,0],[0,1,0]], "translation_vector": [0,0,0]}}])", "page.json"), Error);
-  EXPECT_THROW(ParseExtrinsics(R"([{"extrinsic": {"rotation_matrix": [[1,0,0],[0,1,0],[0,0,-1]], "translation_vector": [0,0,0]}}])", "page.json"), Error);
+  EXPECT_THROW(
+      ParseExtrinsics(R"([{"extrinsic": {"rotation_matrix": [[1,0,0],[0,1,0]], "translation_vector": [0,0,0]}}])",
+                      "page.json"),
+      Error);
+  EXPECT_THROW(ParseExtrinsics(
+                   R"([{"extrinsic": {"rotation_matrix": [[1,0,0],[0,1,0],[0,0,-1]], "translation_vector": [0,0,0]}}])",
+                   "page.json"),
+               Error);
 }
 
 TEST(Recording, ItsTaskAcceptsEveryRecordedStep) {
@@ -278,7 +292,8 @@ TEST(Recording, TheRealExamplesAreReadWhole) {
     double most_closed = 0;
     for (const Arms& arms : recording.arms) most_closed = std::max({most_closed, arms[0].closure, arms[1].closure});
     EXPECT_EQ(most_closed, 1) << "the gripper exceeds 120 in both";
-    const auto pixel = Project(recording.cameras[0], recording.cameras[0].mount_from_camera.inverse() * recording.arms[0][0].base_from_gripper.translation());
+    const auto pixel = Project(recording.cameras[0], recording.cameras[0].mount_from_camera.inverse() *
+                                                         recording.arms[0][0].base_from_gripper.translation());
     ASSERT_TRUE(pixel.has_value()) << "the camera looks at the left gripper";
   }
   EXPECT_EQ(ReadRecording(examples / "example0").arms[0][0].closure, 35.279998779296875 / 120);

@@ -8,8 +8,8 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// CORPUS/npy_fuzz: one array per type. CORPUS/recording_fuzz: a camera's pages, each after the letter that says which it
-/// is. CORPUS/proprio_fuzz and CORPUS/video_fuzz: a track and a video of four steps.
+/// CORPUS/npy_fuzz: one array per type. CORPUS/recording_fuzz: a camera's pages, each after the letter that says which
+/// it is. CORPUS/proprio_fuzz and CORPUS/video_fuzz: a track and a video of four steps.
 void MakeCorpus(const fs::path& corpus) {
   for (const std::string dtype : {"<f8", "<f4", "<i8", "<i4", "|u1"}) {
     evac::WriteText(corpus / "npy_fuzz" / dtype.substr(1), evac::NpyBytes({dtype, {2, 3}, {1, 2, 3, 4, 5, 6}}));

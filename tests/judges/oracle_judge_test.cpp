@@ -21,7 +21,9 @@ class TrackMaker {
   TrackMaker& Frame(const Eigen::Vector3d& bottle_m, double grip_n = 0, double tilt_rad = 0) {
     PrivilegedFrame frame;
     Eigen::Isometry3d bottle = Eigen::Translation3d(bottle_m) * Eigen::AngleAxisd(tilt_rad, Eigen::Vector3d::UnitX());
-    frame.bodies = {{"bottle", bottle}, {"gripper", Eigen::Isometry3d(Eigen::Translation3d(0, 0, 0.1))}, {"table", Eigen::Isometry3d::Identity()}};
+    frame.bodies = {{"bottle", bottle},
+                    {"gripper", Eigen::Isometry3d(Eigen::Translation3d(0, 0, 0.1))},
+                    {"table", Eigen::Isometry3d::Identity()}};
     if (grip_n > 0) frame.contacts = {{"bottle", "gripper", grip_n}};
     track_.push_back(frame);
     return *this;
@@ -36,7 +38,8 @@ class TrackMaker {
   PrivilegedTrack track_;
 };
 
-Condition Make(const std::string& kind, std::optional<double> above, std::optional<double> below, const std::string& b = "") {
+Condition Make(const std::string& kind, std::optional<double> above, std::optional<double> below,
+               const std::string& b = "") {
   return {kind, "bottle", b, above, below};
 }
 
@@ -59,7 +62,9 @@ Task LiftTask() {
 /// A store with one task, and episodes whose tracks the test chooses.
 class OracleJudgeTest : public testing::Test {
  protected:
-  OracleJudgeTest() : store_(Store::InMemory(folder_.path(), {.suite_text = "", .suite_hash = "h", .suite_path = "", .evac_version = ""})) {
+  OracleJudgeTest()
+      : store_(Store::InMemory(folder_.path(),
+                               {.suite_text = "", .suite_hash = "h", .suite_path = "", .evac_version = ""})) {
     store_.AddWorld({.name = "real", .type = "mujoco", .is_real = true, .profile_hash = ""});
     store_.AddPolicy({"hold", "a", ""});
   }
@@ -105,7 +110,8 @@ TEST_F(OracleJudgeTest, AnEpisodeThatReachesEveryStageInOrderSucceeds) {
   EXPECT_EQ(verdict.judge, "oracle");
   EXPECT_EQ(verdict.rubric_version, "7");
   EXPECT_EQ(verdict.stages, (std::map<std::string, bool>{{"grasp", true}, {"lift", true}, {"release", true}}));
-  EXPECT_THAT(verdict.reason, AllOf(HasSubstr("grasp at 0.3 s"), HasSubstr("lift at 0.4 s"), HasSubstr("release at 0.5 s")));
+  EXPECT_THAT(verdict.reason,
+              AllOf(HasSubstr("grasp at 0.3 s"), HasSubstr("lift at 0.4 s"), HasSubstr("release at 0.5 s")));
 }
 
 TEST_F(OracleJudgeTest, AFailureSaysWhichStageAndHowNearItCame) {
@@ -113,8 +119,8 @@ TEST_F(OracleJudgeTest, AFailureSaysWhichStageAndHowNearItCame) {
   made.Frame({0, 0, 0}, 2).Repeat(3).Frame({0, 0, 0.034}, 2).Frame({0, 0, 0.01}, 2);
   const Verdict verdict = Rate(LiftTask(), made.track());
   EXPECT_EQ(verdict.label, Label::kFailure);
-  EXPECT_THAT(verdict.reason, AllOf(HasSubstr("stage lift was not reached; nearest at 0.4 s"), HasSubstr("0.034 m, wanted above 0.05"),
-                                    HasSubstr("before it: grasp at 0.2 s")));
+  EXPECT_THAT(verdict.reason, AllOf(HasSubstr("stage lift was not reached; nearest at 0.4 s"),
+                                    HasSubstr("0.034 m, wanted above 0.05"), HasSubstr("before it: grasp at 0.2 s")));
   EXPECT_EQ(verdict.stages, (std::map<std::string, bool>{{"grasp", true}, {"lift", false}, {"release", false}}));
 }
 
@@ -137,7 +143,8 @@ TEST_F(OracleJudgeTest, WhatMustHoldAtTheEndIsLookedAtThere) {
   made.Frame({0, 0, 0}, 2).Repeat(2).Frame({0, 0, 0.06}).Frame({0, 0, 0.06}, 3);
   const Verdict verdict = Rate(LiftTask(), made.track());
   EXPECT_EQ(verdict.label, Label::kFailure);
-  EXPECT_THAT(verdict.reason, AllOf(HasSubstr("stage release held at 0.3 s, but not at the end"), HasSubstr("3 N, wanted below 0.05")));
+  EXPECT_THAT(verdict.reason,
+              AllOf(HasSubstr("stage release held at 0.3 s, but not at the end"), HasSubstr("3 N, wanted below 0.05")));
   EXPECT_FALSE(verdict.stages.at("release"));
 }
 
@@ -200,7 +207,9 @@ TEST(Rubric, EveryKindMeasuresWhatItsNameSays) {
   TrackMaker made;
   made.Frame({0, 0, 0.1}).Frame({0.3, 0.4, 0.3}, 2.5, std::numbers::pi / 3);
   const TrackView track{made.track(), 0.1};
-  const auto value = [&](const char* kind, const char* b = "") { return Measure({kind, "bottle", b, 0.0, {}}, track, 1); };
+  const auto value = [&](const char* kind, const char* b = "") {
+    return Measure({kind, "bottle", b, 0.0, {}}, track, 1);
+  };
   EXPECT_NEAR(value("distance", "gripper"), std::sqrt(0.25 + 0.04), 1e-12);
   EXPECT_NEAR(value("horizontal_distance", "gripper"), 0.5, 1e-12);
   EXPECT_NEAR(value("height"), 0.3, 1e-12);

@@ -66,7 +66,8 @@ std::string SyntheticClip::Extrinsics(const std::string& camera) const {
 }
 
 void SyntheticClip::Write(const ClipFolders& folders) const {
-  for (const fs::path& folder : {folders.images, folders.pages, folders.proprio.parent_path()}) fs::create_directories(folder);
+  for (const fs::path& folder : {folders.images, folders.pages, folders.proprio.parent_path()})
+    fs::create_directories(folder);
   const hid_t file = H5Fcreate(folders.proprio.c_str(), H5F_ACC_TRUNC, H5P_DEFAULT, H5P_DEFAULT);
   const auto count = static_cast<hsize_t>(steps);
   WriteDataSet(file, "state/effector/position", {count, 2}, grippers);
@@ -74,15 +75,19 @@ void SyntheticClip::Write(const ClipFolders& folders) const {
   WriteDataSet(file, "state/end/orientation", {count, 2, 4}, quaternions_xyzw);
   H5Fclose(file);
   for (const std::string& camera : cameras) {
-    WriteText(folders.pages / (camera + "_intrinsic_params.json"), R"({"intrinsic": {"fx": 40, "fy": 41, "ppx": 24, "ppy": 16}})");
+    WriteText(folders.pages / (camera + "_intrinsic_params.json"),
+              R"({"intrinsic": {"fx": 40, "fy": 41, "ppx": 24, "ppy": 16}})");
     WriteText(folders.pages / (camera + "_extrinsic_params_aligned.json"), Extrinsics(camera));
     VideoWriter video(folders.images / (camera + "_color.mp4"), {.period_s = 1.0 / 30});
-    for (int frame = 0; frame < frames; ++frame) video.Append(cv::Mat(kHeight_px, kWidth_px, CV_8UC3, cv::Scalar::all(FrameGrey(frame))));
+    for (int frame = 0; frame < frames; ++frame)
+      video.Append(cv::Mat(kHeight_px, kWidth_px, CV_8UC3, cv::Scalar::all(FrameGrey(frame))));
     video.Finish();
   }
 }
 
-ClipFolders OneFolder(const fs::path& folder) { return {folder.filename().string(), folder, folder, folder / "proprio_stats.h5"}; }
+ClipFolders OneFolder(const fs::path& folder) {
+  return {folder.filename().string(), folder, folder, folder / "proprio_stats.h5"};
+}
 
 ClipFolders TreeUnder(const fs::path& root) {
   return {"327-648642", root / "observations/327/648642/videos", root / "parameters/327/648642/parameters/camera",

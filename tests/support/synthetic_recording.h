@@ -9,8 +9,9 @@
 
 namespace evac {
 
-/// A recording in AgiBot World's files that a test makes up and then spoils as it likes. Both grippers move and turn; the wrist
-/// cameras sit still on them, the head camera on the base. Frame k of every video is uniformly grey, FrameGrey(k).
+/// A recording in AgiBot World's files that a test makes up and then spoils as it likes. Both grippers move and turn;
+/// the wrist cameras sit still on them, the head camera on the base. Frame k of every video is uniformly grey,
+/// FrameGrey(k).
 struct SyntheticClip {
   explicit SyntheticClip(int steps);
 
@@ -19,8 +20,8 @@ struct SyntheticClip {
   std::vector<double> quaternions_xyzw;  ///< [T, 2, 4]
   std::vector<std::string> cameras = {"head"};
   int steps;
-  int frames;          ///< of each video; at first = steps
-  double slip_m = 0;   ///< by how much the cameras have slid on their mounts at the last step
+  int frames;         ///< of each video; at first = steps
+  double slip_m = 0;  ///< by how much the cameras have slid on their mounts at the last step
 
   static constexpr int kWidth_px = 48, kHeight_px = 32;
   static int FrameGrey(int frame) { return 20 + 12 * frame; }

@@ -26,7 +26,8 @@ class EchoWorldTest : public testing::Test {
   /// The recorded steps `from` … `from + count - 1` as a chunk.
   ActionChunk Chunk(std::size_t from, std::size_t count) const {
     ActionChunk chunk;
-    for (std::size_t k = from; k < from + count; ++k) chunk.targets.push_back(recording().arms.at(std::min<std::size_t>(k, kSteps - 1)));
+    for (std::size_t k = from; k < from + count; ++k)
+      chunk.targets.push_back(recording().arms.at(std::min<std::size_t>(k, kSteps - 1)));
     return chunk;
   }
   const Recording& recording() const {
@@ -49,7 +50,8 @@ TEST_F(EchoWorldTest, AnswersWithTheRecordingsFramesInOrderAndThenTheLastOneStay
   const std::vector<SceneChunk> batch = {{0, &chunk}};
   const std::vector<WorldStep> steps = Steps(world.Advance(batch).at(0));
   ASSERT_EQ(steps.size(), 7u);
-  for (int k = 0; k < 7; ++k) EXPECT_NEAR(GreyOf(steps[k]), SyntheticClip::FrameGrey(std::min(k + 1, kSteps - 1)), 3) << k;
+  for (int k = 0; k < 7; ++k)
+    EXPECT_NEAR(GreyOf(steps[k]), SyntheticClip::FrameGrey(std::min(k + 1, kSteps - 1)), 3) << k;
 }
 
 TEST_F(EchoWorldTest, TheArmsItShowsAreTheCommandedOnesAndItSaysSo) {
@@ -87,7 +89,8 @@ TEST_F(EchoWorldTest, WhereThereIsNoVideoTheFirstFrameStays) {
   world.Reset(0, TaskFromRecording(still), kStart, 1);
   const ActionChunk chunk = Chunk(1, 4);
   const std::vector<SceneChunk> batch = {{0, &chunk}};
-  for (const WorldStep& step : Steps(world.Advance(batch).at(0))) EXPECT_NEAR(GreyOf(step), SyntheticClip::FrameGrey(0), 3);
+  for (const WorldStep& step : Steps(world.Advance(batch).at(0)))
+    EXPECT_NEAR(GreyOf(step), SyntheticClip::FrameGrey(0), 3);
 }
 
 TEST_F(EchoWorldTest, ATaskWithOtherArmsOrCamerasIsRefused) {
@@ -115,7 +118,8 @@ TEST_F(EchoWorldTest, AVideoThatEndsEarlyFailsItsSceneAndNoOther) {
   const std::vector<Advanced> answers = world.Advance(batch);
   ASSERT_TRUE(std::holds_alternative<Failure>(answers[0]));
   EXPECT_EQ(std::get<Failure>(answers[0]).stop, StopReason::kWorldError);
-  EXPECT_THAT(std::get<Failure>(answers[0]).message, testing::HasSubstr("head_color.mp4: the video ends before step 3"));
+  EXPECT_THAT(std::get<Failure>(answers[0]).message,
+              testing::HasSubstr("head_color.mp4: the video ends before step 3"));
   EXPECT_EQ(Steps(answers[1]).size(), 2u);
 }
 
