@@ -1,3 +1,4 @@
+#include <cmath>
 #include <nlohmann/json.hpp>
 
 #include "core/error.h"
@@ -139,7 +140,12 @@ auto Decoded(const std::string& text, const Read& read) {
   }
 }
 
+/// JSON has no infinity and no NaN; nlohmann's would silently become null.
 std::string Dumped(const Json& json, const std::string& what) {
+  const Json flat = json.flatten();
+  for (const auto& [field, value] : flat.items()) {
+    if (value.is_number_float() && !std::isfinite(value.get<double>())) throw InvalidInput("{} cannot be stored: {} is not finite", what, field);
+  }
   try {
     return json.dump();
   } catch (const nlohmann::json::exception& error) {

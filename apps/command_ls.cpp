@@ -1,0 +1,151 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cstdio>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <set>
+#include <vector>
+
+#include "apps/commands.h"
+#include "core/store.h"
+
+namespace evac {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+struct LsArguments {
+  std::string run;
+  bool json = false;
+  bool failed = false;
+  std::string world, task, policy;  ///< empty: all
+};
+
+/// Judge → the label that counts now.
+using Labels = std::map<std::string, Label>;
+
+struct Listed {
+  Episode episode;
+  Labels labels;
+};
+
+bool IsWanted(const Episode& episode, const LsArguments& arguments) {
+  const auto fits = [](const std::string& wanted, const std::string& found) { return wanted.empty() || wanted == found; };
+  return fits(arguments.world, episode.key.world) && fits(arguments.task, episode.key.pair.task) &&
+         fits(arguments.policy, episode.key.pair.policy) && (!arguments.failed || IsFailure(episode.stop));
+}
+
+std::vector<Listed> List(const LsArguments& arguments) {
+  const Store store = Store::Open(arguments.run, Store::Mode::kReadOnly);
+  const std::vector<Episode> episodes = store.Episodes();  // before the verdicts: each verdict read has its episode
+  const auto verdicts = store.CurrentVerdicts();
+  std::vector<Listed> list;
+  for (const Episode& episode : episodes) {
+    if (!IsWanted(episode, arguments)) continue;
+    Listed& listed = list.emplace_back(Listed{episode, {}});
+    const auto found = verdicts.find(episode.key.Id());
+    if (found == verdicts.end()) continue;
+    for (const auto& [judge, verdict] : found->second) listed.labels[judge] = verdict.label;
+  }
+  return list;
+}
+
+Json TextOrNull(const std::string& text) { return text.empty() ? Json() : Json(text); }
+
+Json AsJson(const Listed& listed) {
+  const Episode& episode = listed.episode;
+  const PairKey& pair = episode.key.pair;
+  Json verdicts = Json::object();
+  for (const auto& [judge, label] : listed.labels) verdicts[judge] = Name(label);
+  return {{"task", pair.task},
+          {"initial_state", pair.initial_state},
+          {"policy", pair.policy},
+          {"checkpoint", pair.checkpoint},
+          {"world", episode.key.world},
+          {"seed", pair.seed},
+          {"stop", Name(episode.stop)},
+          {"stop_reason", episode.stop_reason},
+          {"chunks", episode.chunks},
+          {"failure", TextOrNull(episode.failure)},
+          {"video", TextOrNull(episode.video)},
+          {"video_sha256", TextOrNull(episode.video_sha256)},
+          {"verdicts", verdicts}};
+}
+
+void PrintJson(const std::vector<Listed>& list) {
+  Json array = Json::array();
+  for (const Listed& listed : list) array.push_back(AsJson(listed));
+  // A policy's own words may be no UTF-8; the list is to be readable all the same.
+  fmt::print("{}\n", array.dump(2, ' ', false, Json::error_handler_t::replace));
+}
+
+std::string Shown(const Labels& labels) {
+  std::string shown;
+  for (const auto& [judge, label] : labels) shown += fmt::format("{}{}={}", shown.empty() ? "" : " ", judge, Name(label));
+  return shown.empty() ? "-" : shown;
+}
+
+using Row = std::vector<std::string>;
+
+std::vector<Row> Rows(const std::vector<Listed>& list) {
+  std::vector<Row> rows = {{"TASK", "INITIAL STATE", "POLICY", "SEED", "WORLD", "CHUNKS", "STOP", "VERDICTS"}};
+  for (const auto& [episode, labels] : list) {
+    const PairKey& pair = episode.key.pair;
+    rows.push_back({pair.task, pair.initial_state, pair.policy + "@" + pair.checkpoint, std::to_string(pair.seed), episode.key.world,
+                    std::to_string(episode.chunks), Name(episode.stop), Shown(labels)});
+  }
+  return rows;
+}
+
+void PrintAligned(const std::vector<Row>& rows) {
+  std::vector<std::size_t> widths(rows.front().size());
+  for (const Row& row : rows) {
+    for (std::size_t i = 0; i < row.size(); ++i) widths[i] = std::max(widths[i], row[i].size());
+  }
+  for (const Row& row : rows) {
+    std::string line;
+    for (std::size_t i = 0; i < row.size(); ++i) line += fmt::format("{:{}}  ", row[i], i + 1 < row.size() ? widths[i] : 0);
+    fmt::print("{}\n", line.substr(0, line.find_last_not_of(' ') + 1));
+  }
+}
+
+void PrintTable(const std::vector<Listed>& list) {
+  PrintAligned(Rows(list));
+  std::set<std::string> tasks, policies, worlds;
+  std::size_t failed = 0, judged = 0;
+  for (const auto& [episode, labels] : list) {
+    tasks.insert(episode.key.pair.task);
+    policies.insert(episode.key.pair.policy + "@" + episode.key.pair.checkpoint);
+    worlds.insert(episode.key.world);
+    failed += IsFailure(episode.stop);
+    judged += !labels.empty();
+    if (IsFailure(episode.stop)) fmt::print(stderr, "failed: {}: {}\n", episode.key.Id(), episode.failure);
+  }
+  const auto counted = [](std::size_t count, const char* one, const char* many) { return fmt::format("{} {}", count, count == 1 ? one : many); };
+  fmt::print("\n{} ({}, {}, {}), {} failed, {} judged\n", counted(list.size(), "episode", "episodes"), counted(tasks.size(), "task", "tasks"),
+             counted(policies.size(), "policy", "policies"), counted(worlds.size(), "world", "worlds"), failed, judged);
+}
+
+}  // namespace
+
+void AddLs(CLI::App& app, ExitCode& exit_code) {
+  const auto arguments = std::make_shared<LsArguments>();
+  CLI::App* command = app.add_subcommand("ls", "List the episodes of a run, also while it is running");
+  command->add_option("run", arguments->run, "The run's folder")->required();
+  command->add_flag("--json", arguments->json, "An array with one object per episode");
+  command->add_flag("--failed", arguments->failed, "Only episodes that failed (an error, not an unsuccessful attempt)");
+  command->add_option("--world", arguments->world, "Only this world's");
+  command->add_option("--task", arguments->task, "Only this task's");
+  command->add_option("--policy", arguments->policy, "Only this policy's, with all its checkpoints");
+  command->footer(
+      "Examples:\n  evac ls out/demo --world sim\n  evac ls out/demo --failed\n"
+      "  evac ls out/demo --json | jq '.[] | select(.verdicts.oracle == \"success\") | .video'");
+  command->callback([arguments, &exit_code] {
+    const std::vector<Listed> list = List(*arguments);
+    arguments->json ? PrintJson(list) : PrintTable(list);
+    exit_code = ExitCode::kOk;
+  });
+}
+
+}  // namespace evac

@@ -1,0 +1,189 @@
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <sys/mount.h>
+#include <sys/resource.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <chrono>
+#include <csignal>
+#include <fstream>
+#include <set>
+#include <thread>
+
+#include "core/error.h"
+#include "core/file.h"
+#include "core/hash.h"
+#include "tests/core/store_samples.h"
+#include "tests/support/temp_folder.h"
+
+/// What is left when the process that writes is killed, and when the disk is full.
+namespace evac {
+namespace {
+
+using namespace samples;
+using testing::AnyOf;
+using testing::HasSubstr;
+
+/// Runs `body` in a child that never returns into the test; what `body` returns is its exit code.
+template <typename Body>
+pid_t InChild(const Body& body) {
+  const pid_t child = ::fork();
+  if (child != 0) return child;
+  int code = 0;
+  try {
+    code = body();
+  } catch (const std::exception& error) {
+    fmt::print(stderr, "{}\n", error.what());
+    code = 99;
+  }
+  ::_exit(code);
+}
+
+/// What a run does from its start: opens, tidies up, and adds what is not there yet.
+void AddMissing(const std::filesystem::path& run, int count) {
+  Store store = Store::CreateOrContinue(run, SomeRun());
+  store.RemoveOrphans();
+  Declare(store);
+  for (int i = 0; i < count; ++i) {
+    if (store.Has(Key(i))) continue;
+    store.AddInitialScene(Key(i).pair, {{Image(i)}, {}, {}});
+    store.Add(SomeEpisode(store, Key(i)));
+    store.AddVerdict({.episode_id = Key(i).Id(), .judge = "oracle", .label = Label::kSuccess, .probability = {}, .stages = {}, .reason = "", .rubric_version = ""});
+  }
+}
+
+std::vector<std::string> VideoHashes(const Store& store) {
+  std::vector<std::string> hashes;
+  for (const Episode& episode : store.Episodes()) hashes.push_back(episode.key.Id() + " " + episode.video_sha256);
+  return hashes;
+}
+
+std::set<std::string> FilesBelow(const std::filesystem::path& folder) {
+  std::set<std::string> names;
+  for (const auto& entry : std::filesystem::recursive_directory_iterator(folder)) {
+    if (entry.is_regular_file()) names.insert(entry.path().lexically_relative(folder).string());
+  }
+  return names;
+}
+
+void ExpectWhole(const std::filesystem::path& run) {
+  const Store store = Store::Open(run, Store::Mode::kReadOnly);
+  for (Episode& episode : store.Episodes()) {
+    EXPECT_EQ(Sha256HexOfFile(run / episode.video), episode.video_sha256);
+    EXPECT_EQ(ReadFile(run / episode.thumbnail), "jpeg of " + episode.key.Id());
+    store.LoadSteps(episode);
+    EXPECT_EQ(episode.observations.size(), 5u);
+    EXPECT_EQ(store.LoadPrivileged(episode.key.Id()).size(), 5u);
+  }
+}
+
+TEST(StoreKill, AnEpisodeIsThereWithItsVideoOrNotAtAll) {
+  const TempFolder folder;
+  const std::filesystem::path run = folder / "run";
+  SplitMix64 random(20);
+  for (int kills = 0; kills < 12; ++kills) {
+    const pid_t child = InChild([&] { return AddMissing(run, 1'000'000), 0; });
+    std::this_thread::sleep_for(std::chrono::microseconds(random.Below(120'000)));
+    ::kill(child, SIGKILL);
+    int status = 0;
+    ::waitpid(child, &status, 0);
+    ASSERT_TRUE(WIFSIGNALED(status)) << "the child ended by itself";
+    if (std::filesystem::exists(run)) {
+      Store::CreateOrContinue(run, SomeRun());  // recovers, whatever there is
+      ExpectWhole(run);
+    }
+  }
+  const int count = 3 + static_cast<int>(Store::CreateOrContinue(run, SomeRun()).Episodes().size());
+  AddMissing(run, count);
+  AddMissing(folder / "uninterrupted", count);
+  ExpectWhole(run);
+  EXPECT_EQ(VideoHashes(Store::Open(run, Store::Mode::kReadOnly)), VideoHashes(Store::Open(folder / "uninterrupted", Store::Mode::kReadOnly)));
+  EXPECT_EQ(FilesBelow(run / "videos"), FilesBelow(folder / "uninterrupted/videos"));
+  EXPECT_EQ(FilesBelow(run / "thumbs"), FilesBelow(folder / "uninterrupted/thumbs"));
+}
+
+TEST(StoreKill, TheLockGoesWithTheKilledProcess) {
+  const TempFolder folder;
+  const std::filesystem::path run = folder / "run";
+  int ready[2];
+  ASSERT_EQ(::pipe(ready), 0);
+  const pid_t child = InChild([&] {
+    const Store store = Store::CreateOrContinue(run, SomeRun());
+    if (::write(ready[1], "x", 1) != 1) return 1;
+    return ::pause();
+  });
+  char x = 0;
+  ASSERT_EQ(::read(ready[0], &x, 1), 1);
+  try {
+    Store::CreateOrContinue(run, SomeRun());
+    ADD_FAILURE() << "a second process was let in";
+  } catch (const Error& error) {
+    EXPECT_THAT(error.what(), HasSubstr("process " + std::to_string(child)));
+  }
+  ::kill(child, SIGKILL);
+  ::waitpid(child, nullptr, 0);
+  EXPECT_NO_THROW(Store::CreateOrContinue(run, SomeRun()));
+  ::close(ready[0]);
+  ::close(ready[1]);
+}
+
+/// Adds until it is told that there is no room. @returns how many episodes were added, and the error.
+std::pair<int, std::string> AddUntilFull(const std::filesystem::path& run, int most) {
+  int added = 0;
+  try {
+    Store store = Store::CreateOrContinue(run, SomeRun());
+    Declare(store);
+    for (; added < most; ++added) store.Add(SomeEpisode(store, Key(added)));
+  } catch (const Error& error) {
+    EXPECT_EQ(error.exit_code(), ExitCode::kInternal);
+    return {added, error.what()};
+  }
+  return {added, ""};
+}
+
+TEST(StoreFull, OnAFullDiskTheStoreStaysIntactAndSaysSoOnce) {
+  const TempFolder folder;
+  const std::filesystem::path mount = folder / "disk";
+  std::filesystem::create_directory(mount);
+  if (::mount("tmpfs", mount.c_str(), "tmpfs", 0, "size=1m") != 0) GTEST_SKIP() << "mounting a small disk needs root";
+  const auto [added, message] = AddUntilFull(mount / "run", 1000);
+  EXPECT_GT(added, 3);
+  EXPECT_THAT(message, AnyOf(HasSubstr("full"), HasSubstr("No space left")));
+  EXPECT_THAT(message, HasSubstr(mount.string()));
+  ExpectWhole(mount / "run");
+  EXPECT_EQ(Store::Open(mount / "run", Store::Mode::kReadOnly).Episodes().size(), static_cast<std::size_t>(added));
+
+  ASSERT_EQ(::mount("tmpfs", mount.c_str(), "tmpfs", MS_REMOUNT, "size=8m"), 0);  // room again: it goes on
+  AddMissing(mount / "run", added + 5);
+  EXPECT_EQ(Store::Open(mount / "run", Store::Mode::kReadOnly).Episodes().size(), static_cast<std::size_t>(added + 5));
+  EXPECT_EQ(::umount2(mount.c_str(), MNT_DETACH), 0);
+}
+
+TEST(StoreFull, AtTheLimitOfAFilesSizeTheStoreStaysIntact) {
+  const TempFolder folder;
+  const std::filesystem::path run = folder / "run";
+  const pid_t child = InChild([&] {
+    std::signal(SIGXFSZ, SIG_IGN);
+    const rlimit limit{400 << 10, 400 << 10};
+    if (::setrlimit(RLIMIT_FSIZE, &limit) != 0) return 1;
+    const auto [added, message] = AddUntilFull(run, 1000);
+    std::ofstream(folder / "said") << added << " " << message;
+    return 0;
+  });
+  int status = 0;
+  ::waitpid(child, &status, 0);
+  ASSERT_EQ(status, 0);
+  std::ifstream said(folder / "said");
+  std::size_t added = 0;
+  std::string message;
+  said >> added;
+  std::getline(said, message);
+  EXPECT_GT(added, 3u);
+  EXPECT_THAT(message, HasSubstr("evac.sqlite"));
+  ExpectWhole(run);
+  EXPECT_EQ(Store::Open(run, Store::Mode::kReadOnly).Episodes().size(), added);
+}
+
+}  // namespace
+}  // namespace evac
