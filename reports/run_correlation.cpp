@@ -23,9 +23,9 @@ struct Counted {
 };
 
 std::string Verdictless(const std::string& judge, const std::set<std::string>& judges) {
-  const std::string known = judges.empty() ? "none at all" : fmt::format("verdicts of {}", fmt::join(judges, ", "));
-  return fmt::format("judge {}: found {}, wanted verdicts of it; `evac judge RUN --judge {}` gives them", judge, known,
-                     judge);
+  if (judges.empty())
+    return fmt::format("judge {}: found no verdicts at all, wanted those that `evac judge` gives", judge);
+  return fmt::format("judge {}: found verdicts of {}, wanted one of these", judge, fmt::join(judges, ", "));
 }
 
 Counted Read(const Store& store, const std::string& judge) {

@@ -268,6 +268,11 @@ TEST_F(RunCorrelation, AWorldCanBeChosenAndAWrongNameIsNamed) {
   EXPECT_THAT(MessageOf(options), HasSubstr("judge orcale: found verdicts of oracle"));
 }
 
+TEST_F(RunCorrelation, ARunThatNobodyJudgedYetIsRefusedWithWhatToDo) {
+  store_.Add({AnEpisode({"bottle", "7-0", "pick", "good", 0}, "real"), {}, {}, {}});
+  EXPECT_THAT(MessageOf({}), HasSubstr("judge oracle: found no verdicts at all, wanted those that `evac judge` gives"));
+}
+
 TEST_F(RunCorrelation, CountsOnlyPairsThatSucceededOrFailedInBothWorlds) {
   const auto pair = [](const char* state) { return PairKey{"bottle", state, "pick", "good", 0}; };
   Add(pair("7-0"), "real", Label::kSuccess), Add(pair("7-0"), "sim", Label::kFailure);
