@@ -69,6 +69,15 @@ std::string Escaped(std::string_view text) {
   return escaped;
 }
 
+std::string Breakable(std::string_view text) {
+  std::string breakable;
+  for (const char c : Escaped(text)) {
+    breakable += c;
+    if (c == '_' || c == '@' || c == '/') breakable += "<wbr>";
+  }
+  return breakable;
+}
+
 std::string Link(std::string_view relative_path) {
   std::string link;
   for (const char c : relative_path) {

@@ -95,7 +95,7 @@ std::string PointsTable(const WorldComparison& comparison, const std::vector<Poi
     html += fmt::format(
         "<tr><td class=\"key\"><b>{}</b>{}</td><th scope=\"row\">{} <span class=\"quiet\">{}</span></th>"
         "{}{}<td class=\"num\">{}</td></tr>",
-        point.letter, PointIcon(styles[i]), Escaped(point.policy), Escaped(point.task), RateCellOf(point.real),
+        point.letter, PointIcon(styles[i]), Breakable(point.policy), Breakable(point.task), RateCellOf(point.real),
         RateCellOf(point.other), point.real.n);
   }
   return html + "</tbody></table>";

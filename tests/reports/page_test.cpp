@@ -28,7 +28,8 @@ std::vector<std::string> Matches(const std::string& text, const std::string& pat
 
 /// The tags left open, or closed without having been opened.
 std::vector<std::string> UnbalancedTags(std::string page) {
-  static const std::set<std::string> kVoid = {"meta", "img", "link", "br", "input", "path", "line", "rect", "circle"};
+  static const std::set<std::string> kVoid = {"meta",  "wbr",  "img",  "link", "br",
+                                              "input", "path", "line", "rect", "circle"};
   page = std::regex_replace(page, std::regex("<(style|script)>[^]*?</\\1>"), "");
   std::vector<std::string> open;
   const std::regex tag("<(/?)([a-z0-9]+)((?:[^>\"]|\"[^\"]*\")*)>");
@@ -160,6 +161,10 @@ TEST(Page, ARunWithoutEpisodesOrWithoutARealWorldStillHasAPage) {
 TEST(Html, EscapesWhatMarksUpAndWhatIsNoUtf8) {
   EXPECT_EQ(Escaped("<a href='x'>&\"ü€"), "&lt;a href=&#39;x&#39;&gt;&amp;&quot;ü€");
   EXPECT_EQ(Escaped(std::string("a\xff\xc0\x80z\x01", 6)), "a\xEF\xBF\xBD\xEF\xBF\xBD\xEF\xBF\xBDz\xEF\xBF\xBD");
+}
+
+TEST(Html, LongNamesMayBreakBetweenTheirParts) {
+  EXPECT_EQ(Breakable("visual_pick@<1>"), "visual_<wbr>pick@<wbr>&lt;1&gt;");
 }
 
 TEST(Html, AnchorsOfDifferentNamesDiffer) {
