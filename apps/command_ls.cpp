@@ -36,8 +36,25 @@ bool IsWanted(const Episode& episode, const LsArguments& arguments) {
          fits(arguments.policy, episode.key.pair.policy) && (!arguments.failed || IsFailure(episode.stop));
 }
 
+/// A name that nothing has is a slip of the keyboard, not a wish for an empty list.
+void DemandKnown(const char* option, const std::string& wanted, const std::set<std::string>& known) {
+  if (wanted.empty() || known.contains(wanted)) return;
+  throw InvalidInput("{}: found '{}', wanted one of: {}", option, wanted, fmt::join(known, ", "));
+}
+
+void Check(const LsArguments& arguments, const Store& store) {
+  std::set<std::string> worlds, tasks, policies;
+  for (const WorldInfo& world : store.Worlds()) worlds.insert(world.name);
+  for (const Task& task : store.Tasks()) tasks.insert(task.id);
+  for (const PolicyInfo& policy : store.Policies()) policies.insert(policy.name);
+  DemandKnown("--world", arguments.world, worlds);
+  DemandKnown("--task", arguments.task, tasks);
+  DemandKnown("--policy", arguments.policy, policies);
+}
+
 std::vector<Listed> List(const LsArguments& arguments) {
   const Store store = Store::Open(arguments.run, Store::Mode::kReadOnly);
+  Check(arguments, store);
   const std::vector<Episode> episodes = store.Episodes();  // before the verdicts: each verdict read has its episode
   const auto verdicts = store.CurrentVerdicts();
   std::vector<Listed> list;
@@ -120,7 +137,7 @@ void PrintTable(const std::vector<Listed>& list) {
     worlds.insert(episode.key.world);
     failed += IsFailure(episode.stop);
     judged += !labels.empty();
-    if (IsFailure(episode.stop)) fmt::print(stderr, "failed: {}: {}\n", episode.key.Id(), episode.failure);
+    if (IsFailure(episode.stop)) fmt::print("{}failed: {}: {}\n", failed == 1 ? "\n" : "", episode.key.Id(), episode.failure);
   }
   const auto counted = [](std::size_t count, const char* one, const char* many) { return fmt::format("{} {}", count, count == 1 ? one : many); };
   fmt::print("\n{} ({}, {}, {}), {} failed, {} judged\n", counted(list.size(), "episode", "episodes"), counted(tasks.size(), "task", "tasks"),
@@ -131,15 +148,17 @@ void PrintTable(const std::vector<Listed>& list) {
 
 void AddLs(CLI::App& app, ExitCode& exit_code) {
   const auto arguments = std::make_shared<LsArguments>();
-  CLI::App* command = app.add_subcommand("ls", "List the episodes of a run, also while it is running");
-  command->add_option("run", arguments->run, "The run's folder")->required();
-  command->add_flag("--json", arguments->json, "An array with one object per episode");
-  command->add_flag("--failed", arguments->failed, "Only episodes that failed (an error, not an unsuccessful attempt)");
-  command->add_option("--world", arguments->world, "Only this world's");
-  command->add_option("--task", arguments->task, "Only this task's");
-  command->add_option("--policy", arguments->policy, "Only this policy's, with all its checkpoints");
+  CLI::App* command = app.add_subcommand("ls", "List the episodes of a run, also while it is running.");
+  command->add_option("RUN", arguments->run, "folder of a run")->required();
+  command->add_flag("--json", arguments->json, "an array with one object per episode");
+  command->add_flag("--failed", arguments->failed, "only episodes that failed (an error, not an unsuccessful attempt)");
+  command->add_option("--world", arguments->world, "only this world's");
+  command->add_option("--task", arguments->task, "only this task's");
+  command->add_option("--policy", arguments->policy, "only this policy's, with all its checkpoints");
   command->footer(
-      "Examples:\n  evac ls out/demo --world sim\n  evac ls out/demo --failed\n"
+      "Examples:\n"
+      "  evac ls out/demo --world sim\n"
+      "  evac ls out/demo --failed\n"
       "  evac ls out/demo --json | jq '.[] | select(.verdicts.oracle == \"success\") | .video'");
   command->callback([arguments, &exit_code] {
     const std::vector<Listed> list = List(*arguments);
