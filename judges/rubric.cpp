@@ -116,8 +116,8 @@ std::string Describe(const Condition& condition, double value) {
   std::string wanted;
   if (condition.above) wanted = fmt::format("above {}", *condition.above);
   if (condition.below) wanted += fmt::format("{}below {}", wanted.empty() ? "" : " and ", *condition.below);
-  return fmt::format("{} of {}{} was {:.3g} {}, wanted {}", condition.kind, condition.a,
-                     kind->needs_b ? " and " + condition.b : "", value, kind->unit, wanted);
+  return fmt::format("{} of {}{} was {} {}, wanted {}", condition.kind, condition.a,
+                     kind->needs_b ? " and " + condition.b : "", std::round(value * 1000) / 1000, kind->unit, wanted);
 }
 
 StageOutcome Follow(const Stage& stage, const TrackView& track, std::size_t from) {
