@@ -5,6 +5,7 @@
 #include <cstdlib>
 
 #include "core/error.h"
+#include "worldmodel/sim/box_contacts.h"
 
 namespace evac::sim {
 
@@ -45,7 +46,8 @@ Eigen::Isometry3d PoseOf(const mjtNum* position, const mjtNum* rotation) {
   return pose;
 }
 
-void QuietenMujoco() {
+void PrepareMujoco() {
+  UseSoundBoxContacts();
   mju_user_warning = [](const char*) {};
   mju_user_error = [](const char* message) {  // may not return and may not throw through C
     std::fprintf(stderr, "MuJoCo: %s\n", message);

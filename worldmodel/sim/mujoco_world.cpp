@@ -27,7 +27,7 @@ struct MujocoWorld::Stage {
 
 MujocoWorld::MujocoWorld(MujocoWorldOptions options) : options_(std::move(options)), profile_(ReadProfile(options_.profile)) {
   if (options_.threads < 1 || options_.threads > 256) throw InvalidInput("world {}: found threads {}, wanted 1 … 256", options_.name, options_.threads);
-  QuietenMujoco();
+  PrepareMujoco();
   workers_ = std::make_unique<Workers>(options_.threads);
 }
 

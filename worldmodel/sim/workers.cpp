@@ -1,8 +1,12 @@
 #include "worldmodel/sim/workers.h"
 
+#include <cstdlib>
+
 namespace evac::sim {
 
 Workers::Workers(int threads) {
+  // Mesa's software rasteriser would start threads of its own in each context; ours already use every core. A user's choice stands.
+  setenv("LP_NUM_THREADS", "0", 0);
   for (int i = 0; i < threads; ++i) threads_.emplace_back([this] { Live(); });
   std::unique_lock lock(mutex_);
   changed_.wait(lock, [&] { return ready_ == threads; });
