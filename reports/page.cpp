@@ -40,7 +40,7 @@ std::string MissingVerdicts(const RunSummary& summary) {
     if (judge != summary.options.judge) others += (others.empty() ? "" : ", ") + Escaped(judge);
   }
   return fmt::format(
-      "<p class=\"notice\" role=\"note\"><strong>{} no verdict by {}.</strong> They are in no rate. "
+      "<p class=\"notice\" role=\"note\"><strong>{} no verdict by {}.</strong> No rate counts such. "
       "<code>evac judge RUN --judge {}</code>, then <code>evac report RUN</code>, adds them.{}</p>",
       unjudged == 1 ? "1 episode has" : fmt::format("{} episodes have", unjudged), Escaped(summary.options.judge),
       Escaped(summary.options.judge), others.empty() ? "" : " Other judges have spoken: " + others + ".");

@@ -45,11 +45,11 @@ std::string Tasks(const RunSummary& summary) {
     }
     std::string seed_list;
     for (const std::uint64_t seed : seeds) seed_list += (seed_list.empty() ? "" : ", ") + std::to_string(seed);
-    html +=
-        fmt::format("<p><b>{}</b>, {}{}; seeds {}; rubric {}: {}</p>", Escaped(task.id),
-                    Counted(static_cast<std::int64_t>(states.size()), "initial state"),
-                    states.empty() ? "" : fmt::format(", {} … {}", Escaped(*states.begin()), Escaped(*states.rbegin())),
-                    seed_list.empty() ? "none" : seed_list, Code(task.rubric.version), Escaped(task.rubric.success));
+    html += fmt::format(
+        "<p><b>{}</b>, {}{}; seeds {}; rubric {}: {}</p>", Escaped(task.id),
+        Counted(static_cast<std::int64_t>(states.size()), "initial state"),
+        states.size() < 2 ? "" : fmt::format(", {} … {}", Escaped(*states.begin()), Escaped(*states.rbegin())),
+        seed_list.empty() ? "none" : seed_list, Code(task.rubric.version), Escaped(task.rubric.success));
   }
   return html;
 }

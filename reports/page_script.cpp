@@ -22,7 +22,7 @@ if (filters) {
       if (fits) ++fit;
       clip.hidden = !fits || (fit > first && !everything);
     }
-    output.textContent = fit === clips.length ? `${fit} clips` : `${fit} of ${clips.length} clips`;
+    output.textContent = `${fit === clips.length ? "" : `${fit} of `}${clips.length} clip${clips.length === 1 ? "" : "s"}`;
     more.hidden = everything || fit <= first;
     more.textContent = `Show all ${fit}`;
   };
