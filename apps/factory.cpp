@@ -51,7 +51,7 @@ PolicyProcessOptions ProcessOptions(const SuitePolicy& policy, const Suite& suit
   const fs::path log = run_folder / "logs" / (policy.name + "@" + policy.checkpoint + ".log");
   fs::create_directories(log.parent_path());
   return {.command = CommandLine(policy, suite),
-          .environment = {{"EVAC_LCM_URL", address.url}, {"EVAC_TOKEN", address.token}},
+          .environment = {{"EVAC_LCM_URL", address.url}, {"EVAC_TOKEN", address.token}, {"EVAC_CHUNK_SIZE", std::to_string(suite.chunk_size)}},
           .working_directory = fs::absolute(suite.path).parent_path(),
           .log = log};
 }
