@@ -23,6 +23,7 @@ void CheckImageHeader(const image_t& m) {
 
 /// Width and height as a JPEG's own header states them, so that no hostile size is ever decoded; {0, 0} if it has none.
 cv::Size JpegSize(std::span<const std::uint8_t> bytes) {
+  if (bytes.size() < 2 || bytes[0] != 0xFF || bytes[1] != 0xD8) return {0, 0};
   std::size_t at = 2;  // behind the start-of-image marker
   while (at + 9 <= bytes.size() && bytes[at] == 0xFF) {
     const int marker = bytes[at + 1];

@@ -25,7 +25,7 @@ namespace evac {
 template <typename Message>
 std::vector<std::uint8_t> Encoded(const Message& message) {
   std::vector<std::uint8_t> bytes(message.getEncodedSize());
-  message.encode(bytes.data(), 0, static_cast<int>(bytes.size()));
+  bytes.resize(message.encode(bytes.data(), 0, static_cast<int>(bytes.size())));  // less where a text holds a zero byte
   return bytes;
 }
 

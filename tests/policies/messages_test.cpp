@@ -3,6 +3,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <array>
+
 #include "core/error.h"
 #include "core/geometry.h"
 #include "tests/policies/wire_support.h"
@@ -58,6 +60,15 @@ TEST(Messages, AnAnnouncedSizeThatTheBytesCannotHoldIsRefusedBeforeItIsAllocated
   for (const std::uint8_t first : {0x7F, 0xFF}) {  // two thousand million, and a negative count
     bytes[8] = first;
     EXPECT_FALSE(Decoded<image_t>(bytes).has_value());
+  }
+}
+
+TEST(Messages, ATextOfImpossibleLengthIsRefused) {
+  std::vector<std::uint8_t> bytes = Encoded(bye_t{.client = "harness"});
+  ASSERT_TRUE(Decoded<bye_t>(bytes).has_value());
+  for (const std::array<std::uint8_t, 4> length : {std::array<std::uint8_t, 4>{0x80, 0, 0, 0}, {0xFF, 0xFF, 0xFF, 0xFF}, {0, 0, 0, 0}, {0, 0, 0, 9}}) {
+    std::copy(length.begin(), length.end(), bytes.begin() + 8);
+    EXPECT_FALSE(Decoded<bye_t>(bytes).has_value());
   }
 }
 
