@@ -1,9 +1,12 @@
 #include "core/config.h"
 
 #include <algorithm>
+#include <cctype>
+#include <cmath>
 #include <cstdint>
-#include <limits>
+#include <set>
 #include <sstream>
+#include <type_traits>
 
 #include "core/file.h"
 #include "core/hash.h"
@@ -52,17 +55,48 @@ const char* kTypeName<std::vector<std::string>> = "a list of texts";
 template <>
 const char* kTypeName<std::vector<std::uint64_t>> = "a list of whole numbers, 0 or more";
 
+/// One line, whatever is in it.
+std::string Escaped(const std::string& text) {
+  std::string escaped;
+  for (const char c : text) {
+    if (c == '\n') {
+      escaped += "\\n";
+    } else {
+      if (c == '\\') escaped += c;
+      escaped += c;
+    }
+  }
+  return escaped;
+}
+
 /// Sorted keys, one line a scalar: what two files with the same content agree on.
 void WriteCanonical(const YAML::Node& node, const std::string& field, std::ostringstream& out) {
   if (node.IsMap()) {
     std::vector<std::string> keys;
     for (const auto& item : node) keys.push_back(item.first.Scalar());
     std::sort(keys.begin(), keys.end());
-    for (const std::string& key : keys) WriteCanonical(node[key], field + "." + key, out);
+    for (const std::string& key : keys) WriteCanonical(node[key], field + "." + Escaped(key), out);
+    if (keys.empty()) out << field << "={}\n";
   } else if (node.IsSequence()) {
     for (std::size_t i = 0; i < node.size(); ++i) WriteCanonical(node[i], field + "." + std::to_string(i), out);
+    if (node.size() == 0) out << field << "=[]\n";
   } else {
-    out << field << "=" << (node.IsScalar() ? node.Scalar() : "~") << "\n";
+    out << field << "=" << (node.IsScalar() ? Escaped(node.Scalar()) : "~") << "\n";
+  }
+}
+
+/// YAML allows keys that are lists; its parser lets the first of two equal keys win. Neither can be meant.
+void DemandPlainKeys(const YAML::Node& node, const std::filesystem::path& file) {
+  std::set<std::string> keys;
+  for (const auto& item : node) {
+    if (!node.IsMap()) {
+      DemandPlainKeys(item, file);
+      continue;
+    }
+    const int line = item.first.Mark().line + 1;
+    if (!item.first.IsScalar()) throw InvalidInput("{}:{}: found {} as a key, wanted a text", file.string(), line, Shown(item.first));
+    if (!keys.insert(item.first.Scalar()).second) throw InvalidInput("{}:{}: field {} is given twice", file.string(), line, item.first.Scalar());
+    DemandPlainKeys(item.second, file);
   }
 }
 
@@ -70,15 +104,24 @@ YAML::Node Parse(const std::string& text, const std::filesystem::path& file) {
   try {
     YAML::Node node = YAML::Load(text);
     if (!node.IsMap()) throw InvalidInput("{}: found {}, wanted a YAML mapping (key: value)", file.string(), Shown(node));
+    DemandPlainKeys(node, file);
     return node;
   } catch (const YAML::Exception& error) {
     throw InvalidInput("{}:{}: not YAML: {}", file.string(), error.mark.line + 1, error.msg);
   }
 }
 
+/// YAML has .inf and .nan; no field of ours does.
+template <typename T>
+bool IsFinite(const T& value) {
+  if constexpr (std::is_same_v<T, double>) return std::isfinite(value);
+  if constexpr (std::is_same_v<T, std::vector<double>>) return std::all_of(value.begin(), value.end(), [](double x) { return std::isfinite(x); });
+  return true;
+}
+
 YAML::Node Step(const YAML::Node& node, const std::string& key) {
   if (node.IsMap()) return node[key];
-  const bool is_index = !key.empty() && key.size() < 7 && std::all_of(key.begin(), key.end(), ::isdigit);
+  const bool is_index = !key.empty() && key.size() < 7 && std::all_of(key.begin(), key.end(), [](unsigned char c) { return std::isdigit(c); });
   if (node.IsSequence() && is_index && std::stoul(key) < node.size()) return node[std::stoul(key)];
   return YAML::Node(YAML::NodeType::Undefined);
 }
@@ -131,9 +174,12 @@ std::string Config::FieldName(const std::string& key) const {
 
 std::string Config::Where(const std::string& key) const {
   const YAML::Node child = key.empty() ? node_ : Child(key);
-  const int line = child.IsDefined() ? child.Mark().line : node_.Mark().line;
+  const YAML::Mark mark = child.IsDefined() ? child.Mark() : node_.Mark();
   const std::string field = FieldName(key);
-  return fmt::format("{}:{}{}", file_.string(), line + 1, field.empty() ? "" : ": field " + field);
+  // Only the whole page begins at the first letter; a field that does is a text of its own, from --set.
+  const bool is_page = child.IsDefined() ? field.empty() : field_.empty();
+  const std::string line = mark.pos == 0 && !is_page ? " (--set)" : fmt::format(":{}", mark.line + 1);
+  return fmt::format("{}{}{}", file_.string(), line, field.empty() ? "" : ": field " + field);
 }
 
 bool Config::Has(const std::string& key) const {
@@ -146,14 +192,20 @@ void Config::ThrowWrongType(const std::string& key, const YAML::Node& found, con
 }
 
 template <typename T>
+T Config::Converted(const std::string& key, const YAML::Node& node) const {
+  try {
+    const T value = node.as<T>();
+    if (IsFinite(value)) return value;
+  } catch (const YAML::Exception&) {  // told below
+  }
+  ThrowWrongType(key, node, kTypeName<T>);
+}
+
+template <typename T>
 T Config::Get(const std::string& key) const {
   const YAML::Node child = Child(key);
   if (!child.IsDefined() || child.IsNull()) ThrowWrongType(key, child, kTypeName<T>);
-  try {
-    return child.as<T>();
-  } catch (const YAML::Exception&) {
-    ThrowWrongType(key, child, kTypeName<T>);
-  }
+  return Converted<T>(key, child);
 }
 
 template <typename T>
@@ -163,11 +215,7 @@ T Config::Get(const std::string& key, const T& otherwise) const {
 
 template <typename T>
 T Config::Value() const {
-  try {
-    return node_.as<T>();
-  } catch (const YAML::Exception&) {
-    ThrowWrongType("", node_, kTypeName<T>);
-  }
+  return Converted<T>("", node_);
 }
 
 #define EVAC_CONFIG_TYPE(T)                                        \
@@ -214,6 +262,7 @@ std::filesystem::path Config::Path(const std::string& key) const {
 void Config::AllowOnly(std::initializer_list<const char*> known) const {
   for (const std::string& key : Keys()) {
     if (std::find(known.begin(), known.end(), key) != known.end()) continue;
+    if (known.size() == 0) throw InvalidInput("{}: there is no such field", Where(key));
     const auto nearest = std::min_element(known.begin(), known.end(),
                                           [&](const char* a, const char* b) { return EditDistance(key, a) < EditDistance(key, b); });
     throw InvalidInput("{}: there is no such field; the nearest is '{}'", Where(key), *nearest);

@@ -70,6 +70,8 @@ class Config {
   Config(YAML::Node node, std::filesystem::path file, std::string field);
   YAML::Node Child(const std::string& key) const;
   std::string FieldName(const std::string& key) const;
+  template <typename T>
+  T Converted(const std::string& key, const YAML::Node& node) const;
   [[noreturn]] void ThrowWrongType(const std::string& key, const YAML::Node& found, const char* wanted) const;
 
   YAML::Node node_;

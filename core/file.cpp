@@ -29,7 +29,7 @@ void SyncFolder(const fs::path& folder) { Sync(folder.empty() ? fs::path(".") : 
 
 std::string ReadFile(const fs::path& path) {
   std::ifstream file(path, std::ios::binary);
-  if (!file || fs::is_directory(path)) throw InvalidInput("{}: cannot be read: {}", path.string(), std::strerror(errno ? errno : EISDIR));
+  if (!file || fs::is_directory(path)) throw InvalidInput("{}: cannot be read: {}", path.string(), std::strerror(file ? EISDIR : errno));
   std::ostringstream bytes;
   bytes << file.rdbuf();
   return std::move(bytes).str();
@@ -52,11 +52,17 @@ void MakeFolders(const fs::path& folder) {
 
 void WriteFileAtomically(const fs::path& path, std::string_view bytes) {
   const fs::path part = path.string() + ".tmp";
-  std::ofstream file(part, std::ios::binary | std::ios::trunc);
-  file.write(bytes.data(), static_cast<std::streamsize>(bytes.size()));
-  file.close();
-  if (!file) throw InternalError("{}: cannot be written: {}", path.string(), std::strerror(errno));
-  SyncAndRename(part, path);
+  try {
+    std::ofstream file(part, std::ios::binary | std::ios::trunc);
+    file.write(bytes.data(), static_cast<std::streamsize>(bytes.size()));
+    file.close();
+    if (!file) throw InternalError("{}: cannot be written: {}", path.string(), std::strerror(errno));
+    SyncAndRename(part, path);
+  } catch (const Error&) {
+    std::error_code ignored;
+    fs::remove(part, ignored);
+    throw;
+  }
 }
 
 }  // namespace evac

@@ -40,7 +40,9 @@ std::string Sha256Hex(std::string_view bytes) {
 
 std::string Sha256HexOfFile(const std::filesystem::path& path) {
   std::ifstream file(path, std::ios::binary);
-  if (!file) throw InvalidInput("{}: cannot be read: {}", path.string(), std::strerror(errno));
+  if (!file || std::filesystem::is_directory(path)) {
+    throw InvalidInput("{}: cannot be read: {}", path.string(), std::strerror(file ? EISDIR : errno));
+  }
   const Context context = NewSha256();
   std::array<char, 1 << 16> buffer;
   while (file.read(buffer.data(), buffer.size()), file.gcount() > 0) {

@@ -1,0 +1,164 @@
+#include "core/config.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cstdint>
+#include <set>
+
+#include "core/file.h"
+#include "tests/support/temp_folder.h"
+
+namespace evac {
+namespace {
+
+using testing::AllOf;
+using testing::ElementsAre;
+using testing::HasSubstr;
+using testing::IsEmpty;
+
+constexpr const char* kPage = R"(# a comment
+name: demo
+lanes: 4
+big: 18446744073709551615
+friction: 0.75
+light: yes
+empty:
+worlds:
+  - {name: real, images: [1.5, 2]}
+  - {name: sim}
+nested:
+  deep: {deeper: 1}
+)";
+
+Config Page() { return Config::FromText(kPage, "suites/page.yaml"); }
+
+template <typename Call>
+std::string MessageOf(const Call& call) {
+  try {
+    call();
+  } catch (const Error& error) {
+    EXPECT_EQ(error.exit_code(), ExitCode::kInvalidInput);
+    return error.what();
+  }
+  return "no error";
+}
+
+TEST(Config, FieldsComeBackAsTheTypeAskedFor) {
+  const Config page = Page();
+  EXPECT_EQ(page.Get<std::string>("name"), "demo");
+  EXPECT_EQ(page.Get<int>("lanes"), 4);
+  EXPECT_EQ(page.Get<double>("lanes"), 4.0);
+  EXPECT_EQ(page.Get<std::uint64_t>("big"), ~std::uint64_t{0});
+  EXPECT_EQ(page.Get<double>("friction"), 0.75);
+  EXPECT_TRUE(page.Get<bool>("light"));
+  EXPECT_EQ(page.Get<int>("absent", 7), 7);
+  EXPECT_EQ(page.Get<int>("empty", 7), 7);
+  EXPECT_EQ(page.Section("nested").Section("deep").Get<int>("deeper"), 1);
+  EXPECT_THAT(page.List("worlds").at(0).Get<std::vector<double>>("images"), ElementsAre(1.5, 2));
+  EXPECT_THAT(page.List("absent"), IsEmpty());
+  EXPECT_THAT(page.Section("nested").Keys(), ElementsAre("deep"));
+}
+
+TEST(Config, AWrongFieldIsNamedWithFileLineFoundAndWanted) {
+  const Config page = Page();
+  EXPECT_THAT(MessageOf([&] { page.Get<int>("name"); }),
+              AllOf(HasSubstr("suites/page.yaml:2: field name"), HasSubstr("found 'demo'"), HasSubstr("a whole number")));
+  EXPECT_THAT(MessageOf([&] { page.Get<int>("friction"); }), HasSubstr("found '0.75'"));
+  EXPECT_THAT(MessageOf([&] { page.Get<int>("big"); }), HasSubstr("found '18446744073709551615'"));
+  EXPECT_THAT(MessageOf([&] { page.Get<bool>("lanes"); }), HasSubstr("true or false"));
+  EXPECT_THAT(MessageOf([&] { page.Get<std::string>("worlds"); }), HasSubstr("found a list"));
+  EXPECT_THAT(MessageOf([&] { page.Get<std::string>("absent"); }), AllOf(HasSubstr("field absent"), HasSubstr("found nothing")));
+  EXPECT_THAT(MessageOf([&] { page.List("worlds").at(1).Get<int>("name"); }), HasSubstr("suites/page.yaml:10: field worlds.1.name"));
+  EXPECT_THAT(MessageOf([&] { page.Section("lanes"); }), HasSubstr("a mapping"));
+  EXPECT_THAT(MessageOf([&] { page.List("lanes"); }), HasSubstr("a list"));
+  EXPECT_THAT(MessageOf([&] { page.Require(false, "lanes", "fewer than 3"); }), HasSubstr("page.yaml:3: field lanes: found '4', wanted fewer than 3"));
+}
+
+TEST(Config, NumbersAreFiniteAndSeedsAreNotNegative) {
+  const Config page = Config::FromText("a: .inf\nb: .nan\nc: [1, .inf]\nd: -1\ne: 1.5\n", "p");
+  EXPECT_THAT(MessageOf([&] { page.Get<double>("a"); }), HasSubstr("found '.inf', wanted a number"));
+  EXPECT_THAT(MessageOf([&] { page.Get<double>("b"); }), HasSubstr("found '.nan'"));
+  EXPECT_THAT(MessageOf([&] { page.Get<std::vector<double>>("c"); }), HasSubstr("a list of numbers"));
+  EXPECT_THAT(MessageOf([&] { page.Get<std::uint64_t>("d"); }), HasSubstr("0 or more"));
+  EXPECT_THAT(MessageOf([&] { page.Get<std::uint64_t>("e"); }), HasSubstr("0 or more"));
+}
+
+TEST(Config, AnUnknownFieldIsNamedWithTheNearestKnownOne) {
+  EXPECT_THAT(MessageOf([&] { Page().AllowOnly({"name", "lanse", "big", "friction", "light", "empty", "worlds", "nested"}); }),
+              AllOf(HasSubstr("page.yaml:3: field lanes"), HasSubstr("the nearest is 'lanse'")));
+  EXPECT_THAT(MessageOf([&] { Page().AllowOnly({}); }), HasSubstr("field name"));
+  EXPECT_NO_THROW(Page().Section("nested").AllowOnly({"deep", "more"}));
+}
+
+TEST(Config, WhatIsNoMappingIsRefusedWithItsLine) {
+  EXPECT_THAT(MessageOf([] { Config::FromText("a: 1\nb: [1\n", "p.yaml"); }), AllOf(HasSubstr("p.yaml:"), HasSubstr("not YAML")));
+  EXPECT_THAT(MessageOf([] { Config::FromText("- a\n- b\n", "p.yaml"); }), HasSubstr("found a list"));
+  EXPECT_THAT(MessageOf([] { Config::FromText("", "p.yaml"); }), HasSubstr("found nothing"));
+  EXPECT_THAT(MessageOf([] { Config::FromText("just words", "p.yaml"); }), HasSubstr("found 'just words'"));
+  EXPECT_THAT(MessageOf([] { Config::FromText("a: {b: 1,\n  c: 2,\n  b: 3}\n", "p.yaml"); }), HasSubstr("p.yaml:3: field b is given twice"));
+  EXPECT_THAT(MessageOf([] { Config::FromText("x:\n- {[1, 2]: 3}\n", "p.yaml"); }), HasSubstr("p.yaml:2: found a list as a key"));
+  EXPECT_THAT(MessageOf([] { Config::FromFile("no/such/page.yaml"); }), HasSubstr("no/such/page.yaml"));
+}
+
+TEST(Config, AnAssignmentReplacesAFieldAnItemOrAddsAField) {
+  Config page = Page();
+  page.Set("lanes=9");
+  page.Set("worlds.1.name=dream");
+  page.Set("worlds.0.images.1=3.5");
+  page.Set("nested.deep.new={x: [1, 2]}");
+  page.Set("text=a=b");
+  EXPECT_EQ(page.Get<int>("lanes"), 9);
+  EXPECT_EQ(page.List("worlds").at(1).Get<std::string>("name"), "dream");
+  EXPECT_EQ(page.List("worlds").at(0).Get<std::string>("name"), "real");
+  EXPECT_THAT(page.List("worlds").at(0).Get<std::vector<double>>("images"), ElementsAre(1.5, 3.5));
+  EXPECT_THAT(page.Section("nested").Section("deep").Section("new").Get<std::vector<std::uint64_t>>("x"), ElementsAre(1, 2));
+  EXPECT_EQ(page.Get<std::string>("text"), "a=b");
+  EXPECT_EQ(page.Get<std::string>("name"), "demo");
+}
+
+TEST(Config, AnAssignmentWithoutAPlaceOrAValueIsRefused) {
+  for (const char* assignment : {"lanes", "=4", "absent.x=1", "worlds.2.name=a", "worlds.9=a", "worlds.x=a", "lanes.x=1", "a=[1"}) {
+    Config page = Page();
+    const std::string before = page.Canonical();
+    EXPECT_THAT(MessageOf([&] { page.Set(assignment); }), HasSubstr(assignment));
+    EXPECT_EQ(page.Canonical(), before);
+  }
+}
+
+TEST(Config, AFieldFromTheCommandLineIsNotBlamedOnALineOfTheFile) {
+  Config page = Page();
+  page.Set("lanes=many");
+  EXPECT_THAT(MessageOf([&] { page.Get<int>("lanes"); }), HasSubstr("suites/page.yaml (--set): field lanes: found 'many'"));
+}
+
+TEST(Config, AMissingFieldIsMissedInTheFile) {
+  const Config page = Config::FromText("a: 1\n", "p.yaml");
+  EXPECT_THAT(MessageOf([&] { page.Get<int>("b"); }), HasSubstr("p.yaml:1: field b: found nothing"));
+}
+
+TEST(Config, TheCanonicalTextIsAboutContentAlone) {
+  const auto canonical = [](const std::string& text) { return Config::FromText(text, "p").Canonical(); };
+  EXPECT_EQ(canonical("a: 1\nb: {c: x, d: [1, 2]}\n"), canonical("# layout\nb:\n  d:\n  - 1\n  - 2\n  c: 'x'\na:   1\n"));
+  const char* const different[] = {"a: 1", "a: 2", "b: 1", "a: [1]", "a: {b: 1}", "a: [1, 2]", "a: [2, 1]", "a: {}", "a: []", "a:",
+                                   "a: \"1\\n.b=1\"", "a: \"1\\\\n.b=1\"", "a: 1\nb: 1", "c: {}\na: 1"};
+  std::set<std::string> seen;
+  for (const char* text : different) EXPECT_TRUE(seen.insert(canonical(text)).second) << text;
+}
+
+TEST(Config, ItsTextMeansTheSameAgain) {
+  Config page = Page();
+  page.Set("worlds.1.name=\"7\"");
+  EXPECT_EQ(Config::FromText(page.Text(), "again").Canonical(), page.Canonical());
+}
+
+TEST(Config, PathsAreRelativeToTheFile) {
+  const TempFolder folder;
+  WriteFileAtomically(folder / "p.yaml", "a: data/x\nb: /data/x\n");
+  const Config page = Config::FromFile(folder / "p.yaml");
+  EXPECT_EQ(page.Path("a"), folder / "data/x");
+  EXPECT_EQ(page.Path("b"), "/data/x");
+}
+
+}  // namespace
+}  // namespace evac
