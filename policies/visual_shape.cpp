@@ -6,6 +6,7 @@
 #include <opencv2/imgproc.hpp>
 
 #include "core/geometry.h"
+#include "policies/perception.h"
 
 namespace evac {
 namespace {
@@ -75,32 +76,80 @@ Eigen::Isometry3d BaseFromObject(const Placement& placement, double height_m) {
   return pose;
 }
 
+namespace {
+
+/// Weighted mean of the pixel centres, or nothing if there is nothing.
+std::optional<Eigen::Vector2d> Centroid(const cv::Mat& cover) {
+  const cv::Moments m = cv::moments(cover);
+  if (m.m00 <= 0) return std::nullopt;
+  return Eigen::Vector2d(m.m10 / m.m00 + 0.5, m.m01 / m.m00 + 0.5);
+}
+
+struct Viewpoint {
+  const Camera& camera;
+  const Eigen::Isometry3d& base_from_camera;
+};
+
+/// The search for one placement; vectors are x, y (metres) and yaw (radians).
+struct Search {
+  const cv::Mat& cover;
+  const Shape& shape;
+  Viewpoint view;
+  const FitOptions& options;
+
+  cv::Mat Drawn(const Eigen::Vector3d& p) const {
+    return Silhouette(shape, view.camera, view.base_from_camera.inverse() * BaseFromObject({p.head<2>(), p.z()}, options.height_m));
+  }
+  double OverlapAt(const Eigen::Vector3d& p) const { return Overlap(cover, Drawn(p)); }
+
+  /// Moved so that the silhouette's middle lies on the cover's.
+  Eigen::Vector3d Centred(Eigen::Vector3d p) const {
+    const std::optional<Eigen::Vector2d> wanted_px = Centroid(cover), found_px = Centroid(Drawn(p));
+    if (!wanted_px || !found_px) return p;
+    const auto wanted_m = OnPlane(view.camera, view.base_from_camera, *wanted_px, options.height_m);
+    const auto found_m = OnPlane(view.camera, view.base_from_camera, *found_px, options.height_m);
+    if (wanted_m && found_m) p.head<2>() += (*wanted_m - *found_m).head<2>();
+    return p;
+  }
+
+  /// The best of where one expects it and, for some yaws around that, where the middles agree.
+  Eigen::Vector3d BestStart(const Placement& expected) const {
+    Eigen::Vector3d best(expected.xy_m.x(), expected.xy_m.y(), expected.yaw_rad);
+    for (const int turn : {0, -3, -2, -1, 1, 2, 3}) {
+      if (turn != 0 && options.reach_yaw_rad == 0) break;
+      const Eigen::Vector3d turned(expected.xy_m.x(), expected.xy_m.y(), expected.yaw_rad + turn * options.reach_yaw_rad);
+      const Eigen::Vector3d centred = Centred(Centred(turned));
+      if (OverlapAt(centred) > OverlapAt(best)) best = centred;
+    }
+    return best;
+  }
+
+  ShapeFit Climb(Eigen::Vector3d best) const {
+    double overlap = OverlapAt(best);
+    const Eigen::Vector3d step(options.reach_m, options.reach_m, options.reach_yaw_rad);
+    for (double share = 1; share >= kFinestShare;) {
+      bool climbed = false;
+      for (int i = 0; i < 6; ++i) {
+        Eigen::Vector3d candidate = best;
+        candidate[i / 2] += (i % 2 == 0 ? share : -share) * step[i / 2];
+        const double found = OverlapAt(candidate);
+        if (found <= overlap) continue;
+        best = candidate;
+        overlap = found;
+        climbed = true;
+      }
+      if (!climbed) share /= 2;
+    }
+    return {{best.head<2>(), best.z()}, overlap};
+  }
+};
+
+}  // namespace
+
 ShapeFit FitShape(const cv::Mat& cover, const Shape& shape, const Camera& camera, const Eigen::Isometry3d& base_from_camera,
                   const ShapeFit& start, const FitOptions& options) {
-  const Eigen::Isometry3d camera_from_base = base_from_camera.inverse();
-  const auto fit_at = [&](const Eigen::Vector3d& p) {
-    const Placement placement{p.head<2>(), p.z()};
-    return Overlap(cover, Silhouette(shape, camera, camera_from_base * BaseFromObject(placement, options.height_m)));
-  };
-  Eigen::Vector3d best(start.placement.xy_m.x(), start.placement.xy_m.y(), start.placement.yaw_rad);
-  double overlap = fit_at(best);
-  Eigen::Vector3d step(options.reach_m, options.reach_m, options.reach_yaw_rad);
-  for (double share = 1; share >= kFinestShare;) {
-    bool climbed = false;
-    for (int i = 0; i < 6; ++i) {
-      const int axis = i / 2;
-      if (step[axis] == 0) continue;
-      Eigen::Vector3d candidate = best;
-      candidate[axis] += (i % 2 == 0 ? share : -share) * step[axis];
-      const double found = fit_at(candidate);
-      if (found <= overlap) continue;
-      best = candidate;
-      overlap = found;
-      climbed = true;
-    }
-    if (!climbed) share /= 2;
-  }
-  return {{best.head<2>(), best.z()}, overlap};
+  const Search search{cover, shape, {camera, base_from_camera}, options};
+  return search.Climb(search.BestStart(start.placement));
 }
 
 }  // namespace evac

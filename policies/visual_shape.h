@@ -47,8 +47,9 @@ struct FitOptions {
   double height_m = 0;        ///< of the object's origin, base frame
 };
 
-/// Climbs from `start` to the placement whose silhouette agrees best with `cover` (pattern search after Hooke and Jeeves
-/// 1961: steps along each coordinate, halved when none helps). Sub-pixel, since cover is a share and not a yes or no.
+/// The placement whose silhouette agrees best with `cover`: from the best of `start` and of those, at yaws up to thrice the reach
+/// away, whose middle lies on the cover's, it climbs (pattern search after Hooke and Jeeves 1961: steps along each coordinate,
+/// halved when none helps). Sub-pixel, since cover is a share and not a yes or no.
 ShapeFit FitShape(const cv::Mat& cover, const Shape& shape, const Camera& camera, const Eigen::Isometry3d& base_from_camera,
                   const ShapeFit& start, const FitOptions& options);
 

@@ -1,0 +1,172 @@
+#include "policies/visual_pick.h"
+
+#include <gtest/gtest.h>
+
+#include <limits>
+
+#include "core/check.h"
+#include "core/error.h"
+#include "core/geometry.h"
+#include "tests/policies/visual_support.h"
+
+namespace evac {
+namespace {
+
+View ViewOf(const Task& task, const Observation& observation, int camera) {
+  return {&observation.images[camera], task.cameras[camera], BaseFromCamera(task.cameras[camera], observation.arms)};
+}
+
+/// Of every initial state: how far from the truth the head camera finds a body, in metres.
+double WorstHeadError(sim::MujocoWorld& world, const Task& task, const Thing& thing, const std::string& body) {
+  double worst_m = 0;
+  for (int state = 0; state < 20; ++state) {
+    const WorldStep first = world.Reset(0, task, SimState(state), 1);
+    const auto fit = Locate(ViewOf(task, first.observation, 0), thing);
+    if (!fit) return std::numeric_limits<double>::infinity();
+    const Eigen::Vector2d truth_m = PoseIn(first.privileged, body).translation().head<2>();
+    worst_m = std::max(worst_m, (fit->placement.xy_m - truth_m).norm());
+  }
+  return worst_m;
+}
+
+class HeadCamera : public testing::TestWithParam<int> {};
+
+TEST_P(HeadCamera, FindsWhatItIsToTakeAndWhereToPutItInTwentyStates) {
+  const int width_px = GetParam();
+  sim::MujocoWorld world = SimWorld("real");
+  for (const char* id : {"take_bottle", "take_toast"}) {
+    Task task = SimTask(id);
+    for (Camera& camera : task.cameras) camera = Resized(camera, width_px, width_px * 2 / 3);
+    const PickKnowledge knowledge = KnowledgeOf(id);
+    EXPECT_LT(WorstHeadError(world, task, knowledge.thing, std::string(id).substr(5)), 0.012) << id;
+    if (knowledge.target) {
+      EXPECT_LT(WorstHeadError(world, task, *knowledge.target, "plate"), 0.012) << id;
+    }
+  }
+}
+INSTANTIATE_TEST_SUITE_P(Widths, HeadCamera, testing::Values(96, 192));
+
+TEST(VisualPick, TheWristCameraFindsTheThingWithinTenMillimetres) {
+  sim::MujocoWorld world = SimWorld("real");
+  for (const char* id : {"take_bottle", "take_toast"}) {
+    const Task task = SimTask(id);
+    VisualPick policy({.chunk_size = 20});
+    for (int state = 0; state < 6; ++state) {
+      const WorldStep first = world.Reset(0, task, SimState(state), 1);
+      policy.Reset(0, task, 1);
+      const SceneObservation asked{0, &first.observation};
+      const Acted approach = policy.Act({&asked, 1}).front();
+      const SceneChunk chunk{0, &std::get<ActionChunk>(approach)};
+      const WorldStep above = std::get<std::vector<WorldStep>>(world.Advance({&chunk, 1}).front()).back();
+      const Eigen::Vector2d truth_m = PoseIn(above.privileged, std::string(id).substr(5)).translation().head<2>();
+      const auto fit = Locate(ViewOf(task, above.observation, 1), KnowledgeOf(id).thing, Placement{truth_m + Eigen::Vector2d(0.01, 0.01), 0});
+      ASSERT_TRUE(fit) << id << " " << state;
+      EXPECT_LT((fit->placement.xy_m - truth_m).norm(), 0.010) << id << " " << state;
+    }
+  }
+}
+
+TEST(VisualPick, MastersBothTasksAndADegradedOneIsWorse) {
+  sim::MujocoWorld world = SimWorld("real");
+  for (const char* id : {"take_bottle", "take_toast"}) {
+    VisualPick clean({}), degraded({.bias_m = {0.05, 0.03}});
+    const int successes = Successes(world, clean, SimTask(id), 2, 10);
+    EXPECT_EQ(successes, 2) << id;
+    EXPECT_LT(Successes(world, degraded, SimTask(id), 2, 10), successes) << id;
+  }
+}
+
+/// Answers to two pictures of the beginning, as one text of numbers.
+std::vector<double> Answers(std::uint64_t seed, const VisualPickOptions& options) {
+  static const Task task = SimTask("take_bottle");
+  static const Observation seen = SimWorld("sim").Reset(0, task, SimState(0), 1).observation;
+  VisualPick policy(options);
+  policy.Reset(3, task, seed);
+  std::vector<double> numbers;
+  for (int request = 0; request < 5; ++request) {
+    Observation here = seen;
+    if (!numbers.empty()) here.arms[0].base_from_gripper.translation() = Eigen::Vector3d(numbers.end()[-4], numbers.end()[-3], numbers.end()[-2]);
+    const SceneObservation asked{3, &here};
+    const ActionChunk chunk = std::get<ActionChunk>(policy.Act({&asked, 1}).front());
+    for (const Arms& target : chunk.targets) {
+      const Eigen::Vector3d at_m = target[0].base_from_gripper.translation();
+      numbers.insert(numbers.end(), {at_m.x(), at_m.y(), at_m.z(), target[0].closure});
+    }
+  }
+  return numbers;
+}
+
+TEST(VisualPick, TheSameSeedAndPicturesGetTheSameAnswersAndAnotherSeedOthers) {
+  const VisualPickOptions noisy{.noise_m = 0.02, .request_noise_m = 0.01, .blindness = 0.3, .request_blindness = 0.3};
+  EXPECT_EQ(Answers(1, noisy), Answers(1, noisy));
+  EXPECT_NE(Answers(1, noisy), Answers(2, noisy));
+  EXPECT_EQ(Answers(1, {}), Answers(2, {})) << "without noise the seed means nothing";
+}
+
+TEST(VisualPick, BlindItGoesWhereTheThingUsuallyIs) {
+  const PickKnowledge knowledge = KnowledgeOf("take_bottle");
+  const std::vector<double> blind = Answers(1, {.blindness = 1}), seeing = Answers(1, {});
+  const auto reached = [&](const std::vector<double>& answers) {  // above the thing: the end of the second chunk
+    return Eigen::Vector2d(answers.at(15 * 4), answers.at(15 * 4 + 1));
+  };
+  EXPECT_LT((reached(blind) - knowledge.usual.xy_m).norm(), 1e-9);
+  EXPECT_GT((reached(seeing) - knowledge.usual.xy_m).norm(), 0.005);
+}
+
+TEST(VisualPick, ItsChunksAreValidAndSlowEnoughToFollow) {
+  const Task task = SimTask("take_toast");
+  sim::MujocoWorld world = SimWorld("sim");
+  VisualPick policy({.chunk_size = 5});
+  Observation seen = world.Reset(0, task, SimState(4), 1).observation;
+  policy.Reset(0, task, 1);
+  Arms last = seen.arms;
+  for (int request = 0; request < 18; ++request) {
+    const SceneObservation asked{0, &seen};
+    const ActionChunk chunk = std::get<ActionChunk>(policy.Act({&asked, 1}).front());
+    ASSERT_EQ(chunk.targets.size(), 5u);
+    EXPECT_EQ(WhatIsWrong(chunk, task, 5), std::nullopt);
+    for (const Arms& target : chunk.targets) {
+      EXPECT_LE((target[0].base_from_gripper.translation() - last[0].base_from_gripper.translation()).norm(), 0.04);
+      EXPECT_LE(RotationBetween(target[0].base_from_gripper, last[0].base_from_gripper), 0.3);
+      last = target;
+    }
+    const SceneChunk executed{0, &chunk};
+    seen = std::get<std::vector<WorldStep>>(world.Advance({&executed, 1}).front()).back().observation;
+  }
+}
+
+void ExpectRefused(const VisualPickOptions& options, const std::string& name) {
+  try {
+    VisualPick policy(options);
+    ADD_FAILURE() << name << " was accepted";
+  } catch (const Error& error) {
+    EXPECT_EQ(error.exit_code(), ExitCode::kInvalidInput);
+    EXPECT_NE(std::string(error.what()).find(name), std::string::npos) << error.what();
+  }
+}
+
+TEST(VisualPick, OptionsOutsideTheirRangeAreRefusedByName) {
+  ExpectRefused({.chunk_size = 0}, "chunk-size");
+  ExpectRefused({.bias_m = {0, 0.7}}, "bias-m");
+  ExpectRefused({.noise_m = -0.01}, "noise-m");
+  ExpectRefused({.request_noise_m = std::numeric_limits<double>::quiet_NaN()}, "request-noise-m");
+  ExpectRefused({.late_close_s = 9}, "late-close-s");
+  ExpectRefused({.early_release_s = -1}, "early-release-s");
+  ExpectRefused({.blindness = 1.1}, "blindness");
+  ExpectRefused({.request_blindness = -0.1}, "request-blindness");
+  ExpectRefused({.speed = 0}, "speed");
+  ExpectRefused({.retries = -1}, "retries");
+}
+
+TEST(VisualPick, ATaskItDoesNotKnowOrCannotSeeIsRefused) {
+  VisualPick policy({});
+  Task unknown = SimTask("take_bottle");
+  unknown.id = "fold_shirt";
+  EXPECT_THROW(policy.Reset(0, unknown, 1), Error);
+  Task sightless = SimTask("take_bottle");
+  sightless.cameras.erase(sightless.cameras.begin());
+  EXPECT_THROW(policy.Reset(0, sightless, 1), Error);
+}
+
+}  // namespace
+}  // namespace evac
