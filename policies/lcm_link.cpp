@@ -1,7 +1,9 @@
 #include "policies/lcm_link.h"
 
+#include <arpa/inet.h>
 #include <fmt/format.h>
 #include <lcm/lcm.h>
+#include <sys/socket.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -27,11 +29,29 @@ void CheckToken(const std::string& token) {
   }
 }
 
-std::string WhatToDo(const std::string& url) {
-  return fmt::format(
-      "LCM cannot open {}: the URL is malformed, or this machine has no route for multicast. Without a network, give it one over "
-      "loopback: ip route add 224.0.0.0/4 dev lo",
-      url);
+/// Whether the system would know where to send to a "udpm://ADDRESS:…" URL; asked before LCM, which would answer with a page of advice.
+bool HasRoute(const std::string& url) {
+  const std::string scheme = "udpm://";
+  if (!url.starts_with(scheme)) return true;
+  sockaddr_in to{};
+  to.sin_family = AF_INET;
+  to.sin_port = htons(7667);
+  const std::string host = url.substr(scheme.size(), url.find_first_of(":?", scheme.size()) - scheme.size());
+  if (inet_pton(AF_INET, host.c_str(), &to.sin_addr) != 1) return true;  // LCM says what is wrong with it
+  const int probe = ::socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0);
+  const bool has_route = ::connect(probe, reinterpret_cast<const sockaddr*>(&to), sizeof to) == 0;
+  ::close(probe);
+  return has_route;
+}
+
+lcm_t* Open(const std::string& url) {
+  if (!HasRoute(url)) {
+    throw InvalidInput("this machine has no route for multicast, which LCM needs for {}; without a network, give it one over loopback: "
+                       "ip route add 224.0.0.0/4 dev lo", url);
+  }
+  lcm_t* lcm = lcm_create(url.c_str());
+  if (lcm == nullptr) throw InvalidInput("LCM cannot open {}: the URL is malformed, or multicast is not possible here", url);
+  return lcm;
 }
 
 }  // namespace
@@ -72,9 +92,7 @@ struct LcmLink::Subscription {
 };
 
 LcmLink::LcmLink(const std::string& url, const Pacing& pacing)
-    : lcm_(lcm_create(url.c_str())), pacing_(pacing), drained_until_(Clock::now()) {
-  if (lcm_ == nullptr) throw InvalidInput("{}", WhatToDo(url));
-}
+    : lcm_(Open(url)), pacing_(pacing), drained_until_(Clock::now()) {}
 
 LcmLink::~LcmLink() { lcm_destroy(lcm_); }
 

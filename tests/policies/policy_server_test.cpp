@@ -4,8 +4,6 @@
 #include <signal.h>
 #include <sys/wait.h>
 
-#include <fstream>
-
 #include "policies/hold_policy.h"
 #include "policies/messages.h"
 #include "tests/policies/wire_support.h"
@@ -20,8 +18,8 @@ using wire::Told;
 class BareClient {
  public:
   explicit BareClient(LcmAddress address, std::string name = "bare") : address_(std::move(address)), link_(address_.url), name_(std::move(name)) {
-    link_.Subscribe(address_.Channel("chunk"), [this](const std::string&, auto bytes) { chunks.push_back(*Decoded<chunk_t>(bytes)); });
-    link_.Subscribe(address_.Channel("started"), [this](const std::string&, auto bytes) { started.push_back(*Decoded<episode_started_t>(bytes)); });
+    Keep("chunk", chunks);
+    Keep("started", started);
   }
 
   void Start(std::int64_t episode, int lane, const Task& task) {
@@ -73,6 +71,14 @@ class BareClient {
   std::vector<episode_started_t> started;
 
  private:
+  template <typename Message>
+  void Keep(const std::string& message, std::vector<Message>& mine) {
+    link_.Subscribe(address_.Channel(message), [this, &mine](const std::string&, auto bytes) {
+      const auto decoded = Decoded<Message>(bytes);
+      if (decoded->client == name_) mine.push_back(*decoded);
+    });
+  }
+
   LcmAddress address_;
   LcmLink link_;
   std::string name_;
