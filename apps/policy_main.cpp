@@ -54,7 +54,7 @@ void AddReplay(CLI::App& app, Common& common, int& exit_code) {
   auto every_nth = std::make_shared<int>(1);
   command->add_option("--recording", *folder, "folder of the recording (docs/formats/recording.md)")->required();
   command->add_option("--every-nth", *every_nth, "keep every nth recorded step")->check(CLI::Range(1, 1000))->capture_default_str();
-  command->footer("Example:\n  evac-policy replay --recording agibot_examples/0 --chunk-size 16");
+  command->footer("Example:\n  evac-policy replay --recording agibot_examples/example0 --chunk-size 16");
   command->callback([&common, &exit_code, folder, every_nth] {
     Recording recording = ReadRecording(*folder, {.every_nth = *every_nth, .cameras = {}, .count_video_frames = false});
     PolicySpec spec = common.Spec("replay");
