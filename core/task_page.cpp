@@ -17,14 +17,16 @@ constexpr double kDegree = std::numbers::pi / 180;
 
 Vector3d ReadVector(const Config& page, const std::string& key) {
   const auto numbers = page.Get<std::vector<double>>(key);
-  page.Require(numbers.size() == 3 && std::all_of(numbers.begin(), numbers.end(), [](double x) { return std::isfinite(x); }),
-               key, "three finite numbers [x, y, z]");
+  page.Require(
+      numbers.size() == 3 && std::all_of(numbers.begin(), numbers.end(), [](double x) { return std::isfinite(x); }),
+      key, "three finite numbers [x, y, z]");
   return Vector3d(numbers[0], numbers[1], numbers[2]);
 }
 
 std::string ReadName(const Config& page, const std::string& key) {
   const auto name = page.Get<std::string>(key);
-  const bool plain = std::all_of(name.begin(), name.end(), [](unsigned char c) { return std::isalnum(c) || c == '_' || c == '-'; });
+  const bool plain =
+      std::all_of(name.begin(), name.end(), [](unsigned char c) { return std::isalnum(c) || c == '_' || c == '-'; });
   page.Require(!name.empty() && plain, key, "a name of letters, digits, '_' and '-'");
   return name;
 }
@@ -80,8 +82,8 @@ Mount ReadMount(const Config& page) {
 }
 
 Camera ReadCamera(const Config& page) {
-  page.AllowOnly({"name", "mount", "width_px", "height_px", "fovy_deg", "fx_px", "fy_px", "cx_px", "cy_px", "position_m",
-                  "look_at_m", "up", "quat_xyzw"});
+  page.AllowOnly({"name", "mount", "width_px", "height_px", "fovy_deg", "fx_px", "fy_px", "cx_px", "cy_px",
+                  "position_m", "look_at_m", "up", "quat_xyzw"});
   Camera camera;
   camera.name = ReadName(page, "name");
   camera.mount = ReadMount(page);
@@ -138,8 +140,8 @@ std::optional<double> ReadBound(const Config& page, const std::string& key) {
 
 Condition ReadCondition(const Config& page) {
   static const std::map<std::string, bool> kNeedsB = {
-      {"distance", true},      {"horizontal_distance", true}, {"contact", true}, {"height", false},
-      {"height_gain", false},  {"displacement", false},       {"tilt", false},   {"speed", false}};
+      {"distance", true},     {"horizontal_distance", true}, {"contact", true}, {"height", false},
+      {"height_gain", false}, {"displacement", false},       {"tilt", false},   {"speed", false}};
   page.AllowOnly({"kind", "a", "b", "above", "below"});
   Condition condition;
   condition.kind = page.Get<std::string>("kind");
@@ -151,7 +153,8 @@ Condition ReadCondition(const Config& page) {
   page.Require(kind->second || !page.Has("b"), "b", "none: " + condition.kind + " is about one body");
   condition.above = ReadBound(page, "above");
   condition.below = ReadBound(page, "below");
-  if (!condition.above && !condition.below) throw InvalidInput("{}: found neither 'above' nor 'below', wanted one or both", page.Where());
+  if (!condition.above && !condition.below)
+    throw InvalidInput("{}: found neither 'above' nor 'below', wanted one or both", page.Where());
   return condition;
 }
 
@@ -190,7 +193,8 @@ std::vector<std::string> ReadArms(const Config& page) {
 }
 
 Task ReadTask(const Config& page) {
-  page.AllowOnly({"id", "instruction", "arms", "cameras", "period_s", "max_chunks", "still", "workspace_m", "rubric", "mujoco"});
+  page.AllowOnly(
+      {"id", "instruction", "arms", "cameras", "period_s", "max_chunks", "still", "workspace_m", "rubric", "mujoco"});
   Task task;
   task.id = ReadName(page, "id");
   task.instruction = ReadText(page, "instruction");

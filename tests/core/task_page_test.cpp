@@ -91,7 +91,8 @@ TEST(TaskPage, ACameraLooksAtItsPointWithUpBeingUpInThePicture) {
 TEST(TaskPage, AFieldOfViewIsAFocalLength) {
   const Camera by_angle = ParseTaskPage(kPage, "push.yaml").cameras[0];
   EXPECT_NEAR(by_angle.fy_px, 32 / std::tan(20 * M_PI / 180), 1e-9);
-  const Camera by_pixels = ParseTaskPage(Replaced(kPage, "fovy_deg: 40", "fx_px: 90, fy_px: 91, cx_px: 47"), "push.yaml").cameras[0];
+  const Camera by_pixels =
+      ParseTaskPage(Replaced(kPage, "fovy_deg: 40", "fx_px: 90, fy_px: 91, cx_px: 47"), "push.yaml").cameras[0];
   EXPECT_DOUBLE_EQ(by_pixels.fx_px, 90);
   EXPECT_DOUBLE_EQ(by_pixels.fy_px, 91);
   EXPECT_DOUBLE_EQ(by_pixels.cx_px, 47);
@@ -99,20 +100,25 @@ TEST(TaskPage, AFieldOfViewIsAFocalLength) {
 }
 
 TEST(TaskPage, AQuaternionTurnsACameraAsTheSameLookDoes) {
-  const std::string down = Replaced(kPage, "look_at_m: [0, 0, 0], up: [0, 0, 1]", "look_at_m: [1, 0, 0], up: [1, 0, 0]");
+  const std::string down =
+      Replaced(kPage, "look_at_m: [0, 0, 0], up: [0, 0, 1]", "look_at_m: [1, 0, 0], up: [1, 0, 0]");
   const Camera looking = ParseTaskPage(down, "push.yaml").cameras[0];
   const Eigen::Quaterniond q(looking.mount_from_camera.linear());
   const std::string quat = fmt::format("quat_xyzw: [{}, {}, {}, {}]", q.x(), q.y(), q.z(), q.w());
-  const Camera turned = ParseTaskPage(Replaced(down, "look_at_m: [1, 0, 0], up: [1, 0, 0]", quat), "push.yaml").cameras[0];
+  const Camera turned =
+      ParseTaskPage(Replaced(down, "look_at_m: [1, 0, 0], up: [1, 0, 0]", quat), "push.yaml").cameras[0];
   EXPECT_TRUE(turned.mount_from_camera.isApprox(looking.mount_from_camera, 1e-12));
 }
 
 TEST(TaskPage, EveryComplaintNamesFileFieldAndWhatWasFound) {
-  EXPECT_THAT(ComplaintAbout(Replaced(kPage, "max_chunks: 4", "max_chunk: 4")), AllOf(HasSubstr("push.yaml"), HasSubstr("max_chunk"), HasSubstr("max_chunks")));
-  EXPECT_THAT(ComplaintAbout(Replaced(kPage, "arms: [right]", "arms: [right, left]")), AllOf(HasSubstr("arms"), HasSubstr("[left, right]")));
+  EXPECT_THAT(ComplaintAbout(Replaced(kPage, "max_chunks: 4", "max_chunk: 4")),
+              AllOf(HasSubstr("push.yaml"), HasSubstr("max_chunk"), HasSubstr("max_chunks")));
+  EXPECT_THAT(ComplaintAbout(Replaced(kPage, "arms: [right]", "arms: [right, left]")),
+              AllOf(HasSubstr("arms"), HasSubstr("[left, right]")));
   EXPECT_THAT(ComplaintAbout(Replaced(kPage, "above: 0.1", "more: 0.1")), HasSubstr("more"));
   EXPECT_THAT(ComplaintAbout(Replaced(kPage, ", above: 0.1", "")), AllOf(HasSubstr("above"), HasSubstr("below")));
-  EXPECT_THAT(ComplaintAbout(Replaced(kPage, "displacement", "distanse")), AllOf(HasSubstr("distanse"), HasSubstr("distance")));
+  EXPECT_THAT(ComplaintAbout(Replaced(kPage, "displacement", "distanse")),
+              AllOf(HasSubstr("distanse"), HasSubstr("distance")));
   EXPECT_THAT(ComplaintAbout(Replaced(kPage, "displacement", "distance")), HasSubstr("b"));
   EXPECT_THAT(ComplaintAbout(Replaced(kPage, "max: [1, 1, 1]", "max: [1, -2, 1]")), HasSubstr("max"));
   EXPECT_THAT(ComplaintAbout(Replaced(kPage, "look_at_m: [0, 0, 0]", "look_at_m: [1, 0, 1]")), HasSubstr("look_at_m"));
@@ -121,8 +127,11 @@ TEST(TaskPage, EveryComplaintNamesFileFieldAndWhatWasFound) {
 }
 
 TEST(TaskPage, TwoCamerasOfOneNameAreRefused) {
-  const std::string camera = "  - {name: head, mount: base, width_px: 96, height_px: 64, fovy_deg: 40, position_m: [1, 0, 1], look_at_m: [0, 0, 0], up: [0, 0, 1]}\n";
-  EXPECT_THAT(ComplaintAbout(Replaced(kPage, camera, camera + camera)), AllOf(HasSubstr("cameras.1"), HasSubstr("head")));
+  const std::string camera =
+      "  - {name: head, mount: base, width_px: 96, height_px: 64, fovy_deg: 40, position_m: [1, 0, 1], look_at_m: [0, "
+      "0, 0], up: [0, 0, 1]}\n";
+  EXPECT_THAT(ComplaintAbout(Replaced(kPage, camera, camera + camera)),
+              AllOf(HasSubstr("cameras.1"), HasSubstr("head")));
 }
 
 }  // namespace

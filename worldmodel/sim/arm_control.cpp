@@ -12,12 +12,13 @@ namespace {
 using Vector6d = Eigen::Matrix<double, 6, 1>;
 using RowMatrix3Xd = Eigen::Matrix<double, 3, Eigen::Dynamic, Eigen::RowMajor>;
 
-constexpr double kFingerTravelM = 0.04;      // per finger, closure 0
-constexpr double kJointSpeed = 2.5;          // rad/s
-constexpr double kDamping = 0.02;            // of the least squares
+constexpr double kFingerTravelM = 0.04;  // per finger, closure 0
+constexpr double kJointSpeed = 2.5;      // rad/s
+constexpr double kDamping = 0.02;        // of the least squares
 constexpr int kIterations = 60;
-constexpr double kSolved = 1e-5;             // metres and radians together
-const Joints kPosture = (Joints() << 0.0, -0.10, 2.2, 0.0, 1.05, 0.0).finished();  // elbow up, gripper down: where solving starts
+constexpr double kSolved = 1e-5;  // metres and radians together
+const Joints kPosture =
+    (Joints() << 0.0, -0.10, 2.2, 0.0, 1.05, 0.0).finished();  // elbow up, gripper down: where solving starts
 
 /// Position error and rotation vector, both in the base frame, that lead from one pose to the other.
 Vector6d Difference(const Eigen::Isometry3d& to, const Eigen::Isometry3d& from) {
@@ -53,7 +54,8 @@ ArmControl::ArmControl(const mjModel& model, const Profile::Actuators& actuators
 void ArmControl::StartAt(mjData& data, const ArmState& home) {
   double error = 0;
   reference_ = driven_ = Solve(home.base_from_gripper, kPosture, &error);
-  if (error > 1e-3) throw InvalidInput("the home pose cannot be reached: the arm stays {} (metres and radians) away", error);
+  if (error > 1e-3)
+    throw InvalidInput("the home pose cannot be reached: the arm stays {} (metres and radians) away", error);
   step_.setZero();
   closure_ = home.closure;
   closure_step_ = 0;

@@ -11,11 +11,11 @@ namespace evac::sim {
 constexpr int kJoints = 6;
 using Joints = Eigen::Matrix<double, kJoints, 1>;  ///< radians, base to wrist
 
-/// Drives the scene's one arm (joints j1 … j6, site `gripper`, fingers) from gripper targets: damped least squares inverse
-/// kinematics (Wampler 1986), a straight line in joint angles through each period, gravity compensation, a lag.
+/// Drives the scene's one arm (joints j1 … j6, site `gripper`, fingers) from gripper targets: damped least squares
+/// inverse kinematics (Wampler 1986), a straight line in joint angles through each period, gravity compensation, a lag.
 ///
-/// The controller believes in the nominal kinematics; the true joints are off by `joint_offset` (encoder zeros), so both where
-/// it goes and where it says it is are off together, as on a real robot.
+/// The controller believes in the nominal kinematics; the true joints are off by `joint_offset` (encoder zeros), so
+/// both where it goes and where it says it is are off together, as on a real robot.
 class ArmControl {
  public:
   /// @param joint_offset  believed minus true angle, per joint.
@@ -25,8 +25,8 @@ class ArmControl {
   /// @throws InvalidInput if the pose cannot be reached.
   void StartAt(mjData& data, const ArmState& home);
 
-  /// Aims at a target that is due in `steps` physics steps. A target out of reach or too fast is followed as well as the joints'
-  /// limits and speed allow.
+  /// Aims at a target that is due in `steps` physics steps. A target out of reach or too fast is followed as well as
+  /// the joints' limits and speed allow.
   void Aim(const ArmState& target, int steps);
 
   /// One physics step's controls. Call between mj_step1 and mj_step2.

@@ -29,10 +29,12 @@ double ThinnerHalf(const mjModel& model, int box) { return Map<const Vector3d>(m
 
 bool IsPlausible(const mjModel& model, const mjData& data, const mjContact& contact, int geom1, int geom2) {
   const double deepest_m = ThinnerHalf(model, geom1) + ThinnerHalf(model, geom2) + kToleranceM;
-  return contact.dist > -deepest_m && IsNear(model, data, contact.pos, geom1) && IsNear(model, data, contact.pos, geom2);
+  return contact.dist > -deepest_m && IsNear(model, data, contact.pos, geom1) &&
+         IsNear(model, data, contact.pos, geom2);
 }
 
-int SoundBoxContacts(const mjModel* model, const mjData* data, mjContact* contacts, int geom1, int geom2, mjtNum margin) {
+int SoundBoxContacts(const mjModel* model, const mjData* data, mjContact* contacts, int geom1, int geom2,
+                     mjtNum margin) {
   mjContact* const end = contacts + MujocosOwn()(model, data, contacts, geom1, geom2, margin);
   const auto impossible = [&](const mjContact& contact) { return !IsPlausible(*model, *data, contact, geom1, geom2); };
   return static_cast<int>(std::remove_if(contacts, end, impossible) - contacts);

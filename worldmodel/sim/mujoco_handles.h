@@ -31,9 +31,9 @@ std::string NameOf(const mjModel& model, mjtObj kind, int id);
 /// Position and row-major rotation, e.g. data.site_xpos + 3 * id and data.site_xmat + 9 * id.
 Eigen::Isometry3d PoseOf(const mjtNum* position, const mjtNum* rotation);
 
-/// Sends MuJoCo's warnings nowhere (each scene reads its own counts) and its fatal errors to stderr and exit code 4; without this
-/// it would write files into the working directory and wait for a key. Repairs its box contacts (box_contacts.h). Process-wide; call
-/// before the first model.
+/// Sends MuJoCo's warnings nowhere (each scene reads its own counts) and its fatal errors to stderr and exit code 4;
+/// without this it would write files into the working directory and wait for a key. Repairs its box contacts
+/// (box_contacts.h). Process-wide; call before the first model.
 void PrepareMujoco();
 
 }  // namespace evac::sim

@@ -25,8 +25,10 @@ struct MujocoWorld::Stage {
   ModelPtr model;
 };
 
-MujocoWorld::MujocoWorld(MujocoWorldOptions options) : options_(std::move(options)), profile_(ReadProfile(options_.profile)) {
-  if (options_.threads < 1 || options_.threads > 256) throw InvalidInput("world {}: found threads {}, wanted 1 … 256", options_.name, options_.threads);
+MujocoWorld::MujocoWorld(MujocoWorldOptions options)
+    : options_(std::move(options)), profile_(ReadProfile(options_.profile)) {
+  if (options_.threads < 1 || options_.threads > 256)
+    throw InvalidInput("world {}: found threads {}, wanted 1 … 256", options_.name, options_.threads);
   PrepareMujoco();
   workers_ = std::make_unique<Workers>(options_.threads);
 }
@@ -40,7 +42,8 @@ WorldStep MujocoWorld::Reset(SceneId scene, const Task& task, const InitialState
   place.reset();
   workers_->Run(1, [&](int, Renderer& renderer) {
     auto made = std::make_unique<Scene>(Scene::Setup{stage.model.get(), &stage.page, &profile_, task, initial, seed});
-    if (const auto why = made->WhyDiverged()) throw InternalError("{} {} in {}: {}", task.id, initial.id, options_.name, *why);
+    if (const auto why = made->WhyDiverged())
+      throw InternalError("{} {} in {}: {}", task.id, initial.id, options_.name, *why);
     first = made->Observe(renderer);
     place = std::move(made);
   });
@@ -71,7 +74,8 @@ const MujocoWorld::Stage& MujocoWorld::StageFor(const Task& task) {
 
 Scene& MujocoWorld::SceneAt(SceneId scene) {
   const auto found = scenes_.find(scene);
-  if (found == scenes_.end() || !found->second) throw InternalError("world {}: scene {} was not reset", options_.name, scene);
+  if (found == scenes_.end() || !found->second)
+    throw InternalError("world {}: scene {} was not reset", options_.name, scene);
   return *found->second;
 }
 

@@ -16,19 +16,20 @@ double ReadBetween(const Config& page, const std::string& key, double low, doubl
 
 Profile::Physics ReadPhysics(const Config& page) {
   page.AllowOnly({"pad_friction", "object_friction", "mass"});
-  return {ReadBetween(page, "pad_friction", 0, 5), ReadBetween(page, "object_friction", 0, 5), ReadBetween(page, "mass", 0.05, 20)};
+  return {ReadBetween(page, "pad_friction", 0, 5), ReadBetween(page, "object_friction", 0, 5),
+          ReadBetween(page, "mass", 0.05, 20)};
 }
 
 Profile::Actuators ReadActuators(const Config& page) {
   page.AllowOnly({"gain", "lag_s", "grip_force_n", "grip_speed"});
-  return {ReadBetween(page, "gain", 0.1, 4), ReadBetween(page, "lag_s", 0, 1), ReadBetween(page, "grip_force_n", 0, 100),
-          ReadBetween(page, "grip_speed", 0.1, 20)};
+  return {ReadBetween(page, "gain", 0.1, 4), ReadBetween(page, "lag_s", 0, 1),
+          ReadBetween(page, "grip_force_n", 0, 100), ReadBetween(page, "grip_speed", 0.1, 20)};
 }
 
 Profile::Calibration ReadCalibration(const Config& page) {
   page.AllowOnly({"seed", "camera_position_m", "camera_rotation_deg", "joint_offset_deg"});
-  return {page.Get<int>("seed"), ReadBetween(page, "camera_position_m", 0, 0.2), ReadBetween(page, "camera_rotation_deg", 0, 30),
-          ReadBetween(page, "joint_offset_deg", 0, 10)};
+  return {page.Get<int>("seed"), ReadBetween(page, "camera_position_m", 0, 0.2),
+          ReadBetween(page, "camera_rotation_deg", 0, 30), ReadBetween(page, "joint_offset_deg", 0, 10)};
 }
 
 Profile::Sensors ReadSensors(const Config& page) {
@@ -39,8 +40,8 @@ Profile::Sensors ReadSensors(const Config& page) {
 
 Profile::Light ReadLight(const Config& page) {
   page.AllowOnly({"strength", "ambient", "warmth", "shadows"});
-  return {ReadBetween(page, "strength", 0, 4), ReadBetween(page, "ambient", 0, 4), ReadBetween(page, "warmth", -0.5, 0.5),
-          page.Get<bool>("shadows")};
+  return {ReadBetween(page, "strength", 0, 4), ReadBetween(page, "ambient", 0, 4),
+          ReadBetween(page, "warmth", -0.5, 0.5), page.Get<bool>("shadows")};
 }
 
 }  // namespace

@@ -15,10 +15,13 @@ namespace {
 
 constexpr float kNearM = 0.01F, kFarM = 6.0F;
 constexpr int kMaxGeoms = 400;
-constexpr int kSupersampling = 2;  // drawn twice as large and averaged: cheaper in software than multisampling, and shadows gain too
+constexpr int kSupersampling =
+    2;  // drawn twice as large and averaged: cheaper in software than multisampling, and shadows gain too
 
 void Check(bool ok, const char* step) {
-  if (!ok) throw InternalError("cannot render: {} failed with EGL error 0x{:x}; is libegl1 with libgl1-mesa-dri installed?", step, eglGetError());
+  if (!ok)
+    throw InternalError("cannot render: {} failed with EGL error 0x{:x}; is libegl1 with libgl1-mesa-dri installed?",
+                        step, eglGetError());
 }
 
 EGLDisplay OpenDisplay() {
@@ -58,7 +61,8 @@ class Renderer::Display {
     Check(eglBindAPI(EGL_OPENGL_API), "binding OpenGL");
     context_ = eglCreateContext(display_, config, EGL_NO_CONTEXT, nullptr);
     Check(context_ != EGL_NO_CONTEXT, "making a context");
-    Check(eglMakeCurrent(display_, EGL_NO_SURFACE, EGL_NO_SURFACE, context_), "making the context current without a surface");
+    Check(eglMakeCurrent(display_, EGL_NO_SURFACE, EGL_NO_SURFACE, context_),
+          "making the context current without a surface");
   }
   ~Display() {  // the display itself is shared by all renderers of the process and stays open
     eglMakeCurrent(display_, EGL_NO_SURFACE, EGL_NO_SURFACE, EGL_NO_CONTEXT);
@@ -84,7 +88,8 @@ struct Renderer::Canvas {
     sized->vis.global.offheight = kSupersampling * height;
     mjr_makeContext(sized.get(), &context, mjFONTSCALE_50);
     mjr_setBuffer(mjFB_OFFSCREEN, &context);
-    if (context.currentBuffer != mjFB_OFFSCREEN) throw InternalError("cannot render: no off-screen buffer of {}x{}", width, height);
+    if (context.currentBuffer != mjFB_OFFSCREEN)
+      throw InternalError("cannot render: no off-screen buffer of {}x{}", width, height);
     mjv_defaultOption(&options);
     std::fill(std::begin(options.sitegroup), std::end(options.sitegroup), mjtByte{0});
     mjv_defaultCamera(&unused_camera);
@@ -109,7 +114,8 @@ Renderer::~Renderer() { canvases_.clear(); }  // while their context is still th
 
 Renderer::Canvas& Renderer::CanvasFor(const mjModel& base, const Camera& camera) {
   for (const auto& canvas : canvases_) {
-    if (canvas->base == &base && canvas->width_px == camera.width_px && canvas->height_px == camera.height_px) return *canvas;
+    if (canvas->base == &base && canvas->width_px == camera.width_px && canvas->height_px == camera.height_px)
+      return *canvas;
   }
   canvases_.push_back(std::make_unique<Canvas>(base, camera.width_px, camera.height_px));
   return *canvases_.back();
@@ -132,12 +138,12 @@ cv::Mat Renderer::Draw(const mjModel& base, const mjModel& model, mjData& data, 
 
 void RefuseUndrawable(const Camera& camera) {
   if (std::abs(camera.fx_px - camera.fy_px) > 1e-6 * camera.fy_px) {
-    throw InvalidInput("camera '{}': found fx_px {} and fy_px {}, wanted the same: MuJoCo draws square pixels", camera.name,
-                       camera.fx_px, camera.fy_px);
+    throw InvalidInput("camera '{}': found fx_px {} and fy_px {}, wanted the same: MuJoCo draws square pixels",
+                       camera.name, camera.fx_px, camera.fy_px);
   }
   if (std::abs(camera.cx_px - camera.width_px / 2.0) > 1e-6 || std::abs(camera.cy_px - camera.height_px / 2.0) > 1e-6) {
-    throw InvalidInput("camera '{}': found the principal point at ({}, {}), wanted the middle of the picture ({}, {})", camera.name,
-                       camera.cx_px, camera.cy_px, camera.width_px / 2.0, camera.height_px / 2.0);
+    throw InvalidInput("camera '{}': found the principal point at ({}, {}), wanted the middle of the picture ({}, {})",
+                       camera.name, camera.cx_px, camera.cy_px, camera.width_px / 2.0, camera.height_px / 2.0);
   }
 }
 

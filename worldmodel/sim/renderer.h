@@ -11,8 +11,8 @@
 
 namespace evac::sim {
 
-/// Draws scenes without a display: one OpenGL context by EGL (surfaceless, else EGL's default display; Mesa's software rasteriser
-/// where there is no GPU). The same model and data give the same bytes on the same machine.
+/// Draws scenes without a display: one OpenGL context by EGL (surfaceless, else EGL's default display; Mesa's software
+/// rasteriser where there is no GPU). The same model and data give the same bytes on the same machine.
 ///
 /// Make, use and destroy it in one thread; any number of renderers may live in threads of their own.
 class Renderer {
@@ -23,7 +23,8 @@ class Renderer {
   Renderer(const Renderer&) = delete;
   Renderer& operator=(const Renderer&) = delete;
 
-  /// @param base    whose textures and meshes `model` has: `model` itself or what it was copied from. What is sent to OpenGL is
+  /// @param base    whose textures and meshes `model` has: `model` itself or what it was copied from. What is sent to
+  /// OpenGL is
   ///                kept per base, which must outlive the renderer.
   /// @param camera  size and intrinsics. fx must equal fy, see RefuseUndrawable.
   /// @returns [height_px, width_px] CV_8UC3 RGB, continuous.

@@ -14,7 +14,8 @@
 
 namespace evac::sim {
 
-/// One episode in MuJoCo: its own model (colours, friction, … are its own), its state, its controller and its streams of noise.
+/// One episode in MuJoCo: its own model (colours, friction, … are its own), its state, its controller and its streams
+/// of noise.
 class Scene {
  public:
   struct Setup {

@@ -68,7 +68,8 @@ Clutter ReadClutter(const Config& page) {
 
 ScenePage ReadScenePage(const Task& task) {
   const Config task_page = Config::FromText(task.page, task.page_path);
-  if (!task_page.Has("mujoco")) throw InvalidInput("{}: found no section 'mujoco', wanted one: see docs/add_a_task.md", task.page_path);
+  if (!task_page.Has("mujoco"))
+    throw InvalidInput("{}: found no section 'mujoco', wanted one: see docs/add_a_task.md", task.page_path);
   const Config page = task_page.Section("mujoco");
   page.AllowOnly({"scene", "home", "objects", "colours", "light", "clutter"});
   ScenePage scene;

@@ -44,7 +44,7 @@ struct Clutter {
 
 /// The `mujoco:` section of a task page: what only this world needs to know about a task.
 struct ScenePage {
-  std::filesystem::path scene;  ///< MJCF
+  std::filesystem::path scene;                                       ///< MJCF
   Eigen::Isometry3d base_from_home = Eigen::Isometry3d::Identity();  ///< the gripper in the first frame
   std::vector<Placement> placements;
   std::vector<ColourVariation> colours;

@@ -43,7 +43,8 @@ HiddenErrors DrawHiddenErrors(const Profile& profile, const std::vector<Camera>&
 
 void AddNoise(cv::Mat& image, double deviation_grey, std::uint64_t seed) {
   if (deviation_grey <= 0) return;
-  // The number of ones among 64 random bits has mean 32 and deviation 4: one draw per value, the same bits on every machine.
+  // The number of ones among 64 random bits has mean 32 and deviation 4: one draw per value, the same bits on every
+  // machine.
   SplitMix64 random(seed);
   std::transform(image.datastart, image.dataend, image.data, [&](std::uint8_t value) {
     const double noise = deviation_grey * (std::popcount(random.Next()) - 32) / 4.0;

@@ -56,7 +56,8 @@ Vector3d Recoloured(const Vector3d& rgb, double hue_deg, double saturation, doub
   const double grey = high * (1 - std::min(1.0, saturation));  // towards grey, or away from it
   Vector3d pure = saturation <= 1 ? Vector3d(grey * Vector3d::Ones() + saturation * rgb)
                                   : Vector3d(high * Vector3d::Ones() - saturation * (high * Vector3d::Ones() - rgb));
-  // Turning about the grey axis by Rodrigues' formula keeps the sum and, for small angles, the impression of brightness.
+  // Turning about the grey axis by Rodrigues' formula keeps the sum and, for small angles, the impression of
+  // brightness.
   pure = Eigen::AngleAxisd(hue_deg * kDegree, Vector3d::Ones().normalized()) * pure;
   return (value * pure).cwiseMax(0.0).cwiseMin(1.0);
 }
@@ -78,7 +79,8 @@ void ScaleLight(Eigen::Map<Eigen::Vector3f> rgb, double strength, double warmth)
 }
 
 void ScaleLights(mjModel& model, double strength, double ambient, double warmth) {
-  for (int i = 0; i < model.nlight; ++i) ScaleLight(Eigen::Map<Eigen::Vector3f>(model.light_diffuse + 3 * i), strength, warmth);
+  for (int i = 0; i < model.nlight; ++i)
+    ScaleLight(Eigen::Map<Eigen::Vector3f>(model.light_diffuse + 3 * i), strength, warmth);
   ScaleLight(Eigen::Map<Eigen::Vector3f>(model.vis.headlight.diffuse), strength, warmth);
   ScaleLight(Eigen::Map<Eigen::Vector3f>(model.vis.headlight.ambient), ambient, warmth);
 }
@@ -104,8 +106,10 @@ void Scatter(mjModel& model, const Clutter& clutter, SplitMix64 random) {
     const bool there = random.Uniform() < clutter.chance;
     const Eigen::Vector2d place_m = places_m[chosen] + clutter.spread_m * jitter_m;
     places_m.erase(places_m.begin() + static_cast<std::ptrdiff_t>(chosen));
-    Eigen::Map<Vector3d>(model.body_pos + 3 * body) = Vector3d(place_m.x(), place_m.y(), there ? 0.0 : -5.0);  // or under the floor
-    Eigen::Map<Eigen::Vector4d>(model.body_quat + 4 * body) = Eigen::Vector4d(std::cos(half_yaw), 0, 0, std::sin(half_yaw));
+    Eigen::Map<Vector3d>(model.body_pos + 3 * body) =
+        Vector3d(place_m.x(), place_m.y(), there ? 0.0 : -5.0);  // or under the floor
+    Eigen::Map<Eigen::Vector4d>(model.body_quat + 4 * body) =
+        Eigen::Vector4d(std::cos(half_yaw), 0, 0, std::sin(half_yaw));
   }
 }
 

@@ -5,7 +5,8 @@
 namespace evac::sim {
 
 Workers::Workers(int threads) {
-  // Mesa's software rasteriser would start threads of its own in each context; ours already use every core. A user's choice stands.
+  // Mesa's software rasteriser would start threads of its own in each context; ours already use every core. A user's
+  // choice stands.
   setenv("LP_NUM_THREADS", "0", 0);
   for (int i = 0; i < threads; ++i) threads_.emplace_back([this] { Live(); });
   std::unique_lock lock(mutex_);

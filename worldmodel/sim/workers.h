@@ -22,8 +22,8 @@ class Workers {
   Workers(const Workers&) = delete;
   Workers& operator=(const Workers&) = delete;
 
-  /// Calls `work` once for each item 0 … count - 1, in any order, at the same time on several threads; returns when all are done.
-  /// What `work` throws is thrown again here, the lowest item's first.
+  /// Calls `work` once for each item 0 … count - 1, in any order, at the same time on several threads; returns when all
+  /// are done. What `work` throws is thrown again here, the lowest item's first.
   void Run(int count, const Work& work);
 
  private:

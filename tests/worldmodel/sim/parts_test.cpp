@@ -53,7 +53,8 @@ TEST(ArmControl, MeasuresWhereItBelievesToBe) {
   mj_kinematics(model.get(), data.get());
   const int site = IdOf(*model, mjOBJ_SITE, "gripper");
   const Eigen::Isometry3d truth = PoseOf(data->site_xpos + 3 * site, data->site_xmat + 9 * site);
-  EXPECT_LT((control.Measured(*data).base_from_gripper.translation() - home.base_from_gripper.translation()).norm(), 1e-4);
+  EXPECT_LT((control.Measured(*data).base_from_gripper.translation() - home.base_from_gripper.translation()).norm(),
+            1e-4);
   EXPECT_NEAR(control.Measured(*data).closure, 0.25, 1e-9);
   EXPECT_GT((truth.translation() - home.base_from_gripper.translation()).norm(), 0.002);  // the hidden error
 }

@@ -8,7 +8,8 @@
 
 #include "core/types.h"
 
-/// A hand-written motion that knows where everything truly is: it shows that the tasks can be solved by friction alone. Not a policy.
+/// A hand-written motion that knows where everything truly is: it shows that the tasks can be solved by friction alone.
+/// Not a policy.
 namespace evac::test {
 
 struct Waypoint {
@@ -17,7 +18,8 @@ struct Waypoint {
 };
 
 inline const Eigen::Isometry3d& PoseIn(const PrivilegedFrame& frame, const std::string& body) {
-  const auto found = std::find_if(frame.bodies.begin(), frame.bodies.end(), [&](const auto& b) { return b.name == body; });
+  const auto found =
+      std::find_if(frame.bodies.begin(), frame.bodies.end(), [&](const auto& b) { return b.name == body; });
   if (found == frame.bodies.end()) throw std::out_of_range("no body named " + body);
   return found->base_from_body;
 }
@@ -60,12 +62,18 @@ inline std::vector<Waypoint> Plan(const PickAndPlace& p) {
     return position_m;
   };
   const double hold = p.hold_closure;
-  return {{At(over(p.pick_m), p.pick_rotation, 0), 14},      {At(p.pick_m, p.pick_rotation, 0), 12},
-          {At(p.pick_m, p.pick_rotation, 0), 3},             {At(p.pick_m, p.pick_rotation, hold), 7},
-          {At(over(p.pick_m), p.pick_rotation, hold), 12},   {At(over(p.place_m), p.pick_rotation, hold), 14},
-          {At(over(p.place_m), p.place_rotation, hold), 6},  {At(p.place_m, p.place_rotation, hold), 14},
-          {At(p.place_m, p.place_rotation, hold), 3},        {At(p.place_m, p.place_rotation, 0), 5},
-          {At(over(p.place_m), p.place_rotation, 0), 12},    {p.home, 14},
+  return {{At(over(p.pick_m), p.pick_rotation, 0), 14},
+          {At(p.pick_m, p.pick_rotation, 0), 12},
+          {At(p.pick_m, p.pick_rotation, 0), 3},
+          {At(p.pick_m, p.pick_rotation, hold), 7},
+          {At(over(p.pick_m), p.pick_rotation, hold), 12},
+          {At(over(p.place_m), p.pick_rotation, hold), 14},
+          {At(over(p.place_m), p.place_rotation, hold), 6},
+          {At(p.place_m, p.place_rotation, hold), 14},
+          {At(p.place_m, p.place_rotation, hold), 3},
+          {At(p.place_m, p.place_rotation, 0), 5},
+          {At(over(p.place_m), p.place_rotation, 0), 12},
+          {p.home, 14},
           {p.home, 12}};
 }
 
@@ -80,7 +88,8 @@ inline PickAndPlace PlanBottle(const PrivilegedFrame& frame, const ArmState& hom
   return p;
 }
 
-/// The toast across its thin side; let go with its lower edge just over the plate, leaning, so that it tips onto the middle.
+/// The toast across its thin side; let go with its lower edge just over the plate, leaning, so that it tips onto the
+/// middle.
 inline PickAndPlace PlanToast(const PrivilegedFrame& frame, const ArmState& home) {
   constexpr double kTilt = 25 * std::numbers::pi / 180, kAboveCentreM = 0.024, kHalfHeightM = 0.040;
   const Eigen::Isometry3d toast = PoseIn(frame, "toast");
@@ -104,7 +113,8 @@ inline std::vector<Arms> Targets(ArmState from, const std::vector<Waypoint>& way
     const Eigen::Quaterniond start(from.base_from_gripper.linear()), end(waypoint.arm.base_from_gripper.linear());
     for (int k = 1; k <= waypoint.periods; ++k) {
       const double part = static_cast<double>(k) / waypoint.periods;
-      const Eigen::Vector3d position_m = (1 - part) * from.base_from_gripper.translation() + part * waypoint.arm.base_from_gripper.translation();
+      const Eigen::Vector3d position_m =
+          (1 - part) * from.base_from_gripper.translation() + part * waypoint.arm.base_from_gripper.translation();
       targets.push_back({At(position_m, start.slerp(part, end).toRotationMatrix(), waypoint.arm.closure)});
     }
     from = waypoint.arm;

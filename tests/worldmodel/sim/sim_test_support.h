@@ -41,7 +41,8 @@ inline std::vector<WorldStep> Advance(World& world, SceneId scene, const std::ve
 /// Every byte that a policy could see.
 inline std::string Bytes(const WorldStep& step) {
   std::string bytes;
-  for (const cv::Mat& image : step.observation.images) bytes.append(reinterpret_cast<const char*>(image.data), image.total() * image.elemSize());
+  for (const cv::Mat& image : step.observation.images)
+    bytes.append(reinterpret_cast<const char*>(image.data), image.total() * image.elemSize());
   for (const ArmState& arm : step.observation.arms) {
     const Eigen::Matrix4d pose = arm.base_from_gripper.matrix();
     bytes.append(reinterpret_cast<const char*>(pose.data()), sizeof(double) * 16);
