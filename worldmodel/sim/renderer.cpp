@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <mutex>
 #include <opencv2/imgproc.hpp>
 
 #include "core/error.h"
@@ -30,6 +31,13 @@ EGLDisplay OpenDisplay() {
   display = eglGetDisplay(EGL_DEFAULT_DISPLAY);
   Check(display != EGL_NO_DISPLAY && eglInitialize(display, nullptr, nullptr), "opening a display");
   return display;
+}
+
+/// Held wherever OpenGL works. Mesa's software rasteriser keeps one screen per process, and two contexts that drew at the same time
+/// crashed inside it now and then (Mesa 22.3, LP_NUM_THREADS=0); physics, codecs and everything else run beside it.
+std::mutex& OpenGlTurn() {
+  static std::mutex mutex;
+  return mutex;
 }
 
 void Copy(const Eigen::Vector3d& from, float* to) {
@@ -109,8 +117,16 @@ struct Renderer::Canvas {
   mjvCamera unused_camera;  ///< MuJoCo wants one before we put ours in its place
 };
 
-Renderer::Renderer() : display_(std::make_unique<Display>()) {}
-Renderer::~Renderer() { canvases_.clear(); }  // while their context is still there
+Renderer::Renderer() {
+  const std::lock_guard turn(OpenGlTurn());
+  display_ = std::make_unique<Display>();
+}
+
+Renderer::~Renderer() {
+  const std::lock_guard turn(OpenGlTurn());
+  canvases_.clear();  // while their context is still there
+  display_.reset();
+}
 
 Renderer::Canvas& Renderer::CanvasFor(const mjModel& base, const Camera& camera) {
   for (const auto& canvas : canvases_) {
@@ -123,6 +139,7 @@ Renderer::Canvas& Renderer::CanvasFor(const mjModel& base, const Camera& camera)
 
 cv::Mat Renderer::Draw(const mjModel& base, const mjModel& model, mjData& data, const Camera& camera,
                        const Eigen::Isometry3d& base_from_camera) {
+  std::unique_lock turn(OpenGlTurn());
   Canvas& canvas = CanvasFor(base, camera);
   mjv_updateScene(&model, &data, &canvas.options, nullptr, &canvas.unused_camera, mjCAT_ALL, &canvas.scene);
   canvas.scene.camera[0] = canvas.scene.camera[1] = ViewOf(camera, base_from_camera);
@@ -130,7 +147,8 @@ cv::Mat Renderer::Draw(const mjModel& base, const mjModel& model, mjData& data, 
   mjr_setBuffer(mjFB_OFFSCREEN, &canvas.context);
   mjr_render(viewport, &canvas.scene, &canvas.context);
   cv::Mat bottom_up(viewport.height, viewport.width, CV_8UC3), image;
-  mjr_readPixels(bottom_up.data, nullptr, viewport, &canvas.context);
+  mjr_readPixels(bottom_up.data, nullptr, viewport, &canvas.context);  // waits until it is drawn
+  turn.unlock();
   cv::resize(bottom_up, image, {camera.width_px, camera.height_px}, 0, 0, cv::INTER_AREA);
   cv::flip(image, image, 0);
   return image;
