@@ -31,7 +31,9 @@ struct Listed {
 };
 
 bool IsWanted(const Episode& episode, const LsArguments& arguments) {
-  const auto fits = [](const std::string& wanted, const std::string& found) { return wanted.empty() || wanted == found; };
+  const auto fits = [](const std::string& wanted, const std::string& found) {
+    return wanted.empty() || wanted == found;
+  };
   return fits(arguments.world, episode.key.world) && fits(arguments.task, episode.key.pair.task) &&
          fits(arguments.policy, episode.key.pair.policy) && (!arguments.failed || IsFailure(episode.stop));
 }
@@ -99,7 +101,8 @@ void PrintJson(const std::vector<Listed>& list) {
 
 std::string Shown(const Labels& labels) {
   std::string shown;
-  for (const auto& [judge, label] : labels) shown += fmt::format("{}{}={}", shown.empty() ? "" : " ", judge, Name(label));
+  for (const auto& [judge, label] : labels)
+    shown += fmt::format("{}{}={}", shown.empty() ? "" : " ", judge, Name(label));
   return shown.empty() ? "-" : shown;
 }
 
@@ -109,8 +112,8 @@ std::vector<Row> Rows(const std::vector<Listed>& list) {
   std::vector<Row> rows = {{"TASK", "INITIAL STATE", "POLICY", "SEED", "WORLD", "CHUNKS", "STOP", "VERDICTS"}};
   for (const auto& [episode, labels] : list) {
     const PairKey& pair = episode.key.pair;
-    rows.push_back({pair.task, pair.initial_state, pair.policy + "@" + pair.checkpoint, std::to_string(pair.seed), episode.key.world,
-                    std::to_string(episode.chunks), Name(episode.stop), Shown(labels)});
+    rows.push_back({pair.task, pair.initial_state, pair.policy + "@" + pair.checkpoint, std::to_string(pair.seed),
+                    episode.key.world, std::to_string(episode.chunks), Name(episode.stop), Shown(labels)});
   }
   return rows;
 }
@@ -122,7 +125,8 @@ void PrintAligned(const std::vector<Row>& rows) {
   }
   for (const Row& row : rows) {
     std::string line;
-    for (std::size_t i = 0; i < row.size(); ++i) line += fmt::format("{:{}}  ", row[i], i + 1 < row.size() ? widths[i] : 0);
+    for (std::size_t i = 0; i < row.size(); ++i)
+      line += fmt::format("{:{}}  ", row[i], i + 1 < row.size() ? widths[i] : 0);
     fmt::print("{}\n", line.substr(0, line.find_last_not_of(' ') + 1));
   }
 }
@@ -137,11 +141,15 @@ void PrintTable(const std::vector<Listed>& list) {
     worlds.insert(episode.key.world);
     failed += IsFailure(episode.stop);
     judged += !labels.empty();
-    if (IsFailure(episode.stop)) fmt::print("{}failed: {}: {}\n", failed == 1 ? "\n" : "", episode.key.Id(), episode.failure);
+    if (IsFailure(episode.stop))
+      fmt::print("{}failed: {}: {}\n", failed == 1 ? "\n" : "", episode.key.Id(), episode.failure);
   }
-  const auto counted = [](std::size_t count, const char* one, const char* many) { return fmt::format("{} {}", count, count == 1 ? one : many); };
-  fmt::print("\n{} ({}, {}, {}), {} failed, {} judged\n", counted(list.size(), "episode", "episodes"), counted(tasks.size(), "task", "tasks"),
-             counted(policies.size(), "policy", "policies"), counted(worlds.size(), "world", "worlds"), failed, judged);
+  const auto counted = [](std::size_t count, const char* one, const char* many) {
+    return fmt::format("{} {}", count, count == 1 ? one : many);
+  };
+  fmt::print("\n{} ({}, {}, {}), {} failed, {} judged\n", counted(list.size(), "episode", "episodes"),
+             counted(tasks.size(), "task", "tasks"), counted(policies.size(), "policy", "policies"),
+             counted(worlds.size(), "world", "worlds"), failed, judged);
 }
 
 }  // namespace

@@ -94,8 +94,10 @@ void DemandPlainKeys(const YAML::Node& node, const std::filesystem::path& file) 
       continue;
     }
     const int line = item.first.Mark().line + 1;
-    if (!item.first.IsScalar()) throw InvalidInput("{}:{}: found {} as a key, wanted a text", file.string(), line, Shown(item.first));
-    if (!keys.insert(item.first.Scalar()).second) throw InvalidInput("{}:{}: field {} is given twice", file.string(), line, item.first.Scalar());
+    if (!item.first.IsScalar())
+      throw InvalidInput("{}:{}: found {} as a key, wanted a text", file.string(), line, Shown(item.first));
+    if (!keys.insert(item.first.Scalar()).second)
+      throw InvalidInput("{}:{}: field {} is given twice", file.string(), line, item.first.Scalar());
     DemandPlainKeys(item.second, file);
   }
 }
@@ -103,7 +105,8 @@ void DemandPlainKeys(const YAML::Node& node, const std::filesystem::path& file) 
 YAML::Node Parse(const std::string& text, const std::filesystem::path& file) {
   try {
     YAML::Node node = YAML::Load(text);
-    if (!node.IsMap()) throw InvalidInput("{}: found {}, wanted a YAML mapping (key: value)", file.string(), Shown(node));
+    if (!node.IsMap())
+      throw InvalidInput("{}: found {}, wanted a YAML mapping (key: value)", file.string(), Shown(node));
     DemandPlainKeys(node, file);
     return node;
   } catch (const YAML::Exception& error) {
@@ -115,13 +118,15 @@ YAML::Node Parse(const std::string& text, const std::filesystem::path& file) {
 template <typename T>
 bool IsFinite(const T& value) {
   if constexpr (std::is_same_v<T, double>) return std::isfinite(value);
-  if constexpr (std::is_same_v<T, std::vector<double>>) return std::all_of(value.begin(), value.end(), [](double x) { return std::isfinite(x); });
+  if constexpr (std::is_same_v<T, std::vector<double>>)
+    return std::all_of(value.begin(), value.end(), [](double x) { return std::isfinite(x); });
   return true;
 }
 
 YAML::Node Step(const YAML::Node& node, const std::string& key) {
   if (node.IsMap()) return node[key];
-  const bool is_index = !key.empty() && key.size() < 7 && std::all_of(key.begin(), key.end(), [](unsigned char c) { return std::isdigit(c); });
+  const bool is_index = !key.empty() && key.size() < 7 &&
+                        std::all_of(key.begin(), key.end(), [](unsigned char c) { return std::isdigit(c); });
   if (node.IsSequence() && is_index && std::stoul(key) < node.size()) return node[std::stoul(key)];
   return YAML::Node(YAML::NodeType::Undefined);
 }
@@ -133,11 +138,14 @@ Config::Config(YAML::Node node, std::filesystem::path file, std::string field)
 
 Config Config::FromFile(const std::filesystem::path& path) { return FromText(ReadFile(path), path); }
 
-Config Config::FromText(const std::string& text, const std::filesystem::path& name) { return Config(Parse(text, name), name, ""); }
+Config Config::FromText(const std::string& text, const std::filesystem::path& name) {
+  return Config(Parse(text, name), name, "");
+}
 
 void Config::Set(const std::string& assignment) {
   const std::size_t equals = assignment.find('=');
-  if (equals == std::string::npos || equals == 0) throw InvalidInput("--set {}: wanted path.to.field=VALUE", assignment);
+  if (equals == std::string::npos || equals == 0)
+    throw InvalidInput("--set {}: wanted path.to.field=VALUE", assignment);
   std::vector<std::string> keys;
   std::istringstream path(assignment.substr(0, equals));
   for (std::string key; std::getline(path, key, '.');) keys.push_back(key);
@@ -159,7 +167,8 @@ void Config::Set(const std::string& assignment) {
     return;
   }
   YAML::Node item = Step(parent, keys.back());
-  if (!item.IsDefined()) throw InvalidInput("--set {}: {} has no field or item '{}'", assignment, file_.string(), keys.back());
+  if (!item.IsDefined())
+    throw InvalidInput("--set {}: {} has no field or item '{}'", assignment, file_.string(), keys.back());
   item = value;
 }
 
@@ -218,9 +227,9 @@ T Config::Value() const {
   return Converted<T>("", node_);
 }
 
-#define EVAC_CONFIG_TYPE(T)                                        \
-  template T Config::Get<T>(const std::string&) const;             \
-  template T Config::Get<T>(const std::string&, const T&) const;   \
+#define EVAC_CONFIG_TYPE(T)                                      \
+  template T Config::Get<T>(const std::string&) const;           \
+  template T Config::Get<T>(const std::string&, const T&) const; \
   template T Config::Value<T>() const;
 EVAC_CONFIG_TYPE(bool)
 EVAC_CONFIG_TYPE(int)
@@ -243,7 +252,8 @@ std::vector<Config> Config::List(const std::string& key) const {
   std::vector<Config> items;
   if (!child.IsDefined() || child.IsNull()) return items;
   if (!child.IsSequence()) ThrowWrongType(key, child, "a list");
-  for (std::size_t i = 0; i < child.size(); ++i) items.push_back(Config(child[i], file_, FieldName(key) + "." + std::to_string(i)));
+  for (std::size_t i = 0; i < child.size(); ++i)
+    items.push_back(Config(child[i], file_, FieldName(key) + "." + std::to_string(i)));
   return items;
 }
 
@@ -263,8 +273,9 @@ void Config::AllowOnly(std::initializer_list<const char*> known) const {
   for (const std::string& key : Keys()) {
     if (std::find(known.begin(), known.end(), key) != known.end()) continue;
     if (known.size() == 0) throw InvalidInput("{}: there is no such field", Where(key));
-    const auto nearest = std::min_element(known.begin(), known.end(),
-                                          [&](const char* a, const char* b) { return EditDistance(key, a) < EditDistance(key, b); });
+    const auto nearest = std::min_element(known.begin(), known.end(), [&](const char* a, const char* b) {
+      return EditDistance(key, a) < EditDistance(key, b);
+    });
     throw InvalidInput("{}: there is no such field; the nearest is '{}'", Where(key), *nearest);
   }
 }

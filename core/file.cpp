@@ -29,7 +29,8 @@ void SyncFolder(const fs::path& folder) { Sync(folder.empty() ? fs::path(".") : 
 
 std::string ReadFile(const fs::path& path) {
   std::ifstream file(path, std::ios::binary);
-  if (!file || fs::is_directory(path)) throw InvalidInput("{}: cannot be read: {}", path.string(), std::strerror(file ? EISDIR : errno));
+  if (!file || fs::is_directory(path))
+    throw InvalidInput("{}: cannot be read: {}", path.string(), std::strerror(file ? EISDIR : errno));
   std::ostringstream bytes;
   bytes << file.rdbuf();
   return std::move(bytes).str();
@@ -37,7 +38,8 @@ std::string ReadFile(const fs::path& path) {
 
 void SyncAndRename(const fs::path& from, const fs::path& to) {
   Sync(from, O_RDONLY);
-  if (::rename(from.c_str(), to.c_str()) != 0) throw InternalError("{}: cannot be renamed from {}: {}", to.string(), from.string(), std::strerror(errno));
+  if (::rename(from.c_str(), to.c_str()) != 0)
+    throw InternalError("{}: cannot be renamed from {}: {}", to.string(), from.string(), std::strerror(errno));
   SyncFolder(to.parent_path());
 }
 

@@ -50,8 +50,9 @@ void BeginOrDemandSame(sqlite::Connection& connection, const RunInfo& run, const
   const std::optional<RunInfo> stored = rows::SelectRun(connection);
   if (!stored) return rows::InsertRun(connection, run);
   if (stored->suite_hash == run.suite_hash) return;
-  throw InvalidInput("{}: holds a run of another suite: its suite hash is {}, this suite's is {}; choose another folder", folder.string(),
-                     stored->suite_hash, run.suite_hash);
+  throw InvalidInput(
+      "{}: holds a run of another suite: its suite hash is {}, this suite's is {}; choose another folder",
+      folder.string(), stored->suite_hash, run.suite_hash);
 }
 
 }  // namespace
@@ -77,10 +78,12 @@ Store Store::CreateOrContinue(const fs::path& folder, const RunInfo& run) {
 
 Store Store::Open(const fs::path& folder, Mode mode) {
   const fs::path file = DatabaseIn(folder);
-  if (!fs::is_regular_file(file)) throw InvalidInput("{}: there is no run ({} is missing)", folder.string(), run_files::kDatabase);
+  if (!fs::is_regular_file(file))
+    throw InvalidInput("{}: there is no run ({} is missing)", folder.string(), run_files::kDatabase);
   sqlite::Connection reading = sqlite::Connection::OpenReadOnly(file);
   const int version = schema::Version(reading, schema::Steps(), file);
-  if (version == 0 || !rows::SelectRun(reading)) throw InvalidInput("{}: the run in it was never begun", folder.string());
+  if (version == 0 || !rows::SelectRun(reading))
+    throw InvalidInput("{}: the run in it was never begun", folder.string());
   if (mode == Mode::kReadOnly) return Store(std::make_unique<Database>(folder, nullptr, false, std::move(reading)));
 
   auto lock = std::make_unique<RunLock>(folder / run_files::kLock);
@@ -121,7 +124,8 @@ std::vector<PolicyInfo> Store::Policies() const { return database_->Read(rows::S
 void Store::Add(const EpisodeRecord& record) {
   Episode episode = record.episode;
   const std::string id = episode.key.Id();
-  if (Has(episode.key)) throw InternalError("episode {} is in the store already", id);  // before its thumbnail is overwritten
+  if (Has(episode.key))
+    throw InternalError("episode {} is in the store already", id);  // before its thumbnail is overwritten
   if (record.video) {
     episode.video = run_files::NameInside(folder(), record.video->path);
     episode.video_sha256 = record.video->sha256;

@@ -36,9 +36,9 @@ struct PolicyInfo {
 /// Everything that is written when an episode ends.
 struct EpisodeRecord {
   Episode episode;
-  PrivilegedTrack privileged;            ///< empty or one per observation
-  std::optional<FinishedVideo> video;    ///< already on disk under its final name, inside the run's folder
-  std::string thumbnail_jpeg;            ///< bytes; empty when there is no frame
+  PrivilegedTrack privileged;          ///< empty or one per observation
+  std::optional<FinishedVideo> video;  ///< already on disk under its final name, inside the run's folder
+  std::string thumbnail_jpeg;          ///< bytes; empty when there is no frame
 };
 
 /// How often the wire misbehaved, by name ("repeats", "stale_replies", …): counts of effort, no part of a result.
@@ -74,7 +74,9 @@ class Store {
   std::vector<PolicyInfo> Policies() const;
 
   /// One transaction: the episode's row, its steps, privileged track, video path and hash are there, or nothing is.
-  /// @throws Error if the episode is there already, or the disk is full (the store stays intact).
+  /// Its task, world and policy must have been added before.
+  /// @throws Error if the episode is there already, its video is not in the run's folder, or the disk is full (the
+  /// store stays intact).
   void Add(const EpisodeRecord& record);
   bool Has(const EpisodeKey& key) const;
   /// Removes a failed episode and its verdicts so that it can run again (`resume --retry-failed`).
@@ -101,7 +103,8 @@ class Store {
   void Count(const std::string& policy, const Counters& counters);
   std::map<std::string, Counters> CountersByPolicy() const;
 
-  /// Removes videos, thumbnails and .tmp files that no row names: what a kill left behind. Call when continuing, before running.
+  /// Removes videos, thumbnails and .tmp files that no row names: what a kill left behind. Call when continuing, before
+  /// running.
   void RemoveOrphans();
 
   /// RUN/videos/<episode id>.mp4, its folder made.

@@ -62,7 +62,9 @@ class Unpacker {
   void ExpectEnd() const {
     if (!bytes_.empty()) ThrowDamaged();
   }
-  [[noreturn]] static void ThrowDamaged() { throw InternalError("the store is damaged: a blob does not have the length it states"); }
+  [[noreturn]] static void ThrowDamaged() {
+    throw InternalError("the store is damaged: a blob does not have the length it states");
+  }
 
  private:
   std::string_view Take(std::size_t size) {

@@ -6,7 +6,9 @@ namespace evac::rows {
 namespace {
 
 /// What a page says, whatever its comments and layout.
-std::string Meaning(const std::string& page) { return page.empty() ? "" : Config::FromText(page, "task page").Canonical(); }
+std::string Meaning(const std::string& page) {
+  return page.empty() ? "" : Config::FromText(page, "task page").Canonical();
+}
 
 [[noreturn]] void ThrowOther(const std::string& what, const std::string& stored, const std::string& wanted) {
   throw InvalidInput("{} is in this run already, and is something else: stored {}, wanted {}", what, stored, wanted);
@@ -19,8 +21,8 @@ std::string Shown(const WorldInfo& world) {
 }  // namespace
 
 void InsertRun(sqlite::Connection& connection, const RunInfo& run) {
-  connection.Run("INSERT INTO run (id, suite_text, suite_hash, suite_path, evac_version) VALUES (1, ?, ?, ?, ?)", run.suite_text,
-                 run.suite_hash, run.suite_path, run.evac_version);
+  connection.Run("INSERT INTO run (id, suite_text, suite_hash, suite_path, evac_version) VALUES (1, ?, ?, ?, ?)",
+                 run.suite_text, run.suite_hash, run.suite_path, run.evac_version);
 }
 
 std::optional<RunInfo> SelectRun(sqlite::Connection& connection) {
@@ -33,7 +35,8 @@ void DeclareTask(sqlite::Connection& connection, const Task& task) {
   const std::string definition = codec::EncodeTask(task);
   auto row = connection.Query("SELECT definition, page FROM tasks WHERE id = ?", task.id);
   if (!row.Step()) {
-    connection.Run("INSERT INTO tasks (id, definition, page, page_path) VALUES (?, ?, ?, ?)", task.id, definition, task.page, task.page_path);
+    connection.Run("INSERT INTO tasks (id, definition, page, page_path) VALUES (?, ?, ?, ?)", task.id, definition,
+                   task.page, task.page_path);
     return;
   }
   if (row.Text(0) != definition) ThrowOther("task '" + task.id + "'", row.Text(0), definition);
@@ -45,8 +48,8 @@ void DeclareTask(sqlite::Connection& connection, const Task& task) {
 void DeclareWorld(sqlite::Connection& connection, const WorldInfo& world) {
   auto row = connection.Query("SELECT name, type, is_real, profile_hash FROM worlds WHERE name = ?", world.name);
   if (!row.Step()) {
-    connection.Run("INSERT INTO worlds (name, type, is_real, profile_hash) VALUES (?, ?, ?, ?)", world.name, world.type, world.is_real,
-                   world.profile_hash);
+    connection.Run("INSERT INTO worlds (name, type, is_real, profile_hash) VALUES (?, ?, ?, ?)", world.name, world.type,
+                   world.is_real, world.profile_hash);
     return;
   }
   const WorldInfo stored{row.Text(0), row.Text(1), row.Integer(2) != 0, row.Text(3)};
@@ -54,10 +57,11 @@ void DeclareWorld(sqlite::Connection& connection, const WorldInfo& world) {
 }
 
 void DeclarePolicy(sqlite::Connection& connection, const PolicyInfo& policy) {
-  auto row = connection.Query("SELECT declaration FROM policies WHERE name = ? AND checkpoint = ?", policy.name, policy.checkpoint);
+  auto row = connection.Query("SELECT declaration FROM policies WHERE name = ? AND checkpoint = ?", policy.name,
+                              policy.checkpoint);
   if (!row.Step()) {
-    connection.Run("INSERT INTO policies (name, checkpoint, declaration) VALUES (?, ?, ?)", policy.name, policy.checkpoint,
-                   policy.declaration);
+    connection.Run("INSERT INTO policies (name, checkpoint, declaration) VALUES (?, ?, ?)", policy.name,
+                   policy.checkpoint, policy.declaration);
     return;
   }
   if (row.Text(0) == policy.declaration) return;
@@ -84,7 +88,8 @@ std::vector<WorldInfo> SelectWorlds(sqlite::Connection& connection) {
 
 std::vector<PolicyInfo> SelectPolicies(sqlite::Connection& connection) {
   std::vector<PolicyInfo> policies;
-  for (auto row = connection.Query("SELECT name, checkpoint, declaration FROM policies ORDER BY name, checkpoint"); row.Step();) {
+  for (auto row = connection.Query("SELECT name, checkpoint, declaration FROM policies ORDER BY name, checkpoint");
+       row.Step();) {
     policies.push_back({row.Text(0), row.Text(1), row.Text(2)});
   }
   return policies;

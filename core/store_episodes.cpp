@@ -8,7 +8,7 @@ namespace evac::rows {
 namespace {
 
 /// Their order is ReadEpisode's.
-#define EVAC_EPISODE_COLUMNS                                                                                          \
+#define EVAC_EPISODE_COLUMNS                                                                                        \
   "task, initial_state, policy, checkpoint, seed, world, chunks, stop, stop_reason, failure, video, video_sha256, " \
   "thumbnail"
 
@@ -26,7 +26,9 @@ Episode ReadEpisode(const sqlite::Statement& row) {
   return episode;
 }
 
-std::optional<std::string> NullIfEmpty(const std::string& text) { return text.empty() ? std::nullopt : std::optional(text); }
+std::optional<std::string> NullIfEmpty(const std::string& text) {
+  return text.empty() ? std::nullopt : std::optional(text);
+}
 
 bool Exists(sqlite::Statement row) { return row.Step(); }
 
@@ -39,8 +41,10 @@ void DemandDeclared(sqlite::Connection& connection, const EpisodeKey& key) {
   if (!Exists(connection.Query("SELECT 1 FROM worlds WHERE name = ?", key.world))) {
     throw InternalError("episode {}: world '{}' was not added to the store", key.Id(), key.world);
   }
-  if (!Exists(connection.Query("SELECT 1 FROM policies WHERE name = ? AND checkpoint = ?", pair.policy, pair.checkpoint))) {
-    throw InternalError("episode {}: policy '{}@{}' was not added to the store", key.Id(), pair.policy, pair.checkpoint);
+  if (!Exists(
+          connection.Query("SELECT 1 FROM policies WHERE name = ? AND checkpoint = ?", pair.policy, pair.checkpoint))) {
+    throw InternalError("episode {}: policy '{}@{}' was not added to the store", key.Id(), pair.policy,
+                        pair.checkpoint);
   }
 }
 
@@ -48,22 +52,25 @@ void DemandDeclared(sqlite::Connection& connection, const EpisodeKey& key) {
 
 void InsertEpisode(sqlite::Connection& connection, const Episode& episode) {
   const PairKey& pair = episode.key.pair;
-  if (SelectEpisode(connection, episode.key.Id())) throw InternalError("episode {} is in the store already", episode.key.Id());
+  if (SelectEpisode(connection, episode.key.Id()))
+    throw InternalError("episode {} is in the store already", episode.key.Id());
   DemandDeclared(connection, episode.key);
   connection.Run("INSERT INTO episodes (id, failed, " EVAC_EPISODE_COLUMNS
                  ") VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)",
-                 episode.key.Id(), IsFailure(episode.stop), pair.task, pair.initial_state, pair.policy, pair.checkpoint, pair.seed,
-                 episode.key.world, episode.chunks, Name(episode.stop), episode.stop_reason, NullIfEmpty(episode.failure),
-                 NullIfEmpty(episode.video), NullIfEmpty(episode.video_sha256), NullIfEmpty(episode.thumbnail));
+                 episode.key.Id(), IsFailure(episode.stop), pair.task, pair.initial_state, pair.policy, pair.checkpoint,
+                 pair.seed, episode.key.world, episode.chunks, Name(episode.stop), episode.stop_reason,
+                 NullIfEmpty(episode.failure), NullIfEmpty(episode.video), NullIfEmpty(episode.video_sha256),
+                 NullIfEmpty(episode.thumbnail));
 }
 
 void InsertSteps(sqlite::Connection& connection, const Episode& episode) {
   std::vector<codec::ArmsStep> observed, commanded;
-  for (const Observation& observation : episode.observations) observed.push_back({observation.arms, observation.arms_are_commanded});
+  for (const Observation& observation : episode.observations)
+    observed.push_back({observation.arms, observation.arms_are_commanded});
   for (const Arms& arms : episode.commands) commanded.push_back({arms, true});
   const std::string observations = codec::EncodeArms(observed), commands = codec::EncodeArms(commanded);
-  connection.Run("INSERT INTO steps (episode, observations, commands) VALUES (?, ?, ?)", episode.key.Id(), sqlite::Blob{observations},
-                 sqlite::Blob{commands});
+  connection.Run("INSERT INTO steps (episode, observations, commands) VALUES (?, ?, ?)", episode.key.Id(),
+                 sqlite::Blob{observations}, sqlite::Blob{commands});
 }
 
 void InsertPrivileged(sqlite::Connection& connection, const std::string& episode_id, const PrivilegedTrack& track) {
@@ -73,7 +80,8 @@ void InsertPrivileged(sqlite::Connection& connection, const std::string& episode
 
 std::vector<Episode> SelectEpisodes(sqlite::Connection& connection) {
   std::vector<Episode> episodes;
-  for (auto row = connection.Query("SELECT " EVAC_EPISODE_COLUMNS " FROM episodes"); row.Step();) episodes.push_back(ReadEpisode(row));
+  for (auto row = connection.Query("SELECT " EVAC_EPISODE_COLUMNS " FROM episodes"); row.Step();)
+    episodes.push_back(ReadEpisode(row));
   // Not in SQL, where a seed above 2^63 would be negative.
   std::sort(episodes.begin(), episodes.end(), [](const Episode& a, const Episode& b) { return a.key < b.key; });
   return episodes;
@@ -90,7 +98,8 @@ void SelectSteps(sqlite::Connection& connection, Episode& episode) {
   episode.observations.clear();
   episode.commands.clear();
   for (codec::ArmsStep& step : codec::DecodeArms(row.Text(0))) {
-    episode.observations.push_back({.images = {}, .arms = std::move(step.arms), .arms_are_commanded = step.are_commanded});
+    episode.observations.push_back(
+        {.images = {}, .arms = std::move(step.arms), .arms_are_commanded = step.are_commanded});
   }
   for (codec::ArmsStep& step : codec::DecodeArms(row.Text(1))) episode.commands.push_back(std::move(step.arms));
 }
@@ -101,9 +110,11 @@ PrivilegedTrack SelectPrivileged(sqlite::Connection& connection, const std::stri
 }
 
 void DeleteFailedEpisode(sqlite::Connection& connection, const std::string& episode_id) {
-  connection.Run("INSERT INTO removals (episode) VALUES (?)", episode_id);  // lets these rows, and no others, be deleted
+  connection.Run("INSERT INTO removals (episode) VALUES (?)",
+                 episode_id);  // lets these rows, and no others, be deleted
   connection.Run("DELETE FROM verdicts WHERE episode = ?", episode_id);
-  connection.Run("DELETE FROM episodes WHERE id = ?", episode_id);  // its steps, privileged track and removal go with it
+  connection.Run("DELETE FROM episodes WHERE id = ?",
+                 episode_id);  // its steps, privileged track and removal go with it
 }
 
 }  // namespace evac::rows

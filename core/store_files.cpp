@@ -10,7 +10,8 @@ namespace {
 namespace fs = std::filesystem;
 
 bool LeadsOut(const fs::path& relative) {
-  return relative.empty() || relative.is_absolute() || relative != relative.lexically_normal() || *relative.begin() == "..";
+  return relative.empty() || relative.is_absolute() || relative != relative.lexically_normal() ||
+         *relative.begin() == "..";
 }
 
 std::string NameOf(const EpisodeKey& key, const char* folder, const char* extension) {
@@ -26,7 +27,8 @@ std::string ThumbnailName(const EpisodeKey& key) { return NameOf(key, kThumbnail
 
 std::string NameInside(const fs::path& folder, const fs::path& file) {
   const fs::path relative = fs::weakly_canonical(file).lexically_relative(fs::weakly_canonical(folder));
-  if (LeadsOut(relative) || relative == ".") throw InternalError("{}: is outside the run's folder {}", file.string(), folder.string());
+  if (LeadsOut(relative) || relative == ".")
+    throw InternalError("{}: is outside the run's folder {}", file.string(), folder.string());
   if (!fs::is_regular_file(file)) throw InternalError("{}: is not there", file.string());
   return relative.generic_string();
 }

@@ -42,10 +42,14 @@ Eigen::Isometry3d PoseFromJson(const Json& rows) {
 }
 
 Json CameraToJson(const Camera& camera) {
-  return {{"name", camera.name},           {"width_px", camera.width_px},
-          {"height_px", camera.height_px}, {"fx_px", camera.fx_px},
-          {"fy_px", camera.fy_px},         {"cx_px", camera.cx_px},
-          {"cy_px", camera.cy_px},         {"mount", MountName(camera.mount)},
+  return {{"name", camera.name},
+          {"width_px", camera.width_px},
+          {"height_px", camera.height_px},
+          {"fx_px", camera.fx_px},
+          {"fy_px", camera.fy_px},
+          {"cx_px", camera.cx_px},
+          {"cy_px", camera.cy_px},
+          {"mount", MountName(camera.mount)},
           {"mount_from_camera", PoseToJson(camera.mount_from_camera)}};
 }
 
@@ -81,8 +85,9 @@ Json StillToJson(const StillRule& still) {
 }
 
 StillRule StillFromJson(const Json& json) {
-  return {json.at("enabled").get<bool>(),   json.at("translation_m").get<double>(), json.at("rotation_rad").get<double>(),
-          json.at("closure").get<double>(), json.at("dwell_chunks").get<int>(),     json.at("min_chunks").get<int>()};
+  return {json.at("enabled").get<bool>(),        json.at("translation_m").get<double>(),
+          json.at("rotation_rad").get<double>(), json.at("closure").get<double>(),
+          json.at("dwell_chunks").get<int>(),    json.at("min_chunks").get<int>()};
 }
 
 Json ConditionToJson(const Condition& condition) {
@@ -93,7 +98,8 @@ Json ConditionToJson(const Condition& condition) {
 }
 
 Condition ConditionFromJson(const Json& json) {
-  Condition condition{json.at("kind").get<std::string>(), json.at("a").get<std::string>(), json.at("b").get<std::string>(), {}, {}};
+  Condition condition{
+      json.at("kind").get<std::string>(), json.at("a").get<std::string>(), json.at("b").get<std::string>(), {}, {}};
   if (json.contains("above")) condition.above = json.at("above").get<double>();
   if (json.contains("below")) condition.below = json.at("below").get<double>();
   return condition;
@@ -102,7 +108,11 @@ Condition ConditionFromJson(const Json& json) {
 Json StageToJson(const Stage& stage) {
   Json conditions = Json::array();
   for (const Condition& condition : stage.all_of) conditions.push_back(ConditionToJson(condition));
-  return {{"name", stage.name}, {"description", stage.description}, {"all_of", conditions}, {"hold_s", stage.hold_s}, {"at_end", stage.at_end}};
+  return {{"name", stage.name},
+          {"description", stage.description},
+          {"all_of", conditions},
+          {"hold_s", stage.hold_s},
+          {"at_end", stage.at_end}};
 }
 
 Stage StageFromJson(const Json& json) {
@@ -128,7 +138,9 @@ Rubric RubricFromJson(const Json& json) {
 }
 
 Json PointToJson(const Eigen::Vector3d& point_m) { return {point_m.x(), point_m.y(), point_m.z()}; }
-Eigen::Vector3d PointFromJson(const Json& json) { return {json.at(0).get<double>(), json.at(1).get<double>(), json.at(2).get<double>()}; }
+Eigen::Vector3d PointFromJson(const Json& json) {
+  return {json.at(0).get<double>(), json.at(1).get<double>(), json.at(2).get<double>()};
+}
 
 /// Reads stored JSON; what is wrong with it is the store's damage.
 template <typename Read>
@@ -144,7 +156,8 @@ auto Decoded(const std::string& text, const Read& read) {
 std::string Dumped(const Json& json, const std::string& what) {
   const Json flat = json.flatten();
   for (const auto& [field, value] : flat.items()) {
-    if (value.is_number_float() && !std::isfinite(value.get<double>())) throw InvalidInput("{} cannot be stored: {} is not finite", what, field);
+    if (value.is_number_float() && !std::isfinite(value.get<double>()))
+      throw InvalidInput("{} cannot be stored: {} is not finite", what, field);
   }
   try {
     return json.dump();
@@ -159,15 +172,16 @@ std::string EncodeCameras(const std::vector<Camera>& cameras) { return Dumped(Ca
 std::vector<Camera> DecodeCameras(const std::string& json) { return Decoded(json, CamerasFromJson); }
 
 std::string EncodeTask(const Task& task) {
-  const Json json = {{"id", task.id},
-                     {"instruction", task.instruction},
-                     {"arms", task.arms},
-                     {"cameras", CamerasToJson(task.cameras)},
-                     {"period_s", task.period_s},
-                     {"max_chunks", task.max_chunks},
-                     {"still", StillToJson(task.still)},
-                     {"workspace_m", {{"min", PointToJson(task.workspace_m.min())}, {"max", PointToJson(task.workspace_m.max())}}},
-                     {"rubric", RubricToJson(task.rubric)}};
+  const Json json = {
+      {"id", task.id},
+      {"instruction", task.instruction},
+      {"arms", task.arms},
+      {"cameras", CamerasToJson(task.cameras)},
+      {"period_s", task.period_s},
+      {"max_chunks", task.max_chunks},
+      {"still", StillToJson(task.still)},
+      {"workspace_m", {{"min", PointToJson(task.workspace_m.min())}, {"max", PointToJson(task.workspace_m.max())}}},
+      {"rubric", RubricToJson(task.rubric)}};
   return Dumped(json, "task '" + task.id + "'");
 }
 
@@ -181,13 +195,16 @@ Task DecodeTask(const std::string& text) {
     task.period_s = json.at("period_s").get<double>();
     task.max_chunks = json.at("max_chunks").get<int>();
     task.still = StillFromJson(json.at("still"));
-    task.workspace_m = {PointFromJson(json.at("workspace_m").at("min")), PointFromJson(json.at("workspace_m").at("max"))};
+    task.workspace_m = {PointFromJson(json.at("workspace_m").at("min")),
+                        PointFromJson(json.at("workspace_m").at("max"))};
     task.rubric = RubricFromJson(json.at("rubric"));
     return task;
   });
 }
 
-std::string EncodeStages(const std::map<std::string, bool>& stages) { return Dumped(Json(stages), "a verdict's stages"); }
+std::string EncodeStages(const std::map<std::string, bool>& stages) {
+  return Dumped(Json(stages), "a verdict's stages");
+}
 
 std::map<std::string, bool> DecodeStages(const std::string& text) {
   return Decoded(text, [](const Json& json) { return json.get<std::map<std::string, bool>>(); });

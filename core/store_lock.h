@@ -4,7 +4,8 @@
 
 namespace evac {
 
-/// RUN/lock, held by the one process that may write the run. The kernel releases it with the process, however that ends.
+/// RUN/lock, held by the one process that may write the run. The kernel releases it with the process, however that
+/// ends.
 class RunLock {
  public:
   /// @throws InvalidInput naming the holder's process number, if there is one.

@@ -9,8 +9,9 @@ namespace evac::rows {
 namespace {
 
 bool IsStoredAlready(sqlite::Connection& connection, const PairKey& pair) {
-  auto row = connection.Query("SELECT seed, policy, checkpoint FROM initial_scenes WHERE task = ? AND initial_state = ?", pair.task,
-                              pair.initial_state);
+  auto row =
+      connection.Query("SELECT seed, policy, checkpoint FROM initial_scenes WHERE task = ? AND initial_state = ?",
+                       pair.task, pair.initial_state);
   if (!row.Step()) return false;
   const auto stored = std::tuple(static_cast<std::uint64_t>(row.Integer(0)), row.Text(1), row.Text(2));
   return stored <= std::tie(pair.seed, pair.policy, pair.checkpoint);
@@ -23,23 +24,30 @@ void UpsertInitialScene(sqlite::Connection& connection, const PairKey& pair, con
   const std::string arms = codec::EncodeArms({{scene.arms, false}});
   connection.Run("DELETE FROM initial_scenes WHERE task = ? AND initial_state = ?", pair.task, pair.initial_state);
   connection.Run(
-      "INSERT INTO initial_scenes (task, initial_state, seed, policy, checkpoint, arms, cameras) VALUES (?, ?, ?, ?, ?, ?, ?)", pair.task,
-      pair.initial_state, pair.seed, pair.policy, pair.checkpoint, sqlite::Blob{arms}, codec::EncodeCameras(scene.cameras));
+      "INSERT INTO initial_scenes (task, initial_state, seed, policy, checkpoint, arms, cameras) VALUES (?, ?, ?, ?, "
+      "?, ?, ?)",
+      pair.task, pair.initial_state, pair.seed, pair.policy, pair.checkpoint, sqlite::Blob{arms},
+      codec::EncodeCameras(scene.cameras));
   for (std::size_t i = 0; i < scene.images.size(); ++i) {
     const std::string png = codec::EncodePng(scene.images[i]);
-    connection.Run("INSERT INTO initial_scene_images (task, initial_state, position, png) VALUES (?, ?, ?, ?)", pair.task,
-                   pair.initial_state, i, sqlite::Blob{png});
+    connection.Run("INSERT INTO initial_scene_images (task, initial_state, position, png) VALUES (?, ?, ?, ?)",
+                   pair.task, pair.initial_state, i, sqlite::Blob{png});
   }
 }
 
-std::optional<InitialScene> SelectInitialScene(sqlite::Connection& connection, const std::string& task, const std::string& initial_state) {
-  auto row = connection.Query("SELECT arms, cameras FROM initial_scenes WHERE task = ? AND initial_state = ?", task, initial_state);
+std::optional<InitialScene> SelectInitialScene(sqlite::Connection& connection, const std::string& task,
+                                               const std::string& initial_state) {
+  auto row = connection.Query("SELECT arms, cameras FROM initial_scenes WHERE task = ? AND initial_state = ?", task,
+                              initial_state);
   if (!row.Step()) return std::nullopt;
   const std::vector<codec::ArmsStep> steps = codec::DecodeArms(row.Text(0));
-  if (steps.size() != 1) throw InternalError("the store is damaged: initial scene {} {} has {} arm states", task, initial_state, steps.size());
+  if (steps.size() != 1)
+    throw InternalError("the store is damaged: initial scene {} {} has {} arm states", task, initial_state,
+                        steps.size());
   InitialScene scene{{}, steps[0].arms, codec::DecodeCameras(row.Text(1))};
-  auto image = connection.Query("SELECT png FROM initial_scene_images WHERE task = ? AND initial_state = ? ORDER BY position", task,
-                                initial_state);
+  auto image =
+      connection.Query("SELECT png FROM initial_scene_images WHERE task = ? AND initial_state = ? ORDER BY position",
+                       task, initial_state);
   while (image.Step()) scene.images.push_back(codec::DecodePng(image.Text(0)));
   return scene;
 }
@@ -48,14 +56,17 @@ void InsertVerdict(sqlite::Connection& connection, const Verdict& verdict) {
   if (!SelectEpisode(connection, verdict.episode_id)) {
     throw InvalidInput("a verdict of {} on episode '{}', which is not in the store", verdict.judge, verdict.episode_id);
   }
-  connection.Run("INSERT INTO verdicts (episode, judge, label, probability, stages, reason, rubric_version) VALUES (?, ?, ?, ?, ?, ?, ?)",
-                 verdict.episode_id, verdict.judge, Name(verdict.label), verdict.probability, codec::EncodeStages(verdict.stages),
-                 verdict.reason, verdict.rubric_version);
+  connection.Run(
+      "INSERT INTO verdicts (episode, judge, label, probability, stages, reason, rubric_version) VALUES (?, ?, ?, ?, "
+      "?, ?, ?)",
+      verdict.episode_id, verdict.judge, Name(verdict.label), verdict.probability, codec::EncodeStages(verdict.stages),
+      verdict.reason, verdict.rubric_version);
 }
 
 std::vector<Verdict> SelectVerdicts(sqlite::Connection& connection) {
   std::vector<Verdict> verdicts;
-  auto row = connection.Query("SELECT episode, judge, label, probability, stages, reason, rubric_version FROM verdicts ORDER BY id");
+  auto row = connection.Query(
+      "SELECT episode, judge, label, probability, stages, reason, rubric_version FROM verdicts ORDER BY id");
   while (row.Step()) {
     Verdict& verdict = verdicts.emplace_back();
     verdict.episode_id = row.Text(0);
@@ -72,7 +83,8 @@ std::vector<Verdict> SelectVerdicts(sqlite::Connection& connection) {
 void AddToCounters(sqlite::Connection& connection, const std::string& policy, const Counters& counters) {
   for (const auto& [name, value] : counters) {
     connection.Run(
-        "INSERT INTO counters (policy, name, value) VALUES (?, ?, ?) ON CONFLICT (policy, name) DO UPDATE SET value = value + "
+        "INSERT INTO counters (policy, name, value) VALUES (?, ?, ?) ON CONFLICT (policy, name) DO UPDATE SET value = "
+        "value + "
         "excluded.value",
         policy, name, value);
   }

@@ -36,7 +36,8 @@ void DeleteFailedEpisode(sqlite::Connection& connection, const std::string& epis
 
 /// Stored unless a scene of a lower (seed, policy, checkpoint) is there.
 void UpsertInitialScene(sqlite::Connection& connection, const PairKey& pair, const InitialScene& scene);
-std::optional<InitialScene> SelectInitialScene(sqlite::Connection& connection, const std::string& task, const std::string& initial_state);
+std::optional<InitialScene> SelectInitialScene(sqlite::Connection& connection, const std::string& task,
+                                               const std::string& initial_state);
 
 void InsertVerdict(sqlite::Connection& connection, const Verdict& verdict);
 std::vector<Verdict> SelectVerdicts(sqlite::Connection& connection);

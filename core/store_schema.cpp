@@ -97,10 +97,11 @@ int Version(sqlite::Connection& connection, std::span<const char* const> steps, 
   const std::int64_t version = Pragma(connection, "PRAGMA user_version");
   const bool is_ours = Pragma(connection, "PRAGMA application_id") == kApplicationId;
   const bool is_empty = version == 0 && Pragma(connection, "SELECT count(*) FROM sqlite_schema") == 0;
-  if (!is_ours && !is_empty) throw InvalidInput("{}: is another program's database, wanted an evac run's", file.string());
+  if (!is_ours && !is_empty)
+    throw InvalidInput("{}: is another program's database, wanted an evac run's", file.string());
   if (version > static_cast<std::int64_t>(steps.size())) {
-    throw InvalidInput("{}: has schema version {}, this evac knows up to {}: open it with a newer evac", file.string(), version,
-                       steps.size());
+    throw InvalidInput("{}: has schema version {}, this evac knows up to {}: open it with a newer evac", file.string(),
+                       version, steps.size());
   }
   return static_cast<int>(version);
 }

@@ -15,7 +15,8 @@ std::span<const char* const> Steps();
 /// @throws InvalidInput if the database is newer than `steps`, or another program's.
 void Migrate(sqlite::Connection& connection, std::span<const char* const> steps, const std::filesystem::path& file);
 
-/// The version a database has: 0 if it is empty. @throws InvalidInput if it is newer than `steps`, or another program's.
+/// The version a database has: 0 if it is empty. @throws InvalidInput if it is newer than `steps`, or another
+/// program's.
 int Version(sqlite::Connection& connection, std::span<const char* const> steps, const std::filesystem::path& file);
 
 }  // namespace evac::schema

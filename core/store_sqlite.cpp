@@ -11,7 +11,8 @@ namespace fs = std::filesystem;
 [[noreturn]] void Throw(sqlite3* database, int code) {
   const char* file = sqlite3_db_filename(database, "main");
   const std::string name = file && *file ? file : "store in memory";
-  const std::string reason = fmt::format("{} (SQLite {})", sqlite3_errmsg(database), sqlite3_extended_errcode(database));
+  const std::string reason =
+      fmt::format("{} (SQLite {})", sqlite3_errmsg(database), sqlite3_extended_errcode(database));
   if ((code & 0xFF) == SQLITE_NOTADB) throw InvalidInput("{}: is no run's database: {}", name, reason);
   throw InternalError("{}: {}", name, reason);
 }
@@ -79,7 +80,8 @@ void Statement::Bind(int position, std::int64_t value) {
 
 Connection::Connection(const std::string& name, int flags) {
   sqlite3* database = nullptr;
-  const int code = sqlite3_open_v2(name.c_str(), &database, flags | SQLITE_OPEN_NOMUTEX | SQLITE_OPEN_EXRESCODE, nullptr);
+  const int code =
+      sqlite3_open_v2(name.c_str(), &database, flags | SQLITE_OPEN_NOMUTEX | SQLITE_OPEN_EXRESCODE, nullptr);
   database_.reset(database);
   if (code != SQLITE_OK) throw InternalError("{}: cannot be opened: {}", name, sqlite3_errstr(code));
   sqlite3_busy_timeout(database, 10'000);

@@ -12,17 +12,17 @@ struct VideoOptions {
   double period_s = 0.1;  ///< presentation time of frame k is k * period_s exactly (time base 1/1000 s or finer)
   int crf = 20;           ///< H.264 quality, 0 lossless … 51
   std::string preset = "veryfast";
-  int scale = 1;          ///< each pixel becomes scale x scale (nearest), so that small frames are legible in a player
+  int scale = 1;  ///< each pixel becomes scale x scale (nearest), so that small frames are legible in a player
 };
 
 struct FinishedVideo {
   std::filesystem::path path;
-  std::string sha256;   ///< of the file's bytes
+  std::string sha256;  ///< of the file's bytes
   int frames = 0;
 };
 
-/// Encodes frames as they come: H.264, yuv420p, faststart mp4, playable in a browser. One thread, no clock in the file: the
-/// same frames give the same bytes. Until Finish the file is `path`.tmp; destroyed before that, it is removed.
+/// Encodes frames as they come: H.264, yuv420p, faststart mp4, playable in a browser. One thread, no clock in the file:
+/// the same frames give the same bytes. Until Finish the file is `path`.tmp; destroyed before that, it is removed.
 class VideoWriter {
  public:
   /// @throws Error if the folder cannot be written or there is no H.264 encoder.
@@ -31,11 +31,13 @@ class VideoWriter {
   VideoWriter(VideoWriter&&) noexcept;
   VideoWriter& operator=(VideoWriter&&) noexcept;
 
-  /// @param rgb  CV_8UC3 RGB. The first frame fixes the size; an odd side is padded by repeating its last row or column.
+  /// @param rgb  CV_8UC3 RGB. The first frame fixes the size; an odd side is padded by repeating its last row or
+  /// column.
   /// @throws Error if the size differs or the disk is full.
   void Append(const cv::Mat& rgb);
 
-  /// Writes the trailer, syncs the file, renames it to its final name and syncs the folder. Call once, after at least one frame.
+  /// Writes the trailer, syncs the file, renames it to its final name and syncs the folder. Call once, after at least
+  /// one frame.
   FinishedVideo Finish();
 
  private:
@@ -64,7 +66,8 @@ class VideoReader {
 /// Every frame of a short video.
 std::vector<cv::Mat> ReadAllFrames(const std::filesystem::path& path);
 
-/// The views of one observation side by side, heights made equal by padding below: how an episode's video and thumbnail show them.
+/// The views of one observation side by side, heights made equal by padding below: how an episode's video and thumbnail
+/// show them.
 cv::Mat SideBySide(const std::vector<cv::Mat>& images);
 
 }  // namespace evac

@@ -36,8 +36,8 @@ av::Scaler NewToRgb(const AVFrame& frame) {
   bool full_range = frame.color_range == AVCOL_RANGE_JPEG;
   const AVPixelFormat format = WithoutJ(static_cast<AVPixelFormat>(frame.format), full_range);
   const int flags = SWS_BILINEAR | SWS_ACCURATE_RND | SWS_BITEXACT | SWS_FULL_CHR_H_INT;
-  av::Scaler scaler(sws_getContext(frame.width, frame.height, format, frame.width, frame.height, AV_PIX_FMT_RGB24, flags, nullptr,
-                                   nullptr, nullptr));
+  av::Scaler scaler(sws_getContext(frame.width, frame.height, format, frame.width, frame.height, AV_PIX_FMT_RGB24,
+                                   flags, nullptr, nullptr, nullptr));
   if (!scaler) return scaler;
   const int* coefficients = YuvCoefficients(frame);
   sws_setColorspaceDetails(scaler.get(), coefficients, full_range ? 1 : 0, coefficients, 1, 0, 1 << 16, 1 << 16);
@@ -64,7 +64,7 @@ struct VideoReader::Decoder {
   av::Packet packet_;
   av::Frame frame_;
   int stream_ = -1;
-  av::Frame rgb_;  ///< rows padded as swscale wants them; its size is the first frame's
+  av::Frame rgb_;                 ///< rows padded as swscale wants them; its size is the first frame's
   int format_ = AV_PIX_FMT_NONE;  ///< of the first frame; a video that changes it is broken
   std::int64_t packets_ = 0;
   double time_s_ = 0;
@@ -161,7 +161,8 @@ cv::Mat VideoReader::Decoder::Rgb() {
     const AVRational unit_s = input_->streams[stream_]->time_base;
     time_s_ = static_cast<double>(frame.best_effort_timestamp) * unit_s.num / unit_s.den;
   }
-  return cv::Mat(rgb_->height, rgb_->width, CV_8UC3, rgb_->data[0], static_cast<std::size_t>(rgb_->linesize[0])).clone();
+  return cv::Mat(rgb_->height, rgb_->width, CV_8UC3, rgb_->data[0], static_cast<std::size_t>(rgb_->linesize[0]))
+      .clone();
 }
 
 VideoReader::VideoReader(const std::filesystem::path& path) : decoder_(std::make_unique<Decoder>(path)) {}

@@ -16,8 +16,8 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// Ticks of 1 / per_s seconds, `per_frame` of them from one frame to the next: exact for every period that is a fraction
-/// with a denominator below a million, and never coarser than a millisecond.
+/// Ticks of 1 / per_s seconds, `per_frame` of them from one frame to the next: exact for every period that is a
+/// fraction with a denominator below a million, and never coarser than a millisecond.
 struct Ticks {
   int per_s = 0;
   int per_frame = 0;
@@ -33,7 +33,8 @@ void Check(const VideoOptions& options, const fs::path& path) {
   if (!(options.period_s >= 1e-3 && options.period_s <= 1e3)) {
     throw InvalidInput("{}: the video's period is {} s, wanted .001 … 1000", path.string(), options.period_s);
   }
-  if (options.crf < 0 || options.crf > 51) throw InvalidInput("{}: the video's crf is {}, wanted 0 … 51", path.string(), options.crf);
+  if (options.crf < 0 || options.crf > 51)
+    throw InvalidInput("{}: the video's crf is {}, wanted 0 … 51", path.string(), options.crf);
   if (options.scale < 1 || options.scale > 64) {
     throw InvalidInput("{}: the video's scale is {}, wanted 1 … 64", path.string(), options.scale);
   }
@@ -51,8 +52,8 @@ cv::Mat Prepared(const cv::Mat& rgb, int scale) {
 
 av::Scaler NewRgbToYuv(int width_px, int height_px) {
   const int flags = SWS_BILINEAR | SWS_ACCURATE_RND | SWS_BITEXACT | SWS_FULL_CHR_H_INP;
-  av::Scaler scaler(
-      sws_getContext(width_px, height_px, AV_PIX_FMT_RGB24, width_px, height_px, AV_PIX_FMT_YUV420P, flags, nullptr, nullptr, nullptr));
+  av::Scaler scaler(sws_getContext(width_px, height_px, AV_PIX_FMT_RGB24, width_px, height_px, AV_PIX_FMT_YUV420P,
+                                   flags, nullptr, nullptr, nullptr));
   if (!scaler) throw InternalError("there is no conversion from RGB to yuv420p for {}x{}", width_px, height_px);
   const int* bt709 = sws_getCoefficients(SWS_CS_ITU709);
   sws_setColorspaceDetails(scaler.get(), bt709, 1, bt709, 0, 0, 1 << 16, 1 << 16);
@@ -100,7 +101,8 @@ VideoWriter::Encoder::Encoder(fs::path path, const VideoOptions& options)
   output_.reset(output);
   output_->flags |= AVFMT_FLAG_BITEXACT;
   packet_.reset(av_packet_alloc());
-  if (!avcodec_find_encoder_by_name("libx264")) throw InternalError("{}: libav has no H.264 encoder (libx264)", path_.string());
+  if (!avcodec_find_encoder_by_name("libx264"))
+    throw InternalError("{}: libav has no H.264 encoder (libx264)", path_.string());
   Demand(avio_open(&output_->pb, av::Url(part_).c_str(), AVIO_FLAG_WRITE), "cannot be written");
 }
 
@@ -167,8 +169,8 @@ void VideoWriter::Encoder::Append(const cv::Mat& rgb) {
     Start(image.cols, image.rows);
   }
   if (rgb.size() != size_px_) {
-    throw InternalError("{}: frame {} is {}x{}, the first was {}x{}", path_.string(), frames_, rgb.cols, rgb.rows, size_px_.width,
-                        size_px_.height);
+    throw InternalError("{}: frame {} is {}x{}, the first was {}x{}", path_.string(), frames_, rgb.cols, rgb.rows,
+                        size_px_.width, size_px_.height);
   }
   Demand(av_frame_make_writable(yuv_.get()), "no memory for a frame");
   const std::uint8_t* rows[] = {image.data};

@@ -59,7 +59,8 @@ TEST(Check, WhatIsWrongWithOneTargetIsSaidWithItsNumberAndArm) {
   for (const auto& [spoil, sentence] : spoils) {
     ActionChunk chunk = Chunk(8);
     spoil(chunk.targets[3][0]);
-    EXPECT_THAT(WhatIsWrong(chunk, OneArm(), 8).value_or("nothing"), AllOf(HasSubstr("target 3 of 8"), HasSubstr("right arm"), HasSubstr(sentence)));
+    EXPECT_THAT(WhatIsWrong(chunk, OneArm(), 8).value_or("nothing"),
+                AllOf(HasSubstr("target 3 of 8"), HasSubstr("right arm"), HasSubstr(sentence)));
   }
 }
 

@@ -62,17 +62,20 @@ TEST(Config, FieldsComeBackAsTheTypeAskedFor) {
 
 TEST(Config, AWrongFieldIsNamedWithFileLineFoundAndWanted) {
   const Config page = Page();
-  EXPECT_THAT(MessageOf([&] { page.Get<int>("name"); }),
-              AllOf(HasSubstr("suites/page.yaml:2: field name"), HasSubstr("found 'demo'"), HasSubstr("a whole number")));
+  EXPECT_THAT(MessageOf([&] { page.Get<int>("name"); }), AllOf(HasSubstr("suites/page.yaml:2: field name"),
+                                                               HasSubstr("found 'demo'"), HasSubstr("a whole number")));
   EXPECT_THAT(MessageOf([&] { page.Get<int>("friction"); }), HasSubstr("found '0.75'"));
   EXPECT_THAT(MessageOf([&] { page.Get<int>("big"); }), HasSubstr("found '18446744073709551615'"));
   EXPECT_THAT(MessageOf([&] { page.Get<bool>("lanes"); }), HasSubstr("true or false"));
   EXPECT_THAT(MessageOf([&] { page.Get<std::string>("worlds"); }), HasSubstr("found a list"));
-  EXPECT_THAT(MessageOf([&] { page.Get<std::string>("absent"); }), AllOf(HasSubstr("field absent"), HasSubstr("found nothing")));
-  EXPECT_THAT(MessageOf([&] { page.List("worlds").at(1).Get<int>("name"); }), HasSubstr("suites/page.yaml:10: field worlds.1.name"));
+  EXPECT_THAT(MessageOf([&] { page.Get<std::string>("absent"); }),
+              AllOf(HasSubstr("field absent"), HasSubstr("found nothing")));
+  EXPECT_THAT(MessageOf([&] { page.List("worlds").at(1).Get<int>("name"); }),
+              HasSubstr("suites/page.yaml:10: field worlds.1.name"));
   EXPECT_THAT(MessageOf([&] { page.Section("lanes"); }), HasSubstr("a mapping"));
   EXPECT_THAT(MessageOf([&] { page.List("lanes"); }), HasSubstr("a list"));
-  EXPECT_THAT(MessageOf([&] { page.Require(false, "lanes", "fewer than 3"); }), HasSubstr("page.yaml:3: field lanes: found '4', wanted fewer than 3"));
+  EXPECT_THAT(MessageOf([&] { page.Require(false, "lanes", "fewer than 3"); }),
+              HasSubstr("page.yaml:3: field lanes: found '4', wanted fewer than 3"));
 }
 
 TEST(Config, NumbersAreFiniteAndSeedsAreNotNegative) {
@@ -85,19 +88,24 @@ TEST(Config, NumbersAreFiniteAndSeedsAreNotNegative) {
 }
 
 TEST(Config, AnUnknownFieldIsNamedWithTheNearestKnownOne) {
-  EXPECT_THAT(MessageOf([&] { Page().AllowOnly({"name", "lanse", "big", "friction", "light", "empty", "worlds", "nested"}); }),
+  EXPECT_THAT(MessageOf([&] {
+                Page().AllowOnly({"name", "lanse", "big", "friction", "light", "empty", "worlds", "nested"});
+              }),
               AllOf(HasSubstr("page.yaml:3: field lanes"), HasSubstr("the nearest is 'lanse'")));
   EXPECT_THAT(MessageOf([&] { Page().AllowOnly({}); }), HasSubstr("field name"));
   EXPECT_NO_THROW(Page().Section("nested").AllowOnly({"deep", "more"}));
 }
 
 TEST(Config, WhatIsNoMappingIsRefusedWithItsLine) {
-  EXPECT_THAT(MessageOf([] { Config::FromText("a: 1\nb: [1\n", "p.yaml"); }), AllOf(HasSubstr("p.yaml:"), HasSubstr("not YAML")));
+  EXPECT_THAT(MessageOf([] { Config::FromText("a: 1\nb: [1\n", "p.yaml"); }),
+              AllOf(HasSubstr("p.yaml:"), HasSubstr("not YAML")));
   EXPECT_THAT(MessageOf([] { Config::FromText("- a\n- b\n", "p.yaml"); }), HasSubstr("found a list"));
   EXPECT_THAT(MessageOf([] { Config::FromText("", "p.yaml"); }), HasSubstr("found nothing"));
   EXPECT_THAT(MessageOf([] { Config::FromText("just words", "p.yaml"); }), HasSubstr("found 'just words'"));
-  EXPECT_THAT(MessageOf([] { Config::FromText("a: {b: 1,\n  c: 2,\n  b: 3}\n", "p.yaml"); }), HasSubstr("p.yaml:3: field b is given twice"));
-  EXPECT_THAT(MessageOf([] { Config::FromText("x:\n- {[1, 2]: 3}\n", "p.yaml"); }), HasSubstr("p.yaml:2: found a list as a key"));
+  EXPECT_THAT(MessageOf([] { Config::FromText("a: {b: 1,\n  c: 2,\n  b: 3}\n", "p.yaml"); }),
+              HasSubstr("p.yaml:3: field b is given twice"));
+  EXPECT_THAT(MessageOf([] { Config::FromText("x:\n- {[1, 2]: 3}\n", "p.yaml"); }),
+              HasSubstr("p.yaml:2: found a list as a key"));
   EXPECT_THAT(MessageOf([] { Config::FromFile("no/such/page.yaml"); }), HasSubstr("no/such/page.yaml"));
 }
 
@@ -112,13 +120,15 @@ TEST(Config, AnAssignmentReplacesAFieldAnItemOrAddsAField) {
   EXPECT_EQ(page.List("worlds").at(1).Get<std::string>("name"), "dream");
   EXPECT_EQ(page.List("worlds").at(0).Get<std::string>("name"), "real");
   EXPECT_THAT(page.List("worlds").at(0).Get<std::vector<double>>("images"), ElementsAre(1.5, 3.5));
-  EXPECT_THAT(page.Section("nested").Section("deep").Section("new").Get<std::vector<std::uint64_t>>("x"), ElementsAre(1, 2));
+  EXPECT_THAT(page.Section("nested").Section("deep").Section("new").Get<std::vector<std::uint64_t>>("x"),
+              ElementsAre(1, 2));
   EXPECT_EQ(page.Get<std::string>("text"), "a=b");
   EXPECT_EQ(page.Get<std::string>("name"), "demo");
 }
 
 TEST(Config, AnAssignmentWithoutAPlaceOrAValueIsRefused) {
-  for (const char* assignment : {"lanes", "=4", "absent.x=1", "worlds.2.name=a", "worlds.9=a", "worlds.x=a", "lanes.x=1", "a=[1"}) {
+  for (const char* assignment :
+       {"lanes", "=4", "absent.x=1", "worlds.2.name=a", "worlds.9=a", "worlds.x=a", "lanes.x=1", "a=[1"}) {
     Config page = Page();
     const std::string before = page.Canonical();
     EXPECT_THAT(MessageOf([&] { page.Set(assignment); }), HasSubstr(assignment));
@@ -129,7 +139,8 @@ TEST(Config, AnAssignmentWithoutAPlaceOrAValueIsRefused) {
 TEST(Config, AFieldFromTheCommandLineIsNotBlamedOnALineOfTheFile) {
   Config page = Page();
   page.Set("lanes=many");
-  EXPECT_THAT(MessageOf([&] { page.Get<int>("lanes"); }), HasSubstr("suites/page.yaml (--set): field lanes: found 'many'"));
+  EXPECT_THAT(MessageOf([&] { page.Get<int>("lanes"); }),
+              HasSubstr("suites/page.yaml (--set): field lanes: found 'many'"));
 }
 
 TEST(Config, AMissingFieldIsMissedInTheFile) {
@@ -139,9 +150,11 @@ TEST(Config, AMissingFieldIsMissedInTheFile) {
 
 TEST(Config, TheCanonicalTextIsAboutContentAlone) {
   const auto canonical = [](const std::string& text) { return Config::FromText(text, "p").Canonical(); };
-  EXPECT_EQ(canonical("a: 1\nb: {c: x, d: [1, 2]}\n"), canonical("# layout\nb:\n  d:\n  - 1\n  - 2\n  c: 'x'\na:   1\n"));
-  const char* const different[] = {"a: 1", "a: 2", "b: 1", "a: [1]", "a: {b: 1}", "a: [1, 2]", "a: [2, 1]", "a: {}", "a: []", "a:",
-                                   "a: \"1\\n.b=1\"", "a: \"1\\\\n.b=1\"", "a: 1\nb: 1", "c: {}\na: 1"};
+  EXPECT_EQ(canonical("a: 1\nb: {c: x, d: [1, 2]}\n"),
+            canonical("# layout\nb:\n  d:\n  - 1\n  - 2\n  c: 'x'\na:   1\n"));
+  const char* const different[] = {
+      "a: 1",  "a: 2",  "b: 1", "a: [1]",          "a: {b: 1}",         "a: [1, 2]",  "a: [2, 1]",
+      "a: {}", "a: []", "a:",   "a: \"1\\n.b=1\"", "a: \"1\\\\n.b=1\"", "a: 1\nb: 1", "c: {}\na: 1"};
   std::set<std::string> seen;
   for (const char* text : different) EXPECT_TRUE(seen.insert(canonical(text)).second) << text;
 }

@@ -40,13 +40,16 @@ TEST(File, AnEmptyFileIsEmpty) {
 
 TEST(File, WhatCannotBeReadIsNamedWithTheReason) {
   const TempFolder folder;
-  EXPECT_THAT(MessageOf([&] { ReadFile(folder / "missing"); }), AllOf(HasSubstr((folder / "missing").string()), HasSubstr("No such file")));
-  EXPECT_THAT(MessageOf([&] { ReadFile(folder.path()); }), AllOf(HasSubstr(folder.path().string()), HasSubstr("Is a directory")));
+  EXPECT_THAT(MessageOf([&] { ReadFile(folder / "missing"); }),
+              AllOf(HasSubstr((folder / "missing").string()), HasSubstr("No such file")));
+  EXPECT_THAT(MessageOf([&] { ReadFile(folder.path()); }),
+              AllOf(HasSubstr(folder.path().string()), HasSubstr("Is a directory")));
 }
 
 TEST(File, WhatCannotBeWrittenIsNamedAndTheOldFileStays) {
   const TempFolder folder;
-  EXPECT_THAT(MessageOf([&] { WriteFileAtomically(folder / "missing/f", "x"); }), HasSubstr((folder / "missing/f").string()));
+  EXPECT_THAT(MessageOf([&] { WriteFileAtomically(folder / "missing/f", "x"); }),
+              HasSubstr((folder / "missing/f").string()));
   WriteFileAtomically(folder / "f", "old");
   if (!fs::exists("/dev/full")) GTEST_SKIP() << "there is no /dev/full here";
   fs::create_symlink("/dev/full", folder / "f.tmp");

@@ -12,7 +12,8 @@ namespace {
 TEST(SplitMix64, ItsFirstNumbersAreThePublishedOnes) {
   EXPECT_EQ(SplitMix64(0).Next(), 0xE220A8397B1DCDAFULL);
   SplitMix64 random(1234567);
-  for (const std::uint64_t wanted : {6457827717110365317ULL, 3203168211198807973ULL, 9817491932198370423ULL, 4593380528125082431ULL}) {
+  for (const std::uint64_t wanted :
+       {6457827717110365317ULL, 3203168211198807973ULL, 9817491932198370423ULL, 4593380528125082431ULL}) {
     EXPECT_EQ(random.Next(), wanted);
   }
 }
@@ -55,7 +56,8 @@ TEST(SplitMix64, UniformFillsItsIntervalAndNormalHasItsMoments) {
 TEST(SeedFor, StreamsOfOtherPurposesSeedsAndPlacesAreOthers) {
   std::set<std::uint64_t> seeds;
   for (std::uint64_t seed = 0; seed < 50; ++seed) {
-    for (const char* purpose : {"", "camera noise", "camera noisf", "noise camera"}) seeds.insert(SeedFor(seed, purpose));
+    for (const char* purpose : {"", "camera noise", "camera noisf", "noise camera"})
+      seeds.insert(SeedFor(seed, purpose));
     for (std::uint64_t index = 0; index < 50; ++index) seeds.insert(SeedFor(seed, index));
   }
   EXPECT_EQ(seeds.size(), 50u * 54u);

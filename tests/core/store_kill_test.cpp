@@ -1,6 +1,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <sys/mount.h>
+#include <sys/ptrace.h>
 #include <sys/resource.h>
 #include <sys/wait.h>
 #include <unistd.h>
@@ -49,7 +50,13 @@ void AddMissing(const std::filesystem::path& run, int count) {
     if (store.Has(Key(i))) continue;
     store.AddInitialScene(Key(i).pair, {{Image(i)}, {}, {}});
     store.Add(SomeEpisode(store, Key(i)));
-    store.AddVerdict({.episode_id = Key(i).Id(), .judge = "oracle", .label = Label::kSuccess, .probability = {}, .stages = {}, .reason = "", .rubric_version = ""});
+    store.AddVerdict({.episode_id = Key(i).Id(),
+                      .judge = "oracle",
+                      .label = Label::kSuccess,
+                      .probability = {},
+                      .stages = {},
+                      .reason = "",
+                      .rubric_version = ""});
   }
 }
 
@@ -98,9 +105,52 @@ TEST(StoreKill, AnEpisodeIsThereWithItsVideoOrNotAtAll) {
   AddMissing(run, count);
   AddMissing(folder / "uninterrupted", count);
   ExpectWhole(run);
-  EXPECT_EQ(VideoHashes(Store::Open(run, Store::Mode::kReadOnly)), VideoHashes(Store::Open(folder / "uninterrupted", Store::Mode::kReadOnly)));
+  EXPECT_EQ(VideoHashes(Store::Open(run, Store::Mode::kReadOnly)),
+            VideoHashes(Store::Open(folder / "uninterrupted", Store::Mode::kReadOnly)));
   EXPECT_EQ(FilesBelow(run / "videos"), FilesBelow(folder / "uninterrupted/videos"));
   EXPECT_EQ(FilesBelow(run / "thumbs"), FilesBelow(folder / "uninterrupted/thumbs"));
+}
+
+constexpr int kNotTraced = 98;
+
+/// Lets `child`, which stops itself under PTRACE_TRACEME, run up to the n-th system call after that, and kills it
+/// there.
+/// @returns false if it ended before, with `status` as of waitpid.
+bool KilledAtSystemCall(pid_t child, int n, int& status) {
+  ::waitpid(child, &status, 0);
+  for (int stops = 0; stops < 2 * n && WIFSTOPPED(status); ++stops) {  // each call stops as it begins and as it ends
+    ::ptrace(PTRACE_SYSCALL, child, nullptr, nullptr);
+    ::waitpid(child, &status, 0);
+  }
+  if (!WIFSTOPPED(status)) return false;
+  ::kill(child, SIGKILL);
+  ::waitpid(child, &status, 0);
+  return true;
+}
+
+TEST(StoreKill, AtWhicheverSystemCallOfAnAddTheEpisodeIsThereWholeOrNotAtAll) {
+  const TempFolder folder;
+  const std::filesystem::path run = folder / "run";
+  AddMissing(run, 1);
+  int n = 1;
+  for (bool killed = true; killed; n += 3) {
+    const pid_t child = InChild([&] {
+      Store store = Store::CreateOrContinue(run, SomeRun());
+      if (store.Has(Key(1))) return 0;
+      store.RemoveOrphans();
+      if (::ptrace(PTRACE_TRACEME, 0, nullptr, nullptr) != 0) return kNotTraced;
+      ::raise(SIGSTOP);
+      store.Add(SomeEpisode(store, Key(1)));
+      return 0;
+    });
+    int status = 0;
+    killed = KilledAtSystemCall(child, n, status);
+    if (WIFEXITED(status) && WEXITSTATUS(status) == kNotTraced) GTEST_SKIP() << "this machine lets nobody trace";
+    ASSERT_TRUE(killed || status == 0);
+    ExpectWhole(run);
+  }
+  EXPECT_TRUE(Store::Open(run, Store::Mode::kReadOnly).Has(Key(1)));
+  EXPECT_GT(n, 50) << "to write a video and a row takes more calls than that";
 }
 
 TEST(StoreKill, TheLockGoesWithTheKilledProcess) {

@@ -9,7 +9,9 @@
 /// Made-up content for the store's tests: every field filled, nothing round.
 namespace evac::samples {
 
-inline RunInfo SomeRun() { return {.suite_text = "name: t\n", .suite_hash = "5417e", .suite_path = "suites/t.yaml", .evac_version = "0.1.0"}; }
+inline RunInfo SomeRun() {
+  return {.suite_text = "name: t\n", .suite_hash = "5417e", .suite_path = "suites/t.yaml", .evac_version = "0.1.0"};
+}
 
 inline Eigen::Isometry3d Pose(SplitMix64& random) {
   Eigen::Isometry3d pose = Eigen::Isometry3d::Identity();
@@ -24,7 +26,9 @@ inline Arms SomeArms(SplitMix64& random, int count = 1) {
 }
 
 inline Camera SomeCamera(const std::string& name, Mount mount, SplitMix64& random) {
-  return {name, 24, 16, 20 + random.Uniform(), 21 + random.Uniform(), 12 + random.Uniform(), 8 + random.Uniform(), mount, Pose(random)};
+  return {
+      name,  24,          16, 20 + random.Uniform(), 21 + random.Uniform(), 12 + random.Uniform(), 8 + random.Uniform(),
+      mount, Pose(random)};
 }
 
 inline Task SomeTask(const std::string& id = "take_bottle") {
@@ -37,7 +41,13 @@ inline Task SomeTask(const std::string& id = "take_bottle") {
   task.max_chunks = 25;
   task.still = {true, 1.0 / 3, 0.07, 0.01, 4, 5};
   task.workspace_m = {Eigen::Vector3d(-0.1, -0.2, 0.3), Eigen::Vector3d(1.0 / 7, 2, 3)};
-  task.rubric = {"r1", "it stands", {{"reach", "the hand is there", {{"near", "hand", "bottle", {}, 0.05}, {"lifted", "bottle", "", 0.1, {}}}, 0.5, true}}};
+  task.rubric = {"r1",
+                 "it stands",
+                 {{"reach",
+                   "the hand is there",
+                   {{"near", "hand", "bottle", {}, 0.05}, {"lifted", "bottle", "", 0.1, {}}},
+                   0.5,
+                   true}}};
   task.page = "id: " + id + "\n# a comment\nmujoco: {scene: a.xml}\n";
   task.page_path = "/somewhere/" + id + ".yaml";
   return task;
@@ -66,7 +76,8 @@ inline EpisodeRecord SomeEpisode(const Store& store, const EpisodeKey& key, Stop
   for (int i = 0; i < 5; ++i) {
     record.episode.observations.push_back({{}, SomeArms(random), i == 3});
     if (i > 0) record.episode.commands.push_back(SomeArms(random));
-    record.privileged.push_back({{{"bottle", Pose(random)}, {"hand", Pose(random)}}, {{"bottle", "hand", random.Normal()}}});
+    record.privileged.push_back(
+        {{{"bottle", Pose(random)}, {"hand", Pose(random)}}, {{"bottle", "hand", random.Normal()}}});
     writer.Append(Image(i));
   }
   record.video = writer.Finish();

@@ -6,8 +6,8 @@
 #include <algorithm>
 #include <atomic>
 #include <cstring>
-#include <functional>
 #include <fstream>
+#include <functional>
 #include <limits>
 #include <thread>
 
@@ -30,12 +30,14 @@ using testing::IsEmpty;
 using testing::UnorderedElementsAre;
 
 bool SameBits(const Eigen::Isometry3d& a, const Eigen::Isometry3d& b) {
-  return std::memcmp(a.matrix().topRows<3>().eval().data(), b.matrix().topRows<3>().eval().data(), 12 * sizeof(double)) == 0;
+  return std::memcmp(a.matrix().topRows<3>().eval().data(), b.matrix().topRows<3>().eval().data(),
+                     12 * sizeof(double)) == 0;
 }
 
 bool SameBits(const Arms& a, const Arms& b) {
   return std::equal(a.begin(), a.end(), b.begin(), b.end(), [](const ArmState& x, const ArmState& y) {
-    return SameBits(x.base_from_gripper, y.base_from_gripper) && std::memcmp(&x.closure, &y.closure, sizeof(double)) == 0;
+    return SameBits(x.base_from_gripper, y.base_from_gripper) &&
+           std::memcmp(&x.closure, &y.closure, sizeof(double)) == 0;
   });
 }
 
@@ -120,8 +122,15 @@ TEST_F(StoreTest, PrivilegedFramesComeBackToTheLastBit) {
 TEST_F(StoreTest, AnEpisodeWithoutFramesHasARowAndNoFiles) {
   Store store = NewRun();
   EpisodeRecord record;
-  record.episode = {.key = Key(1), .observations = {}, .commands = {}, .stop = StopReason::kWorldError, .stop_reason = "after 0 chunks: no scene",
-                    .failure = "no scene", .video = "", .video_sha256 = "", .thumbnail = ""};
+  record.episode = {.key = Key(1),
+                    .observations = {},
+                    .commands = {},
+                    .stop = StopReason::kWorldError,
+                    .stop_reason = "after 0 chunks: no scene",
+                    .failure = "no scene",
+                    .video = "",
+                    .video_sha256 = "",
+                    .thumbnail = ""};
   store.Add(record);
   Episode episode = store.Episodes().at(0);
   EXPECT_EQ(episode.failure, "no scene");
@@ -137,7 +146,8 @@ TEST_F(StoreTest, EpisodesStandInPairKeyOrderAndThenByWorldWhateverTheOrderOfFin
   largest.pair.seed = ~std::uint64_t{0};
   other.pair.policy = "hold";
   other.pair.checkpoint = "a";
-  for (const EpisodeKey& key : {largest, Key(10, "sim"), Key(2, "sim"), Key(10, "real"), other}) store.Add(SomeEpisode(store, key));
+  for (const EpisodeKey& key : {largest, Key(10, "sim"), Key(2, "sim"), Key(10, "real"), other})
+    store.Add(SomeEpisode(store, key));
   std::vector<EpisodeKey> keys;
   for (const Episode& episode : store.Episodes()) keys.push_back(episode.key);
   EXPECT_THAT(keys, ElementsAre(other, Key(2, "sim"), Key(10, "real"), Key(10, "sim"), largest));
@@ -158,7 +168,8 @@ TEST_F(StoreTest, AVideoOutsideTheFolderIsRefused) {
   Store store = NewRun();
   EpisodeRecord record = SomeEpisode(store, Key(1));
   std::filesystem::copy_file(record.video->path, folder_ / "elsewhere.mp4");
-  for (const std::filesystem::path& path : {folder_ / "elsewhere.mp4", run_ / "../../elsewhere.mp4", run_ / "videos/none.mp4"}) {
+  for (const std::filesystem::path& path :
+       {folder_ / "elsewhere.mp4", run_ / "../../elsewhere.mp4", run_ / "videos/none.mp4"}) {
     record.video->path = path;
     EXPECT_THAT(MessageOf([&] { store.Add(record); }, ExitCode::kInternal), HasSubstr(path.filename().string()));
   }
@@ -179,7 +190,8 @@ TEST_F(StoreTest, AnEpisodeOfWhatWasNeverDeclaredIsRefusedByName) {
   EXPECT_THAT(MessageOf([&] { store.Add(SomeEpisode(store, key)); }, ExitCode::kInternal), HasSubstr("world 'dream'"));
   key = Key(1);
   key.pair.checkpoint = "best";
-  EXPECT_THAT(MessageOf([&] { store.Add(SomeEpisode(store, key)); }, ExitCode::kInternal), HasSubstr("visual_pick@best"));
+  EXPECT_THAT(MessageOf([&] { store.Add(SomeEpisode(store, key)); }, ExitCode::kInternal),
+              HasSubstr("visual_pick@best"));
 }
 
 TEST_F(StoreTest, ATaskComesBackWholeAndIsNotChanged) {
@@ -202,7 +214,8 @@ TEST_F(StoreTest, ATaskComesBackWholeAndIsNotChanged) {
   EXPECT_EQ(stored.rubric.stages.at(0).at_end, true);
 
   task.max_chunks = 26;
-  EXPECT_THAT(MessageOf([&] { store.AddTask(task); }), AllOf(HasSubstr("take_bottle"), HasSubstr("25"), HasSubstr("26")));
+  EXPECT_THAT(MessageOf([&] { store.AddTask(task); }),
+              AllOf(HasSubstr("take_bottle"), HasSubstr("25"), HasSubstr("26")));
   Task other_page = SomeTask();
   other_page.page = "id: take_bottle\nmujoco: {scene: b.xml}\n";
   EXPECT_THAT(MessageOf([&] { store.AddTask(other_page); }), HasSubstr("b.xml"));
@@ -218,14 +231,17 @@ TEST_F(StoreTest, WorldsAndPoliciesAreDeclaredOnceAndOtherwiseRefused) {
   EXPECT_EQ(store.Worlds().size(), 2u);
   EXPECT_TRUE(store.Worlds().at(0).is_real);
   EXPECT_EQ(store.Policies().at(0).declaration, R"({"arms": 1})");
-  EXPECT_THAT(MessageOf([&] { store.AddWorld({.name = "real", .type = "mujoco", .is_real = true, .profile_hash = "f01"}); }),
-              AllOf(HasSubstr("f00"), HasSubstr("f01")));
+  EXPECT_THAT(
+      MessageOf([&] { store.AddWorld({.name = "real", .type = "mujoco", .is_real = true, .profile_hash = "f01"}); }),
+      AllOf(HasSubstr("f00"), HasSubstr("f01")));
   EXPECT_THAT(MessageOf([&] { store.AddPolicy({"visual_pick", "good", "{}"}); }), HasSubstr("visual_pick@good"));
 }
 
 TEST_F(StoreTest, AnInitialSceneComesBackExactlyAndIsTheLowestSeedsWhateverTheOrder) {
   SplitMix64 random(5);
-  const auto scene = [&](int seed) { return InitialScene{{Image(seed), Image(seed + 100, 7, 5)}, SomeArms(random, 2), SomeTask().cameras}; };
+  const auto scene = [&](int seed) {
+    return InitialScene{{Image(seed), Image(seed + 100, 7, 5)}, SomeArms(random, 2), SomeTask().cameras};
+  };
   const InitialScene first = scene(1), second = scene(2), third = scene(3);
   for (const std::vector<int>& order : std::vector<std::vector<int>>{{1, 2, 3}, {3, 2, 1}, {2, 1, 3}}) {
     Store store = Store::InMemory(folder_ / "m", SomeRun());
@@ -244,8 +260,13 @@ TEST_F(StoreTest, AnInitialSceneComesBackExactlyAndIsTheLowestSeedsWhateverTheOr
 }
 
 Verdict SomeVerdict(const std::string& judge, Label label) {
-  return {.episode_id = Key(1).Id(), .judge = judge, .label = label, .probability = 0.25, .stages = {{"reach", true}, {"lift", false}},
-          .reason = "never lifted", .rubric_version = "r1"};
+  return {.episode_id = Key(1).Id(),
+          .judge = judge,
+          .label = label,
+          .probability = 0.25,
+          .stages = {{"reach", true}, {"lift", false}},
+          .reason = "never lifted",
+          .rubric_version = "r1"};
 }
 
 TEST_F(StoreTest, EveryVerdictIsKeptAndTheLastOfAJudgeIsCurrent) {
@@ -275,14 +296,19 @@ TEST_F(StoreTest, VerdictsAndEpisodesAreAppendOnlyEvenForSql) {
     store.AddVerdict(SomeVerdict("oracle", Label::kFailure));
   }
   sqlite::Connection raw = Raw();
-  const std::string row = "(id, episode, judge, label, stages, reason, rubric_version) VALUES (1, '" + Key(1).Id() + "', 'x', 'success', '{}', '', '')";
-  for (const std::string& sql : {std::string("UPDATE verdicts SET label = 'success'"), std::string("DELETE FROM verdicts"),
-                                 "INSERT OR REPLACE INTO verdicts " + row, "REPLACE INTO verdicts " + row}) {
+  const std::string row = "(id, episode, judge, label, stages, reason, rubric_version) VALUES (1, '" + Key(1).Id() +
+                          "', 'x', 'success', '{}', '', '')";
+  for (const std::string& sql :
+       {std::string("UPDATE verdicts SET label = 'success'"), std::string("DELETE FROM verdicts"),
+        "INSERT OR REPLACE INTO verdicts " + row, "REPLACE INTO verdicts " + row}) {
     EXPECT_THAT(MessageOf([&] { raw.RunScript(sql); }, ExitCode::kInternal), HasSubstr("append-only")) << sql;
   }
-  EXPECT_THAT(MessageOf([&] { raw.RunScript("DELETE FROM episodes"); }, ExitCode::kInternal), HasSubstr("never deleted"));
-  EXPECT_THAT(MessageOf([&] { raw.RunScript("UPDATE episodes SET chunks = 9"); }, ExitCode::kInternal), HasSubstr("never changed"));
-  EXPECT_THAT(MessageOf([&] { raw.RunScript("INSERT INTO removals SELECT id FROM episodes"); }, ExitCode::kInternal), HasSubstr("only a failed"));
+  EXPECT_THAT(MessageOf([&] { raw.RunScript("DELETE FROM episodes"); }, ExitCode::kInternal),
+              HasSubstr("never deleted"));
+  EXPECT_THAT(MessageOf([&] { raw.RunScript("UPDATE episodes SET chunks = 9"); }, ExitCode::kInternal),
+              HasSubstr("never changed"));
+  EXPECT_THAT(MessageOf([&] { raw.RunScript("INSERT INTO removals SELECT id FROM episodes"); }, ExitCode::kInternal),
+              HasSubstr("only a failed"));
   EXPECT_EQ(Store::Open(run_, Store::Mode::kReadOnly).Verdicts().at(0).label, Label::kFailure);
 }
 
@@ -337,7 +363,8 @@ TEST_F(StoreTest, ARunGoesOnWithTheSameSuiteAndNotWithAnother) {
 TEST_F(StoreTest, ASecondWriterIsRefusedAndReadersAreNot) {
   Store store = NewRun();
   const std::string number = std::to_string(::getpid());
-  EXPECT_THAT(MessageOf([&] { Store::CreateOrContinue(run_, SomeRun()); }), AllOf(HasSubstr("process " + number), HasSubstr(run_.string())));
+  EXPECT_THAT(MessageOf([&] { Store::CreateOrContinue(run_, SomeRun()); }),
+              AllOf(HasSubstr("process " + number), HasSubstr(run_.string())));
   EXPECT_THAT(MessageOf([&] { Store::Open(run_, Store::Mode::kReadWrite); }), HasSubstr(number));
   const Store reader = Store::Open(run_, Store::Mode::kReadOnly);
   store.Add(SomeEpisode(store, Key(1)));
@@ -352,7 +379,8 @@ TEST_F(StoreTest, AReaderCannotWrite) {
 }
 
 TEST_F(StoreTest, WhatIsNoRunIsRefusedByName) {
-  EXPECT_THAT(MessageOf([&] { Store::Open(run_, Store::Mode::kReadOnly); }), AllOf(HasSubstr(run_.string()), HasSubstr("no run")));
+  EXPECT_THAT(MessageOf([&] { Store::Open(run_, Store::Mode::kReadOnly); }),
+              AllOf(HasSubstr(run_.string()), HasSubstr("no run")));
   std::filesystem::create_directories(run_);
   std::ofstream(run_ / "evac.sqlite") << std::string(4096, 'x');
   EXPECT_THAT(MessageOf([&] { Store::Open(run_, Store::Mode::kReadOnly); }), HasSubstr("evac.sqlite"));
@@ -377,7 +405,8 @@ TEST_F(StoreTest, ANewerSchemaIsRefusedAndLeftAsItIs) {
 }
 
 TEST(Schema, AnOlderDatabaseIsBroughtForwardStepByStepWithItsRows) {
-  const char* const steps[] = {"CREATE TABLE a (x INTEGER); INSERT INTO a VALUES (7)", "ALTER TABLE a ADD COLUMN y INTEGER DEFAULT 8",
+  const char* const steps[] = {"CREATE TABLE a (x INTEGER); INSERT INTO a VALUES (7)",
+                               "ALTER TABLE a ADD COLUMN y INTEGER DEFAULT 8",
                                "CREATE TABLE b (z INTEGER); this is no SQL"};
   sqlite::Connection connection = sqlite::Connection::OpenInMemory();
   const std::span<const char* const> all = steps;

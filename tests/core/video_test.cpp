@@ -30,7 +30,8 @@ cv::Mat Scene(int frame, int width_px = 96, int height_px = 64) {
   return image;
 }
 
-FinishedVideo Write(const std::filesystem::path& path, const std::vector<cv::Mat>& frames, const VideoOptions& options = {}) {
+FinishedVideo Write(const std::filesystem::path& path, const std::vector<cv::Mat>& frames,
+                    const VideoOptions& options = {}) {
   VideoWriter writer(path, options);
   for (const cv::Mat& frame : frames) writer.Append(frame);
   return writer.Finish();
@@ -46,8 +47,8 @@ double LargestDifference(const cv::Mat& a, const cv::Mat& b) { return cv::norm(a
 
 TEST(Video, FlatColoursComeBackWithinAFewLevels) {
   const TempFolder folder;
-  const std::vector<cv::Scalar> colours = {{255, 0, 0},   {0, 255, 0},   {0, 0, 255},    {255, 255, 255}, {0, 0, 0},
-                                           {200, 120, 40}, {30, 90, 160}, {128, 128, 128}};
+  const std::vector<cv::Scalar> colours = {{255, 0, 0}, {0, 255, 0},    {0, 0, 255},   {255, 255, 255},
+                                           {0, 0, 0},   {200, 120, 40}, {30, 90, 160}, {128, 128, 128}};
   for (const cv::Scalar& colour : colours) {
     Write(folder / "flat.mp4", {Flat(96, 64, colour)}, {.crf = 10});
     const std::vector<cv::Mat> read = ReadAllFrames(folder / "flat.mp4");
@@ -66,7 +67,8 @@ TEST(Video, EveryFrameComesBackAtItsTimeAndInItsPlace) {
     int k = 0;
     for (cv::Mat frame = reader.Next(); !frame.empty(); frame = reader.Next(), ++k) {
       ASSERT_LT(k, 60);
-      EXPECT_NEAR(reader.time_s(), k * period_s, 1e-9 * (1 + k * period_s)) << "frame " << k << " of period " << period_s;
+      EXPECT_NEAR(reader.time_s(), k * period_s, 1e-9 * (1 + k * period_s))
+          << "frame " << k << " of period " << period_s;
       EXPECT_LT(cv::norm(frame, frames[k], cv::NORM_L1) / (frame.total() * 3), 5) << "frame " << k;
     }
     EXPECT_EQ(k, 60);
@@ -130,7 +132,8 @@ TEST(Video, OddSidesArePaddedByTheirLastRowAndColumn) {
 TEST(Video, TheSmallestImagesCanBeWritten) {
   const TempFolder folder;
   for (const cv::Size size : {cv::Size(1, 1), cv::Size(2, 2), cv::Size(3, 40)}) {
-    Write(folder / "small.mp4", {Flat(size.width, size.height, {128, 128, 128}), Flat(size.width, size.height, {90, 90, 90})});
+    Write(folder / "small.mp4",
+          {Flat(size.width, size.height, {128, 128, 128}), Flat(size.width, size.height, {90, 90, 90})});
     EXPECT_EQ(ReadAllFrames(folder / "small.mp4").size(), 2u) << size;
   }
 }
@@ -138,7 +141,8 @@ TEST(Video, TheSmallestImagesCanBeWritten) {
 TEST(Video, AScaledPixelIsABlockOfItsColour) {
   const TempFolder folder;
   cv::Mat checker(8, 8, CV_8UC3);
-  for (int i = 0; i < 64; ++i) checker.at<cv::Vec3b>(i / 8, i % 8) = (i / 8 + i % 8) % 2 ? cv::Vec3b(230, 30, 30) : cv::Vec3b(30, 30, 230);
+  for (int i = 0; i < 64; ++i)
+    checker.at<cv::Vec3b>(i / 8, i % 8) = (i / 8 + i % 8) % 2 ? cv::Vec3b(230, 30, 30) : cv::Vec3b(30, 30, 230);
   Write(folder / "big.mp4", {checker}, {.crf = 5, .scale = 8});
   const cv::Mat read = ReadAllFrames(folder / "big.mp4").at(0);
   ASSERT_EQ(read.size(), cv::Size(64, 64));
