@@ -74,7 +74,7 @@ class Evaluation {
     for (const SuitePolicy& suite_policy : suite_.policies) {
       JobQueue jobs(MissingJobs(AllJobs(suite_, suite_world, suite_policy), store_));
       if (jobs.size() == 0) continue;
-      if (!world) world = MakeWorld(suite_world, suite_);
+      if (!world) world = MakeCheckedWorld(suite_world);
       display_.Begin(fmt::format("{} · {}@{}", suite_world.name, suite_policy.name, suite_policy.checkpoint));
       RunningPolicy policy(suite_policy, suite_, store_.folder());
       store_.AddPolicy({suite_policy.name, suite_policy.checkpoint, policy.declaration()});
@@ -91,6 +91,13 @@ class Evaluation {
   const Plan& plan() const { return plan_; }
 
  private:
+  /// A task page that the world cannot start from ends the run here, once, and not in every episode.
+  std::unique_ptr<World> MakeCheckedWorld(const SuiteWorld& suite_world) {
+    std::unique_ptr<World> world = MakeWorld(suite_world, suite_);
+    for (const Task& task : suite_.tasks) world->Reset(0, task, suite_.initial_states.front(), 0);
+    return world;
+  }
+
   RolloutOptions Options(const SuiteWorld& world, const RunningPolicy& policy) {
     RolloutOptions options;
     options.lanes = suite_.lanes;
