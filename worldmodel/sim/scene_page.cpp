@@ -1,6 +1,10 @@
 #include "worldmodel/sim/scene_page.h"
 
+#include <algorithm>
+#include <regex>
+
 #include "core/config.h"
+#include "core/file.h"
 #include "core/geometry.h"
 
 namespace evac::sim {
@@ -64,6 +68,19 @@ Clutter ReadClutter(const Config& page) {
   return clutter;
 }
 
+/// A suite's hash covers the files that a page names; so a page must name all that its scene is made of.
+void RequireIncludesNamed(const Config& page, const std::filesystem::path& scene) {
+  const auto named = page.Get<std::vector<std::string>>("includes", std::vector<std::string>{});
+  const std::string text = ReadFile(scene);
+  const std::regex include(R"re(<include\s+file\s*=\s*"([^"]*)")re");
+  for (std::sregex_iterator match(text.begin(), text.end(), include), end; match != end; ++match) {
+    const std::string file = (*match)[1];
+    if (std::find(named.begin(), named.end(), file) != named.end()) continue;
+    throw InvalidInput("{}: {} includes '{}', wanted that file in the list", page.Where("includes"), scene.string(),
+                       file);
+  }
+}
+
 }  // namespace
 
 ScenePage ReadScenePage(const Task& task) {
@@ -71,9 +88,10 @@ ScenePage ReadScenePage(const Task& task) {
   if (!task_page.Has("mujoco"))
     throw InvalidInput("{}: found no section 'mujoco', wanted one: see docs/add_a_task.md", task.page_path);
   const Config page = task_page.Section("mujoco");
-  page.AllowOnly({"scene", "home", "objects", "colours", "light", "clutter"});
+  page.AllowOnly({"scene", "includes", "home", "objects", "colours", "light", "clutter"});
   ScenePage scene;
   scene.scene = page.Path("scene");
+  RequireIncludesNamed(page, scene.scene);
   scene.base_from_home = ReadHome(page.Section("home"));
   for (const Config& item : page.List("objects")) scene.placements.push_back(ReadPlacement(item));
   for (const Config& item : page.List("colours")) scene.colours.push_back(ReadColour(item));

@@ -221,6 +221,9 @@ TEST(MujocoWorld, WhatItCannotShowIsRefusedByName) {
   Task misspelt = ReadTask("take_bottle");
   misspelt.page.replace(misspelt.page.find("body: bottle"), 12, "body: flask ");
   EXPECT_THAT(complaint_about(misspelt), HasSubstr("flask"));
+  Task unnamed = ReadTask("take_bottle");
+  unnamed.page.replace(unnamed.page.find("includes: [robot.xml]"), 21, "includes: []");
+  EXPECT_THAT(complaint_about(unnamed), HasSubstr("robot.xml"));
 }
 
 }  // namespace
