@@ -27,68 +27,75 @@ struct Common {
   }
 };
 
-CLI::App* AddPolicy(CLI::App& app, const std::string& name, const std::string& description, Common& common) {
-  CLI::App* command = app.add_subcommand(name, description);
-  command->add_option("--checkpoint", common.checkpoint, "name that tells apart two of this policy in a run")->capture_default_str();
-  command->add_option("--chunk-size", common.chunk_size, "targets per chunk")->envname("EVAC_CHUNK_SIZE")->check(CLI::Range(1, 1000))->capture_default_str();
-  command->add_option("--period-s", common.period_s, "seconds between two targets; 0: any")->check(CLI::Range(0.0, 60.0))->capture_default_str();
-  command->add_option("--url", common.address.url, "where to listen")->envname("EVAC_LCM_URL")->capture_default_str();
-  command->add_option("--token", common.address.token, "word inside the channels' names")->envname("EVAC_TOKEN")->capture_default_str();
+/// One subcommand and its own copy of the common options: CLI11 fills in the environment's values for all subcommands.
+struct Command {
+  CLI::App* app;
+  std::shared_ptr<Common> common = std::make_shared<Common>();
+};
+
+Command AddPolicy(CLI::App& app, const std::string& name, const std::string& description) {
+  const Command command{app.add_subcommand(name, description)};
+  Common& common = *command.common;
+  command.app->add_option("--checkpoint", common.checkpoint, "name that tells apart two of this policy in a run")->capture_default_str();
+  command.app->add_option("--chunk-size", common.chunk_size, "targets per chunk")->envname("EVAC_CHUNK_SIZE")->check(CLI::Range(1, 1000))->capture_default_str();
+  command.app->add_option("--period-s", common.period_s, "seconds between two targets; 0: any")->check(CLI::Range(0.0, 60.0))->capture_default_str();
+  command.app->add_option("--url", common.address.url, "where to listen")->envname("EVAC_LCM_URL")->capture_default_str();
+  command.app->add_option("--token", common.address.token, "word inside the channels' names")->envname("EVAC_TOKEN")->capture_default_str();
   return command;
 }
 
-void AddHold(CLI::App& app, Common& common, int& exit_code) {
-  CLI::App* command = AddPolicy(app, "hold", "Never moves: answers where the arms are.", common);
-  command->footer("Example:\n  evac-policy hold --chunk-size 8");
-  command->callback([&] {
-    HoldPolicy policy(common.chunk_size);
-    PolicySpec spec = common.Spec("hold");
+void AddHold(CLI::App& app, int& exit_code) {
+  const Command command = AddPolicy(app, "hold", "Never moves: answers where the arms are.");
+  command.app->footer("Example:\n  evac-policy hold --chunk-size 8");
+  command.app->callback([&exit_code, common = command.common] {
+    HoldPolicy policy(common->chunk_size);
+    PolicySpec spec = common->Spec("hold");
     spec.needs = {"arms"};
-    exit_code = ServePolicy(policy, spec, common.address);
+    exit_code = ServePolicy(policy, spec, common->address);
   });
 }
 
-void AddReplay(CLI::App& app, Common& common, int& exit_code) {
-  CLI::App* command = AddPolicy(app, "replay", "Plays a recorded trajectory.", common);
+void AddReplay(CLI::App& app, int& exit_code) {
+  const Command command = AddPolicy(app, "replay", "Plays a recorded trajectory.");
   auto folder = std::make_shared<std::string>();
   auto every_nth = std::make_shared<int>(1);
-  command->add_option("--recording", *folder, "folder of the recording (docs/formats/recording.md)")->required();
-  command->add_option("--every-nth", *every_nth, "keep every nth recorded step")->check(CLI::Range(1, 1000))->capture_default_str();
-  command->footer("Example:\n  evac-policy replay --recording agibot_examples/example0 --chunk-size 16");
-  command->callback([&common, &exit_code, folder, every_nth] {
+  command.app->add_option("--recording", *folder, "folder of the recording (docs/formats/recording.md)")->required();
+  command.app->add_option("--every-nth", *every_nth, "keep every nth recorded step")->check(CLI::Range(1, 1000))->capture_default_str();
+  command.app->footer("Example:\n  evac-policy replay --recording agibot_examples/example0 --chunk-size 16");
+  command.app->callback([&exit_code, common = command.common, folder, every_nth] {
     Recording recording = ReadRecording(*folder, {.every_nth = *every_nth, .cameras = {}, .count_video_frames = false});
-    PolicySpec spec = common.Spec("replay");
+    PolicySpec spec = common->Spec("replay");
     spec.arms = recording.arm_names;
     spec.period_s = recording.period_s;
     spec.needs = {"whole_chunks"};
-    ReplayPolicy policy(std::move(recording), common.chunk_size);
-    exit_code = ServePolicy(policy, spec, common.address);
+    ReplayPolicy policy(std::move(recording), common->chunk_size);
+    exit_code = ServePolicy(policy, spec, common->address);
   });
 }
 
-void AddVisualPick(CLI::App& app, Common& common, int& exit_code) {
-  CLI::App* command = AddPolicy(app, "visual_pick", "Finds a thing of known colour and shape in the images, takes it and places it.", common);
+void AddVisualPick(CLI::App& app, int& exit_code) {
+  const Command command = AddPolicy(app, "visual_pick", "Finds a thing of known colour and shape in the images, takes it and places it.");
   auto options = std::make_shared<VisualPickOptions>();
   auto bias_m = std::make_shared<std::vector<double>>(2, 0.0);
-  command->add_option("--bias-m", *bias_m, "X,Y: how far off it takes the thing to be, base frame")->delimiter(',')->expected(2)->capture_default_str();
-  command->add_option("--noise-m", options->noise_m, "the same, random per episode: standard deviation")->capture_default_str();
-  command->add_option("--request-noise-m", options->request_noise_m, "the same, random each time it looks")->capture_default_str();
-  command->add_option("--late-close-s", options->late_close_s, "closes the hand this late, the arm does not wait")->capture_default_str();
-  command->add_option("--early-release-s", options->early_release_s, "opens the hand this early")->capture_default_str();
-  command->add_option("--blindness", options->blindness, "probability to see nothing in an episode")->capture_default_str();
-  command->add_option("--request-blindness", options->request_blindness, "probability to see nothing in a request")->capture_default_str();
-  command->add_option("--speed", options->speed, "of all motion; 1: at most 0.38 m/s")->capture_default_str();
-  command->add_option("--retries", options->retries, "how often it goes back when its hand came up empty")->capture_default_str();
-  command->footer("Example:\n  evac-policy visual_pick --checkpoint fair --noise-m 0.02\nWhat it does and how good it is: docs/visual_pick.md");
-  command->callback([&common, &exit_code, options, bias_m] {
-    options->chunk_size = common.chunk_size;
+  command.app->add_option("--bias-m", *bias_m, "X,Y: how far off it takes the thing to be, base frame")->delimiter(',')->expected(2)->capture_default_str();
+  command.app->add_option("--noise-m", options->noise_m, "the same, random per episode: standard deviation")->capture_default_str();
+  command.app->add_option("--request-noise-m", options->request_noise_m, "the same, random each time it looks")->capture_default_str();
+  command.app->add_option("--late-close-s", options->late_close_s, "closes the hand this late, the arm does not wait")->capture_default_str();
+  command.app->add_option("--early-release-s", options->early_release_s, "opens the hand this early")->capture_default_str();
+  command.app->add_option("--blindness", options->blindness, "probability to see nothing in an episode")->capture_default_str();
+  command.app->add_option("--request-blindness", options->request_blindness, "probability to see nothing in a request")->capture_default_str();
+  command.app->add_option("--speed", options->speed, "of all motion; 1: at most 0.38 m/s")->capture_default_str();
+  command.app->add_option("--retries", options->retries, "how often it goes back when its hand came up empty")->capture_default_str();
+  command.app->footer("Example:\n  evac-policy visual_pick --checkpoint fair --noise-m 0.02\nWhat it does and how good it is: docs/visual_pick.md");
+  command.app->callback([&exit_code, common = command.common, options, bias_m] {
+    options->chunk_size = common->chunk_size;
     options->bias_m = {bias_m->at(0), bias_m->at(1)};
     VisualPick policy(*options);
-    PolicySpec spec = common.Spec("visual_pick");
+    PolicySpec spec = common->Spec("visual_pick");
     spec.arms = {"right"};
     spec.cameras = {{"head", 0, 0}, {"hand_right", 0, 0}};
     spec.needs = {"images", "arms", "whole_chunks"};
-    exit_code = ServePolicy(policy, spec, common.address);
+    exit_code = ServePolicy(policy, spec, common->address);
   });
 }
 
@@ -100,12 +107,11 @@ int main(int argc, char** argv) {
   app.set_version_flag("--version", EVAC_VERSION);
   app.require_subcommand(1);
   app.footer("A policy of your own: docs/write_a_policy.md.\nExit codes: 0 stopped, 2 invalid input, 4 internal error.");
-  evac::Common common;
   int exit_code = 0;
   try {
-    evac::AddHold(app, common, exit_code);
-    evac::AddReplay(app, common, exit_code);
-    evac::AddVisualPick(app, common, exit_code);
+    evac::AddHold(app, exit_code);
+    evac::AddReplay(app, exit_code);
+    evac::AddVisualPick(app, exit_code);
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
     return app.exit(error) == 0 ? 0 : static_cast<int>(evac::ExitCode::kInvalidInput);
