@@ -15,12 +15,13 @@
 namespace evac {
 namespace {
 
-constexpr int kLook_ms = 20;           ///< how often the guardian looks whether the policy still runs
-constexpr int kNotExecutable = 127;    ///< as shells say it
+constexpr int kLook_ms = 20;         ///< how often the guardian looks whether the policy still runs
+constexpr int kNotExecutable = 127;  ///< as shells say it
 
 /// Only the policy's own descriptors go with it: other policies' pipes must not be held open here.
 void KeepOnly(int& harness_fd, int& log_fd) {
-  const int log = ::fcntl(log_fd, F_DUPFD, 10), harness = ::fcntl(harness_fd, F_DUPFD, 10);  // above those replaced here
+  const int log = ::fcntl(log_fd, F_DUPFD, 10),
+            harness = ::fcntl(harness_fd, F_DUPFD, 10);  // above those replaced here
   ::dup2(::open("/dev/null", O_RDONLY), STDIN_FILENO);
   ::dup2(log, STDOUT_FILENO);
   ::dup2(log, STDERR_FILENO);
@@ -59,7 +60,8 @@ void Say(const char* text) { (void)!::write(STDERR_FILENO, text, ::strlen(text))
   ::_exit(kNotExecutable);
 }
 
-/// Sends a signal to every child of this process, in whatever session; those that lost their parent are its children too.
+/// Sends a signal to every child of this process, in whatever session; those that lost their parent are its children
+/// too.
 /// @returns whether there was one.
 bool SignalChildren(int number) {
   char text[4096];

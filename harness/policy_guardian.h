@@ -14,8 +14,8 @@ struct GuardianOptions {
 };
 
 /// The whole life of the guardian process (policy_process.h): starts the policy in a session of its own, waits until it
-/// ends or the harness is gone, ends everything that descends from it, and exits as the policy did (128 + n after signal n).
-/// To be called in the child of a fork. Async-signal-safe.
+/// ends or the harness is gone, ends everything that descends from it, and exits as the policy did (128 + n after
+/// signal n). To be called in the child of a fork. Async-signal-safe.
 [[noreturn]] void Guard(const GuardianOptions& options);
 
 }  // namespace evac

@@ -74,7 +74,8 @@ int OpenLog(const std::filesystem::path& log) {
 PolicyProcess::PolicyProcess(PolicyProcessOptions options) : options_(std::move(options)) {
   if (options_.command.empty()) throw InvalidInput("a policy's command is empty, wanted a program and its arguments");
   ::close(OpenLog(options_.log));
-  options_.environment.insert_or_assign("EVAC_SUPERVISED", std::string("1"));  // it may end itself when its parent is gone
+  options_.environment.insert_or_assign("EVAC_SUPERVISED",
+                                        std::string("1"));  // it may end itself when its parent is gone
   supervisor_ = std::thread([this] {
     try {
       Supervise();
@@ -122,8 +123,10 @@ void PolicyProcess::Supervise() {
 
     std::unique_lock lock(mutex_);
     if (stopping_) return;
-    if (IsHopeless(status) || static_cast<int>(deaths.size()) > options_.restarts) return GiveUp(static_cast<int>(deaths.size()), status);
-    if (stopping_changed_.wait_for(lock, std::chrono::duration<double>(back_off_s), [this] { return stopping_; })) return;
+    if (IsHopeless(status) || static_cast<int>(deaths.size()) > options_.restarts)
+      return GiveUp(static_cast<int>(deaths.size()), status);
+    if (stopping_changed_.wait_for(lock, std::chrono::duration<double>(back_off_s), [this] { return stopping_; }))
+      return;
     back_off_s = std::min(2 * back_off_s, options_.longest_back_off_s);
     ++restarts_;
   }
@@ -136,9 +139,13 @@ int PolicyProcess::RunOnce() {
   int alive[2];
   const int log = OpenLog(options_.log);
   if (::pipe2(alive, O_CLOEXEC) != 0) throw InternalError("cannot make a pipe: {}", std::strerror(errno));
-  const GuardianOptions guardian{.arguments = arguments.data(), .environment = environment.data(),
-                                 .working_directory = options_.working_directory.empty() ? nullptr : options_.working_directory.c_str(),
-                                 .log_fd = log, .harness_fd = alive[0], .grace_ms = static_cast<int>(options_.grace_s * 1000)};
+  const GuardianOptions guardian{
+      .arguments = arguments.data(),
+      .environment = environment.data(),
+      .working_directory = options_.working_directory.empty() ? nullptr : options_.working_directory.c_str(),
+      .log_fd = log,
+      .harness_fd = alive[0],
+      .grace_ms = static_cast<int>(options_.grace_s * 1000)};
   std::unique_lock lock(mutex_);
   const pid_t child = stopping_ ? -1 : ::fork();
   if (child == 0) Guard(guardian);  // does not return
@@ -162,8 +169,9 @@ int PolicyProcess::RunOnce() {
 
 /// With `mutex_` held.
 void PolicyProcess::GiveUp(int deaths, int status) {
-  why_gone_ = fmt::format("its process ended {} within {} s, at last with {}: {} ({})", deaths == 1 ? "once" : fmt::format("{} times", deaths),
-                          options_.window_s, HowItEnded(status), LastLine(options_.log), options_.log.string());
+  why_gone_ = fmt::format("its process ended {} within {} s, at last with {}: {} ({})",
+                          deaths == 1 ? "once" : fmt::format("{} times", deaths), options_.window_s, HowItEnded(status),
+                          LastLine(options_.log), options_.log.string());
 }
 
 }  // namespace evac

@@ -18,10 +18,10 @@ struct PolicyProcessOptions {
   std::filesystem::path log;                       ///< its stdout and stderr are appended here
   double first_restart_after_s = 0.2;              ///< back-off after a death; doubles with each …
   double longest_back_off_s = 5;                   ///< … up to this
-  int restarts = 5;                                ///< more deaths than this within `window_s`: given up; at once after exit
-                                                   ///< code 127 (not found) or 2 (refuses its options)
+  int restarts = 5;  ///< more deaths than this within `window_s`: given up; at once after exit
+                     ///< code 127 (not found) or 2 (refuses its options)
   double window_s = 60;
-  double grace_s = 3;                              ///< between SIGTERM and SIGKILL
+  double grace_s = 3;  ///< between SIGTERM and SIGKILL
 };
 
 /// A policy's process, started, watched, restarted and stopped. Nothing of it outlives the harness:
@@ -29,8 +29,9 @@ struct PolicyProcessOptions {
 ///   harness ── guardian ── the policy's command (its own session) ── whatever it starts
 ///
 /// The guardian is a fork of the harness that does nothing but wait. It ends everything below it, also what left the
-/// policy's session (it is the "subreaper" of its descendants), when the policy ends, when Stop asks for it, or when the
-/// harness is gone, be it by SIGKILL: it sees its pipe to the harness close. If the guardian itself is killed, the policy gets SIGKILL.
+/// policy's session (it is the "subreaper" of its descendants), when the policy ends, when Stop asks for it, or when
+/// the harness is gone, be it by SIGKILL: it sees its pipe to the harness close. If the guardian itself is killed, the
+/// policy gets SIGKILL.
 class PolicyProcess {
  public:
   /// Starts it. @throws InvalidInput if the command is empty or the log cannot be written.
@@ -43,8 +44,8 @@ class PolicyProcess {
   /// SIGTERM to all of it, `grace_s`, SIGKILL; returns when nothing is left. Idempotent.
   void Stop();
 
-  /// Why it is not coming back: "its process ended 6 times within 60 s, at last with exit code 3: <log's last line> (policy.log)".
-  /// Nothing while it runs or is about to be restarted, and after Stop. Thread-safe.
+  /// Why it is not coming back: "its process ended 6 times within 60 s, at last with exit code 3: <log's last line>
+  /// (policy.log)". Nothing while it runs or is about to be restarted, and after Stop. Thread-safe.
   std::optional<std::string> WhyGone() const;
 
   int restarts() const;  ///< so far. Thread-safe.

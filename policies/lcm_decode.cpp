@@ -5,8 +5,9 @@ namespace {
 
 constexpr std::size_t kArmStateBytes = 64;  ///< 3 + 4 + 1 doubles
 
-/// Walks over a message's bytes as its type lays them out, and notes if they do not hold what they announce. The generated
-/// decoders need this done first: they allocate what a count says, and compute with a text's length, unchecked.
+/// Walks over a message's bytes as its type lays them out, and notes if they do not hold what they announce. The
+/// generated decoders need this done first: they allocate what a count says, and compute with a text's length,
+/// unchecked.
 class Walk {
  public:
   explicit Walk(std::span<const std::uint8_t> bytes) : bytes_(bytes) { Fixed(8); }  // the type's fingerprint
@@ -24,7 +25,8 @@ class Walk {
     Fixed(4);
     if (!is_whole_) return 0;
     const std::uint8_t* b = bytes_.data() + at;
-    const auto number = static_cast<std::int32_t>(std::uint32_t{b[0]} << 24 | std::uint32_t{b[1]} << 16 | std::uint32_t{b[2]} << 8 | b[3]);
+    const auto number = static_cast<std::int32_t>(std::uint32_t{b[0]} << 24 | std::uint32_t{b[1]} << 16 |
+                                                  std::uint32_t{b[2]} << 8 | b[3]);
     is_whole_ = number >= least && number <= static_cast<std::int64_t>(bytes_.size());
     return is_whole_ ? static_cast<std::size_t>(number) : 0;
   }

@@ -14,7 +14,8 @@ constexpr int kMaxSide_px = 4096;
 void CheckImageHeader(const image_t& m) {
   const auto sane = [](int px) { return px >= 1 && px <= kMaxSide_px; };
   if (!sane(m.width_px) || !sane(m.height_px)) {
-    throw InvalidInput("image of camera {}: size {}x{}, wanted 1 … {} pixels either way", m.camera, m.width_px, m.height_px, kMaxSide_px);
+    throw InvalidInput("image of camera {}: size {}x{}, wanted 1 … {} pixels either way", m.camera, m.width_px,
+                       m.height_px, kMaxSide_px);
   }
   if (m.encoding != image_t::RAW && m.encoding != image_t::JPEG) {
     throw InvalidInput("image of camera {}: encoding {}, wanted 0 (raw) or 1 (JPEG)", m.camera, m.encoding);
@@ -37,7 +38,8 @@ cv::Size JpegSize(std::span<const std::uint8_t> bytes) {
 cv::Mat DecodedJpeg(const image_t& m) {
   const cv::Size stated = JpegSize(m.data);
   if (stated.width != m.width_px || stated.height != m.height_px) {
-    throw InvalidInput("image of camera {}: its JPEG says {}x{}, the message {}x{}", m.camera, stated.width, stated.height, m.width_px, m.height_px);
+    throw InvalidInput("image of camera {}: its JPEG says {}x{}, the message {}x{}", m.camera, stated.width,
+                       stated.height, m.width_px, m.height_px);
   }
   cv::Mat bgr;
   try {
@@ -73,7 +75,8 @@ cv::Mat ImageOf(const image_t& m) {
   if (m.encoding == image_t::JPEG) return DecodedJpeg(m);
   const std::size_t wanted = std::size_t{3} * m.width_px * m.height_px;
   if (m.data.size() != wanted) {
-    throw InvalidInput("image of camera {}: {} bytes, wanted {} for {}x{} RGB", m.camera, m.data.size(), wanted, m.width_px, m.height_px);
+    throw InvalidInput("image of camera {}: {} bytes, wanted {} for {}x{} RGB", m.camera, m.data.size(), wanted,
+                       m.width_px, m.height_px);
   }
   return cv::Mat(m.height_px, m.width_px, CV_8UC3, const_cast<std::uint8_t*>(m.data.data())).clone();
 }

@@ -29,7 +29,8 @@ void CheckToken(const std::string& token) {
   }
 }
 
-/// Whether the system would know where to send to a "udpm://ADDRESS:…" URL; asked before LCM, which would answer with a page of advice.
+/// Whether the system would know where to send to a "udpm://ADDRESS:…" URL; asked before LCM, which would answer with a
+/// page of advice.
 bool HasRoute(const std::string& url) {
   const std::string scheme = "udpm://";
   if (!url.starts_with(scheme)) return true;
@@ -46,11 +47,15 @@ bool HasRoute(const std::string& url) {
 
 lcm_t* Open(const std::string& url) {
   if (!HasRoute(url)) {
-    throw InvalidInput("this machine has no route for multicast, which LCM needs for {}; without a network, give it one over loopback: "
-                       "ip route add 224.0.0.0/4 dev lo", url);
+    throw InvalidInput(
+        "this machine has no route for multicast, which LCM needs for {}; without a network, give it one over "
+        "loopback: "
+        "ip route add 224.0.0.0/4 dev lo",
+        url);
   }
   lcm_t* lcm = lcm_create(url.c_str());
-  if (lcm == nullptr) throw InvalidInput("LCM cannot open {}: the URL is malformed, or multicast is not possible here", url);
+  if (lcm == nullptr)
+    throw InvalidInput("LCM cannot open {}: the URL is malformed, or multicast is not possible here", url);
   return lcm;
 }
 
@@ -98,7 +103,8 @@ LcmLink::~LcmLink() { lcm_destroy(lcm_); }
 
 void LcmLink::Subscribe(const std::string& channels, Handler handler) {
   subscriptions_.push_back(std::make_unique<Subscription>(Subscription{this, std::move(handler)}));
-  lcm_subscription_t* subscribed = lcm_subscribe(lcm_, channels.c_str(), &Subscription::Receive, subscriptions_.back().get());
+  lcm_subscription_t* subscribed =
+      lcm_subscribe(lcm_, channels.c_str(), &Subscription::Receive, subscriptions_.back().get());
   if (subscribed == nullptr) throw InternalError("LCM refuses to listen to {}", channels);
   lcm_subscription_set_queue_capacity(subscribed, kQueuedMessages);
 }
@@ -127,7 +133,8 @@ void LcmLink::WaitForTurn(std::size_t bytes) {
     drained_until_ = now;
   };
   drain();
-  const double excess_bytes = std::min(backlog_bytes_, backlog_bytes_ + static_cast<double>(bytes) - pacing_.burst_bytes);
+  const double excess_bytes =
+      std::min(backlog_bytes_, backlog_bytes_ + static_cast<double>(bytes) - pacing_.burst_bytes);
   if (excess_bytes > 0) {
     std::this_thread::sleep_for(std::chrono::duration<double>(excess_bytes / pacing_.bytes_per_s));
     drain();
@@ -145,8 +152,10 @@ std::optional<std::string> WhatIsWrongWithLcm(const std::string& url) try {
     link.Handle(0.1);
   }
   if (came_back) return std::nullopt;
-  return fmt::format("a message to {} does not come back: a firewall drops it, or loopback has no multicast route "
-                     "(ip route add 224.0.0.0/4 dev lo)", url);
+  return fmt::format(
+      "a message to {} does not come back: a firewall drops it, or loopback has no multicast route "
+      "(ip route add 224.0.0.0/4 dev lo)",
+      url);
 } catch (const Error& error) {
   return error.what();
 }

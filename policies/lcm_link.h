@@ -15,8 +15,9 @@ struct _lcm_t;
 
 namespace evac {
 
-/// Where a run and its policy meet: an LCM URL, and a token inside the channel names. LCM delivers everything sent to one URL to
-/// everyone who listens there, so runs differ in both: the port keeps them apart, the token shows it if the ports collide.
+/// Where a run and its policy meet: an LCM URL, and a token inside the channel names. LCM delivers everything sent to
+/// one URL to everyone who listens there, so runs differ in both: the port keeps them apart, the token shows it if the
+/// ports collide.
 struct LcmAddress {
   /// Where `evac-policy` listens and `evac run` looks for a policy that already runs, unless told otherwise.
   std::string url = "udpm://239.255.76.67:7667?ttl=0&recv_buf_size=4194304";
@@ -24,7 +25,8 @@ struct LcmAddress {
 
   /// An address of its own for anything with a unique name, such as "<run folder> <process id> <policy>".
   static LcmAddress For(const std::string& unique_name);
-  /// EVAC_LCM_URL and EVAC_TOKEN, as the harness sets them for the policies it starts; the defaults where they are unset.
+  /// EVAC_LCM_URL and EVAC_TOKEN, as the harness sets them for the policies it starts; the defaults where they are
+  /// unset.
   static LcmAddress FromEnvironment();
 
   /// "EVAC_<token>_<message>".
@@ -46,7 +48,8 @@ class LcmLink {
  public:
   using Handler = std::function<void(const std::string& channel, std::span<const std::uint8_t> bytes)>;
 
-  /// @throws InvalidInput if the URL is malformed or this machine has no route for multicast; the message says what to do.
+  /// @throws InvalidInput if the URL is malformed or this machine has no route for multicast; the message says what to
+  /// do.
   explicit LcmLink(const std::string& url, const Pacing& pacing = {});
   ~LcmLink();
   LcmLink(const LcmLink&) = delete;

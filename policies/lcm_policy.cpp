@@ -50,8 +50,10 @@ std::vector<std::size_t> WantedCameras(const Task& task, const PolicySpec& polic
 }
 
 void CheckOptions(const LcmPolicyOptions& options) {
-  if (!(options.deadline_s > 0)) throw InvalidInput("policy deadline_s is {}, wanted a positive number", options.deadline_s);
-  if (!(options.repeat_after_s > 0)) throw InvalidInput("policy repeat_after_s is {}, wanted a positive number", options.repeat_after_s);
+  if (!(options.deadline_s > 0))
+    throw InvalidInput("policy deadline_s is {}, wanted a positive number", options.deadline_s);
+  if (!(options.repeat_after_s > 0))
+    throw InvalidInput("policy repeat_after_s is {}, wanted a positive number", options.repeat_after_s);
   if (options.jpeg_quality < 0 || options.jpeg_quality > 100) {
     throw InvalidInput("policy jpeg_quality is {}, wanted 0 … 100", options.jpeg_quality);
   }
@@ -62,7 +64,8 @@ void CheckOptions(const LcmPolicyOptions& options) {
 struct LcmPolicy::Impl {
   explicit Impl(LcmPolicyOptions given) : options(std::move(given)), link(options.address.url, options.pacing) {
     CheckOptions(options);
-    Listen<declaration_t>("declaration", [this](const declaration_t& m) { declarations.insert_or_assign(m.server, m); });
+    Listen<declaration_t>("declaration",
+                          [this](const declaration_t& m) { declarations.insert_or_assign(m.server, m); });
     Listen<episode_started_t>("started", [this](const episode_started_t& m) { TakeStarted(m); });
     Listen<chunk_t>("chunk", [this](const chunk_t& m) { TakeChunk(m); });
   }
@@ -71,13 +74,14 @@ struct LcmPolicy::Impl {
   template <typename Message, typename Handler>
   void Listen(const std::string& message, Handler handler) {
     const std::string mine = options.address.Channel(message);
-    link.Subscribe(LcmAddress::AnyChannel(message), [=, this](const std::string& channel, std::span<const std::uint8_t> bytes) {
-      if (channel != mine) return void(++counters["foreign_replies"]);
-      const auto decoded = Decoded<Message>(bytes);
-      if (!decoded) return void(++counters["undecodable_replies"]);
-      if (decoded->client != client) return void(++counters["foreign_replies"]);
-      handler(*decoded);
-    });
+    link.Subscribe(LcmAddress::AnyChannel(message),
+                   [=, this](const std::string& channel, std::span<const std::uint8_t> bytes) {
+                     if (channel != mine) return void(++counters["foreign_replies"]);
+                     const auto decoded = Decoded<Message>(bytes);
+                     if (!decoded) return void(++counters["undecodable_replies"]);
+                     if (decoded->client != client) return void(++counters["foreign_replies"]);
+                     handler(*decoded);
+                   });
   }
 
   // The handshake.
@@ -108,16 +112,20 @@ struct LcmPolicy::Impl {
     for (const auto end = After(Clock::now(), kLongestWait_s); Clock::now() < end;) link.Handle(kLongestWait_s / 10);
     if (declarations.empty()) declarations[first.server] = first;
     if (declarations.size() == 1) return;
-    throw InvalidInput("{} policies answer on {} with token {} ({}, {} …): stop all but one, or give each a token of its own",
-                       declarations.size(), options.address.url, options.address.token, declarations.begin()->second.policy.name,
-                       std::next(declarations.begin())->second.policy.name);
+    throw InvalidInput(
+        "{} policies answer on {} with token {} ({}, {} …): stop all but one, or give each a token of its own",
+        declarations.size(), options.address.url, options.address.token, declarations.begin()->second.policy.name,
+        std::next(declarations.begin())->second.policy.name);
   }
 
   [[noreturn]] void ThrowNobodyAnswers(double wait_s) {
     const std::int64_t undecodable = counters["undecodable_replies"];
-    const std::string hint = undecodable > 0 ? fmt::format("; {} answers came in another version of the message types", undecodable) : "";
-    throw InvalidInput("no policy answered within {} s on {} with token {}{}. One that runs elsewhere joins with these as "
-                       "EVAC_LCM_URL and EVAC_TOKEN, or as --url and --token", wait_s, options.address.url, options.address.token, hint);
+    const std::string hint =
+        undecodable > 0 ? fmt::format("; {} answers came in another version of the message types", undecodable) : "";
+    throw InvalidInput(
+        "no policy answered within {} s on {} with token {}{}. One that runs elsewhere joins with these as "
+        "EVAC_LCM_URL and EVAC_TOKEN, or as --url and --token",
+        wait_s, options.address.url, options.address.token, hint);
   }
 
   // Asking.
@@ -131,7 +139,8 @@ struct LcmPolicy::Impl {
     lane.header.arms_are_commanded = observation.arms_are_commanded;
     lane.images.clear();
     for (std::size_t i = 0; i < lane.sent.size(); ++i) {
-      if (lane.sent[i] >= observation.images.size()) throw InternalError("the observation lacks the image of camera {}", lane.task.cameras[i].name);
+      if (lane.sent[i] >= observation.images.size())
+        throw InternalError("the observation lacks the image of camera {}", lane.task.cameras[i].name);
       lane.images.push_back(ImageMessage(lane, static_cast<int>(i), observation.images[lane.sent[i]]));
     }
     lane.asked_at = lane.send_at = Clock::now();
@@ -196,11 +205,14 @@ struct LcmPolicy::Impl {
     ++counters["timeouts"];
     gave_up.insert(lane.header.episode);
     lane.gave_up = true;
-    const std::string what = lane.has_started ? fmt::format("request {}", lane.header.request) : std::string("the episode's start");
-    const std::string silence = last_heard ? fmt::format("; the policy was last heard {:.1f} s ago", Seconds(Clock::now() - *last_heard).count())
+    const std::string what =
+        lane.has_started ? fmt::format("request {}", lane.header.request) : std::string("the episode's start");
+    const std::string silence = last_heard ? fmt::format("; the policy was last heard {:.1f} s ago",
+                                                         Seconds(Clock::now() - *last_heard).count())
                                            : std::string("; the policy was never heard");
-    lane.answer = Failure{StopReason::kPolicyTimeout, fmt::format("no answer to {} within {:.1f} s (sent {} times; deadline {} s){}", what, waited_s,
-                                                                  lane.sendings, options.deadline_s, silence)};
+    lane.answer = Failure{StopReason::kPolicyTimeout,
+                          fmt::format("no answer to {} within {:.1f} s (sent {} times; deadline {} s){}", what,
+                                      waited_s, lane.sendings, options.deadline_s, silence)};
   }
 
   std::optional<std::string> WhyGone() const { return options.why_gone ? options.why_gone() : std::nullopt; }
@@ -223,7 +235,8 @@ struct LcmPolicy::Impl {
     lane->sendings = 0;
     lane->wait_s = options.repeat_after_s;
     lane->send_at = Clock::now();
-    if (!started.error.empty() && !lane->answer) lane->answer = PolicyError("the policy refuses the task: " + started.error, "error_replies");
+    if (!started.error.empty() && !lane->answer)
+      lane->answer = PolicyError("the policy refuses the task: " + started.error, "error_replies");
   }
 
   void TakeChunk(const chunk_t& reply) {
@@ -247,13 +260,15 @@ struct LcmPolicy::Impl {
   }
 
   Acted AnswerOf(const chunk_t& reply, const Lane& lane) {
-    if (reply.unknown_episode) return PolicyError("the policy was restarted in the middle of the episode: " + reply.error, "error_replies");
+    if (reply.unknown_episode)
+      return PolicyError("the policy was restarted in the middle of the episode: " + reply.error, "error_replies");
     if (!reply.error.empty()) return PolicyError("the policy answered with an error: " + reply.error, "error_replies");
     try {
       ActionChunk chunk = FromWire(reply, lane.task.arms);
       const std::size_t wanted = harness ? harness->chunk_size : chunk.targets.size();
       if (chunk.targets.size() < wanted && !chunk.ends_recording) {
-        throw InvalidInput("the chunk has {} targets, wanted {} (only the end of a recording may be shorter)", chunk.targets.size(), wanted);
+        throw InvalidInput("the chunk has {} targets, wanted {} (only the end of a recording may be shorter)",
+                           chunk.targets.size(), wanted);
       }
       if (chunk.targets.size() > wanted) {
         chunk.targets.resize(wanted);
@@ -261,7 +276,8 @@ struct LcmPolicy::Impl {
       }
       return chunk;
     } catch (const Error& error) {
-      return PolicyError(fmt::format("malformed answer to request {}: {}", reply.request, error.what()), "malformed_replies");
+      return PolicyError(fmt::format("malformed answer to request {}: {}", reply.request, error.what()),
+                         "malformed_replies");
     }
   }
 
@@ -299,7 +315,8 @@ PolicySpec LcmPolicy::Handshake(const PolicySpec& harness, double wait_s) {
   impl_->AwaitDeclaration(harness, wait_s);
   const PolicySpec policy = FromWire(impl_->declarations.begin()->second.policy);
   if (!Compare(harness, policy).empty()) {
-    throw InvalidInput("policy {}@{} does not fit this run:\n{}", policy.name, policy.checkpoint, SideBySide(harness, policy));
+    throw InvalidInput("policy {}@{} does not fit this run:\n{}", policy.name, policy.checkpoint,
+                       SideBySide(harness, policy));
   }
   impl_->harness = harness;
   impl_->policy = policy;

@@ -26,9 +26,10 @@ struct LcmPolicyOptions {
 
 /// A policy in another process, at the end of an LCM link (docs/formats/policy_wire.md).
 ///
-/// What the wire does is never the run's end: what stays unanswered until its deadline becomes Failure{policy_timeout}, an error
-/// reply or a malformed one becomes Failure{policy_error} with what and where, for that scene alone. Replies that answer
-/// something else are recognised and counted. Repeats change no result: the server answers them from its cache.
+/// What the wire does is never the run's end: what stays unanswered until its deadline becomes Failure{policy_timeout},
+/// an error reply or a malformed one becomes Failure{policy_error} with what and where, for that scene alone. Replies
+/// that answer something else are recognised and counted. Repeats change no result: the server answers them from its
+/// cache.
 ///
 ///   LcmPolicy policy({.address = LcmAddress::For(run_name)});
 ///   const PolicySpec declared = policy.Handshake(HarnessSpec(task, chunk_size), 30);
@@ -39,9 +40,11 @@ class LcmPolicy : public Policy {
   explicit LcmPolicy(LcmPolicyOptions options);
   ~LcmPolicy() override;
 
-  /// Both sides declare. To be called once, before the first Reset; a process that is only just starting has `wait_s` for it.
+  /// Both sides declare. To be called once, before the first Reset; a process that is only just starting has `wait_s`
+  /// for it.
   /// @returns what the policy declared.
-  /// @throws InvalidInput if they do not fit together (both declarations side by side), if nobody answers within `wait_s`,
+  /// @throws InvalidInput if they do not fit together (both declarations side by side), if nobody answers within
+  /// `wait_s`,
   ///         or if two policies answer on this address.
   PolicySpec Handshake(const PolicySpec& harness, double wait_s);
 

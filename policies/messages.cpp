@@ -13,7 +13,8 @@ namespace {
 
 void CheckFinite(std::span<const double> values, const std::string& where, const char* field) {
   for (std::size_t i = 0; i < values.size(); ++i) {
-    if (!std::isfinite(values[i])) throw InvalidInput("{}: {}[{}] is {}, wanted a finite number", where, field, i, values[i]);
+    if (!std::isfinite(values[i]))
+      throw InvalidInput("{}: {}[{}] is {}, wanted a finite number", where, field, i, values[i]);
   }
 }
 
@@ -102,20 +103,36 @@ Camera FromWire(const camera_t& wire) {
   if (wire.mount < camera_t::BASE || wire.mount > camera_t::RIGHT_GRIPPER) {
     throw InvalidInput("{}: mount is {}, wanted 0 (base), 1 (left gripper) or 2 (right gripper)", where, wire.mount);
   }
-  return {.name = wire.name, .width_px = wire.width_px, .height_px = wire.height_px,
-          .fx_px = wire.fx_px, .fy_px = wire.fy_px, .cx_px = wire.cx_px, .cy_px = wire.cy_px,
+  return {.name = wire.name,
+          .width_px = wire.width_px,
+          .height_px = wire.height_px,
+          .fx_px = wire.fx_px,
+          .fy_px = wire.fy_px,
+          .cx_px = wire.cx_px,
+          .cy_px = wire.cy_px,
           .mount = static_cast<Mount>(wire.mount),
-          .mount_from_camera = PoseFromWire(wire.mount_from_camera_position_m, wire.mount_from_camera_orientation_xyzw, where)};
+          .mount_from_camera =
+              PoseFromWire(wire.mount_from_camera_position_m, wire.mount_from_camera_orientation_xyzw, where)};
 }
 
 PolicySpec FromWire(const spec_t& wire) {
   const double numbers[] = {wire.gripper_open, wire.gripper_closed, wire.period_s};
   CheckFinite(numbers, "declaration of " + wire.name, "gripper_open gripper_closed period_s");
-  PolicySpec spec{.name = wire.name, .checkpoint = wire.checkpoint, .action_space = wire.action_space, .frame = wire.frame,
-                  .quaternion_order = wire.quaternion_order, .image_format = wire.image_format,
-                  .gripper_open = wire.gripper_open, .gripper_closed = wire.gripper_closed, .arms = wire.arms,
-                  .period_s = wire.period_s, .chunk_size = wire.chunk_size, .cameras = {}, .needs = {}};
-  for (const camera_need_t& camera : wire.cameras) spec.cameras.push_back({camera.name, camera.width_px, camera.height_px});
+  PolicySpec spec{.name = wire.name,
+                  .checkpoint = wire.checkpoint,
+                  .action_space = wire.action_space,
+                  .frame = wire.frame,
+                  .quaternion_order = wire.quaternion_order,
+                  .image_format = wire.image_format,
+                  .gripper_open = wire.gripper_open,
+                  .gripper_closed = wire.gripper_closed,
+                  .arms = wire.arms,
+                  .period_s = wire.period_s,
+                  .chunk_size = wire.chunk_size,
+                  .cameras = {},
+                  .needs = {}};
+  for (const camera_need_t& camera : wire.cameras)
+    spec.cameras.push_back({camera.name, camera.width_px, camera.height_px});
   spec.needs.insert(wire.needs.begin(), wire.needs.end());
   return spec;
 }
@@ -123,13 +140,15 @@ PolicySpec FromWire(const spec_t& wire) {
 ActionChunk FromWire(const chunk_t& wire, const std::vector<std::string>& arms) {
   if (wire.num_targets < 1) throw InvalidInput("the chunk has {} targets, wanted at least 1", wire.num_targets);
   if (wire.num_arms != static_cast<int>(arms.size())) {
-    throw InvalidInput("the chunk's targets have {} arms, wanted {} ({})", wire.num_arms, arms.size(), fmt::join(arms, ", "));
+    throw InvalidInput("the chunk's targets have {} arms, wanted {} ({})", wire.num_arms, arms.size(),
+                       fmt::join(arms, ", "));
   }
   ActionChunk chunk{.targets = {}, .ends_recording = wire.ends_recording != 0};
   for (int k = 0; k < wire.num_targets; ++k) {
     Arms target;
     for (std::size_t i = 0; i < arms.size(); ++i) {
-      target.push_back(FromWire(wire.targets[k][i], fmt::format("target {} of {}, {} arm", k, wire.num_targets, arms[i])));
+      target.push_back(
+          FromWire(wire.targets[k][i], fmt::format("target {} of {}, {} arm", k, wire.num_targets, arms[i])));
     }
     chunk.targets.push_back(std::move(target));
   }
@@ -160,7 +179,8 @@ Task TaskOf(const episode_start_t& start) {
   task.instruction = start.instruction;
   task.arms = start.arms;
   task.period_s = start.period_s;
-  task.workspace_m = Eigen::AlignedBox3d(Eigen::Vector3d(start.workspace_min_m), Eigen::Vector3d(start.workspace_max_m));
+  task.workspace_m =
+      Eigen::AlignedBox3d(Eigen::Vector3d(start.workspace_min_m), Eigen::Vector3d(start.workspace_max_m));
   for (const camera_t& camera : start.cameras) task.cameras.push_back(FromWire(camera));
   return task;
 }

@@ -17,8 +17,8 @@
 #include "core/types.h"
 #include "policies/spec.h"
 
-/// The edge between the wire (policies/lcm/*.lcm, generated structs ending in _t) and our types. Bytes and messages are what
-/// a stranger sent: everything here checks, nothing behind it has to.
+/// The edge between the wire (policies/lcm/*.lcm, generated structs ending in _t) and our types. Bytes and messages are
+/// what a stranger sent: everything here checks, nothing behind it has to.
 namespace evac {
 
 /// The message's bytes as LCM sends them.
@@ -29,8 +29,8 @@ std::vector<std::uint8_t> Encoded(const Message& message) {
   return bytes;
 }
 
-/// The message, or nothing if these bytes are no such message. Never throws, never allocates more than a small multiple of
-/// the bytes' size. Defined for the messages included above.
+/// The message, or nothing if these bytes are no such message. Never throws, never allocates more than a small multiple
+/// of the bytes' size. Defined for the messages included above.
 template <typename Message>
 std::optional<Message> Decoded(std::span<const std::uint8_t> bytes);
 

@@ -17,8 +17,8 @@
 namespace evac {
 namespace {
 
-constexpr std::size_t kRepliesKept = 4;    ///< per episode, for repeated requests
-constexpr std::size_t kClientsKept = 32;   ///< a server that outlives many runs forgets the one longest silent
+constexpr std::size_t kRepliesKept = 4;   ///< per episode, for repeated requests
+constexpr std::size_t kClientsKept = 32;  ///< a server that outlives many runs forgets the one longest silent
 constexpr int kMaxImages = 16;
 
 /// A request while its images come in.
@@ -49,7 +49,8 @@ struct Client {
 Observation ObservationOf(const Gathering& gathered, const Task& task) {
   Observation observation;
   for (const auto& [index, image] : gathered.images) observation.images.push_back(ImageOf(image));
-  for (const arm_state_t& arm : gathered.header->arms) observation.arms.push_back(FromWire(arm, "the observation's arms"));
+  for (const arm_state_t& arm : gathered.header->arms)
+    observation.arms.push_back(FromWire(arm, "the observation's arms"));
   observation.arms_are_commanded = gathered.header->arms_are_commanded != 0;
   if (const auto wrong = WhatIsWrong(observation, task)) throw InvalidInput("{}", *wrong);
   return observation;
@@ -61,14 +62,16 @@ void PutChunk(const ActionChunk& chunk, chunk_t& reply) {
   reply.num_targets = static_cast<int>(chunk.targets.size());
   reply.num_arms = chunk.targets.empty() ? 0 : static_cast<int>(chunk.targets.front().size());
   for (const auto& target : reply.targets) {
-    if (static_cast<int>(target.size()) != reply.num_arms) throw InvalidInput("its targets have different numbers of arms");
+    if (static_cast<int>(target.size()) != reply.num_arms)
+      throw InvalidInput("its targets have different numbers of arms");
   }
 }
 
 }  // namespace
 
 struct PolicyServer::Impl {
-  Impl(Policy& wrapped, PolicySpec its_spec, const LcmAddress& at) : policy(wrapped), spec(std::move(its_spec)), address(at), link(at.url) {
+  Impl(Policy& wrapped, PolicySpec its_spec, const LcmAddress& at)
+      : policy(wrapped), spec(std::move(its_spec)), address(at), link(at.url) {
     Listen<hello_t>("hello", [this](const hello_t& hello) { Declare(hello); });
     Listen<episode_start_t>("start", [this](const episode_start_t& start) { Start(start); });
     Listen<observation_t>("observation", [this](const observation_t& header) { TakeHeader(header); });
@@ -131,7 +134,8 @@ struct PolicyServer::Impl {
     started.client = start.client;
     started.server = name;
     started.episode = start.episode;
-    started.error = client.episodes.contains(start.episode) ? client.episodes[start.episode].refusal : "the episode is over";
+    started.error =
+        client.episodes.contains(start.episode) ? client.episodes[start.episode].refusal : "the episode is over";
     link.Publish(address.Channel("started"), started);
   }
 
@@ -169,14 +173,16 @@ struct PolicyServer::Impl {
     if (image.index < 0 || image.index >= kMaxImages) return void(++counters["undecodable_messages"]);
     const bool is_answered = !episode->replies.empty() && image.request <= episode->replies.back().request;
     if (is_answered || image.request < episode->gathering.request) return;  // the header decides what to do about it
-    if (image.request > episode->gathering.request) episode->gathering = {.request = image.request, .header = {}, .images = {}};
+    if (image.request > episode->gathering.request)
+      episode->gathering = {.request = image.request, .header = {}, .images = {}};
     episode->gathering.images.insert_or_assign(image.index, image);
     AnswerIfComplete(*episode);
   }
 
   /// Answers a repeated request from the cache; whether this one is new, and room is made for it.
   bool IsWanted(LiveEpisode& episode, const std::string& client, std::int64_t request) {
-    const auto kept = std::find_if(episode.replies.begin(), episode.replies.end(), [&](const chunk_t& r) { return r.request == request; });
+    const auto kept = std::find_if(episode.replies.begin(), episode.replies.end(),
+                                   [&](const chunk_t& r) { return r.request == request; });
     if (kept != episode.replies.end()) {
       ++counters["repeated_requests"];
       Send(*kept, clients[client]);
@@ -207,7 +213,8 @@ struct PolicyServer::Impl {
       const Observation observation = ObservationOf(episode.gathering, episode.task);
       const SceneObservation asked{episode.scene, &observation};
       const std::vector<Acted> acted = policy.Act({&asked, 1});
-      if (acted.size() != 1) throw InternalError("{} answered {} times to one observation", policy.Name(), acted.size());
+      if (acted.size() != 1)
+        throw InternalError("{} answered {} times to one observation", policy.Name(), acted.size());
       if (const auto* failure = std::get_if<Failure>(&acted.front())) throw InternalError("{}", failure->message);
       PutChunk(std::get<ActionChunk>(acted.front()), reply);
     } catch (const std::exception& error) {

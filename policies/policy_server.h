@@ -12,11 +12,12 @@
 
 namespace evac {
 
-/// Serves any Policy over LCM (docs/write_a_policy.md): declares itself, keeps the episodes of every client apart, gathers a request's
-/// images in whatever order they come, answers a repeated request from its cache, and turns exceptions into error replies.
+/// Serves any Policy over LCM (docs/write_a_policy.md): declares itself, keeps the episodes of every client apart,
+/// gathers a request's images in whatever order they come, answers a repeated request from its cache, and turns
+/// exceptions into error replies.
 ///
-/// The wrapped policy gets a Task with id, instruction, arms, cameras (those it declared to need), period_s and workspace_m:
-/// what travels, nothing else. It is asked for one scene at a time, by one thread.
+/// The wrapped policy gets a Task with id, instruction, arms, cameras (those it declared to need), period_s and
+/// workspace_m: what travels, nothing else. It is asked for one scene at a time, by one thread.
 class PolicyServer {
  public:
   /// @param policy  outlives the server.

@@ -14,7 +14,9 @@ namespace {
 
 using nlohmann::json;
 
-std::string Text(const std::vector<std::string>& names) { return names.empty() ? "any" : fmt::format("{}", fmt::join(names, ", ")); }
+std::string Text(const std::vector<std::string>& names) {
+  return names.empty() ? "any" : fmt::format("{}", fmt::join(names, ", "));
+}
 
 std::string Text(const CameraNeed& camera) {
   const auto size = [](int px) { return px == 0 ? std::string("any") : std::to_string(px); };
@@ -58,7 +60,8 @@ std::string WhyChunkDiffers(const PolicySpec& harness, const PolicySpec& policy)
 std::string WhyCamerasDiffer(const PolicySpec& harness, const PolicySpec& policy) {
   const auto fits = [](int offered_px, int needed_px) { return needed_px == 0 || offered_px == needed_px; };
   for (const CameraNeed& need : policy.cameras) {
-    const auto found = std::find_if(harness.cameras.begin(), harness.cameras.end(), [&](const CameraNeed& c) { return c.name == need.name; });
+    const auto found = std::find_if(harness.cameras.begin(), harness.cameras.end(),
+                                    [&](const CameraNeed& c) { return c.name == need.name; });
     if (found == harness.cameras.end()) return fmt::format("the task has no camera {}", need.name);
     if (!fits(found->width_px, need.width_px) || !fits(found->height_px, need.height_px)) {
       return fmt::format("the images of camera {} have another size", need.name);
@@ -77,9 +80,13 @@ std::string WhyNeedsUnknown(const PolicySpec& policy) {
 }
 
 std::vector<Row> Rows(const PolicySpec& harness, const PolicySpec& policy) {
-  const auto gripper = [](const PolicySpec& s) { return fmt::format("{} open … {} closed", s.gripper_open, s.gripper_closed); };
+  const auto gripper = [](const PolicySpec& s) {
+    return fmt::format("{} open … {} closed", s.gripper_open, s.gripper_closed);
+  };
   const auto needs = [](const PolicySpec& s) { return fmt::format("{}", fmt::join(s.needs, ", ")); };
-  const auto period = [](const PolicySpec& s) { return s.period_s == 0 ? std::string("any") : fmt::format("{:.6g} s", s.period_s); };
+  const auto period = [](const PolicySpec& s) {
+    return s.period_s == 0 ? std::string("any") : fmt::format("{:.6g} s", s.period_s);
+  };
   return {
       {"name", harness.name, policy.name, ""},
       {"checkpoint", harness.checkpoint, policy.checkpoint, ""},
@@ -90,8 +97,10 @@ std::vector<Row> Rows(const PolicySpec& harness, const PolicySpec& policy) {
       SameText("gripper", gripper(harness), gripper(policy)),
       {"arms", Text(harness.arms), Text(policy.arms), WhyArmsDiffer(harness, policy)},
       {"period", period(harness), period(policy), WhyPeriodDiffers(harness, policy)},
-      {"chunk_size", std::to_string(harness.chunk_size), std::to_string(policy.chunk_size), WhyChunkDiffers(harness, policy)},
-      {"cameras", Text(harness.cameras, false), Text(policy.cameras, policy.needs.contains("images")), WhyCamerasDiffer(harness, policy)},
+      {"chunk_size", std::to_string(harness.chunk_size), std::to_string(policy.chunk_size),
+       WhyChunkDiffers(harness, policy)},
+      {"cameras", Text(harness.cameras, false), Text(policy.cameras, policy.needs.contains("images")),
+       WhyCamerasDiffer(harness, policy)},
       {"needs", needs(harness), needs(policy), WhyNeedsUnknown(policy)},
   };
 }
@@ -101,7 +110,9 @@ std::size_t Width(const std::string& text) {
   return std::count_if(text.begin(), text.end(), [](char c) { return (static_cast<unsigned char>(c) & 0xC0) != 0x80; });
 }
 
-std::string Padded(const std::string& text, std::size_t width) { return text + std::string(width - std::min(width, Width(text)), ' '); }
+std::string Padded(const std::string& text, std::size_t width) {
+  return text + std::string(width - std::min(width, Width(text)), ' ');
+}
 
 }  // namespace
 
@@ -129,7 +140,8 @@ std::string SideBySide(const PolicySpec& harness, const PolicySpec& policy) {
   }
   std::string table, reasons;
   for (const Row& row : rows) {
-    table += fmt::format("{} {}  {}  {}\n", row.why.empty() ? ' ' : '*', Padded(row.field, field_width), Padded(row.harness, harness_width), row.policy);
+    table += fmt::format("{} {}  {}  {}\n", row.why.empty() ? ' ' : '*', Padded(row.field, field_width),
+                         Padded(row.harness, harness_width), row.policy);
     if (!row.why.empty()) reasons += fmt::format("{}: {}\n", row.field, row.why);
   }
   return table + reasons;
@@ -140,10 +152,19 @@ std::string ToJson(const PolicySpec& spec) {
   for (const CameraNeed& camera : spec.cameras) {
     cameras.push_back({{"name", camera.name}, {"width_px", camera.width_px}, {"height_px", camera.height_px}});
   }
-  return json{{"name", spec.name}, {"checkpoint", spec.checkpoint}, {"action_space", spec.action_space}, {"frame", spec.frame},
-              {"quaternion_order", spec.quaternion_order}, {"image_format", spec.image_format},
-              {"gripper_open", spec.gripper_open}, {"gripper_closed", spec.gripper_closed}, {"arms", spec.arms},
-              {"period_s", spec.period_s}, {"chunk_size", spec.chunk_size}, {"cameras", cameras}, {"needs", spec.needs}}
+  return json{{"name", spec.name},
+              {"checkpoint", spec.checkpoint},
+              {"action_space", spec.action_space},
+              {"frame", spec.frame},
+              {"quaternion_order", spec.quaternion_order},
+              {"image_format", spec.image_format},
+              {"gripper_open", spec.gripper_open},
+              {"gripper_closed", spec.gripper_closed},
+              {"arms", spec.arms},
+              {"period_s", spec.period_s},
+              {"chunk_size", spec.chunk_size},
+              {"cameras", cameras},
+              {"needs", spec.needs}}
       .dump(-1, ' ', false, json::error_handler_t::replace);
 }
 

@@ -16,23 +16,24 @@ struct CameraNeed {
   bool operator==(const CameraNeed&) const = default;
 };
 
-/// The conventions one side of the link keeps to. Harness and policy each declare theirs, and they are compared before the
-/// first episode: a silent difference here is what most "cannot reproduce" reports of this field turn out to be.
-/// The defaults are this project's own conventions; a policy that differs says so and is refused, never converted silently.
+/// The conventions one side of the link keeps to. Harness and policy each declare theirs, and they are compared before
+/// the first episode: a silent difference here is what most "cannot reproduce" reports of this field turn out to be.
+/// The defaults are this project's own conventions; a policy that differs says so and is refused, never converted
+/// silently.
 struct PolicySpec {
   std::string name{};
   std::string checkpoint{};
-  std::string action_space = "absolute";   ///< "absolute" targets, or "delta" to the pose before
-  std::string frame = "base";              ///< what targets and arm states are relative to
+  std::string action_space = "absolute";  ///< "absolute" targets, or "delta" to the pose before
+  std::string frame = "base";             ///< what targets and arm states are relative to
   std::string quaternion_order = "xyzw";
   std::string image_format = "RGB";
-  double gripper_open = 0;                 ///< the number that means open …
-  double gripper_closed = 1;               ///< … and closed: range and sense in one
-  std::vector<std::string> arms{};         ///< in order: {right}, or {left, right}; empty in a policy: any
-  double period_s = 0;                     ///< between two targets; 0 in a policy: any
-  int chunk_size = 1;                      ///< harness: targets it executes per chunk; policy: targets it sends per chunk
-  std::vector<CameraNeed> cameras{};       ///< empty in a policy that needs images: all the task has
-  std::set<std::string> needs{};           ///< of kKnownNeeds; a policy's only
+  double gripper_open = 0;            ///< the number that means open …
+  double gripper_closed = 1;          ///< … and closed: range and sense in one
+  std::vector<std::string> arms{};    ///< in order: {right}, or {left, right}; empty in a policy: any
+  double period_s = 0;                ///< between two targets; 0 in a policy: any
+  int chunk_size = 1;                 ///< harness: targets it executes per chunk; policy: targets it sends per chunk
+  std::vector<CameraNeed> cameras{};  ///< empty in a policy that needs images: all the task has
+  std::set<std::string> needs{};      ///< of kKnownNeeds; a policy's only
   bool operator==(const PolicySpec&) const = default;
 };
 
@@ -48,7 +49,7 @@ struct SpecMismatch {
   std::string field;    ///< as in PolicySpec
   std::string harness;  ///< its value
   std::string policy;
-  std::string why;      ///< "the policy sends fewer targets than the world executes at once"
+  std::string why;  ///< "the policy sends fewer targets than the world executes at once"
 };
 
 /// Nothing if they fit: a longer chunk fits (its first targets are executed), a shorter one or another period does not.

@@ -28,12 +28,13 @@ void Convert(const evac::observation_t& header) {
 void Convert(const evac::episode_started_t&) {}
 void Convert(const evac::bye_t&) {}
 
-/// The bytes after the type's fingerprint are the fuzzer's: what decodes must encode to something that decodes to the same
-/// (from the second time on: LCM's encoder ends a text at a zero byte, its decoder does not).
+/// The bytes after the type's fingerprint are the fuzzer's: what decodes must encode to something that decodes to the
+/// same (from the second time on: LCM's encoder ends a text at a zero byte, its decoder does not).
 template <typename Message>
 void Try(Bytes content) {
   std::vector<std::uint8_t> bytes;
-  for (int shift = 56; shift >= 0; shift -= 8) bytes.push_back(static_cast<std::uint8_t>(static_cast<std::uint64_t>(Message::getHash()) >> shift));
+  for (int shift = 56; shift >= 0; shift -= 8)
+    bytes.push_back(static_cast<std::uint8_t>(static_cast<std::uint64_t>(Message::getHash()) >> shift));
   bytes.insert(bytes.end(), content.begin(), content.end());
   const auto message = evac::Decoded<Message>(bytes);
   if (!message) return;
@@ -55,21 +56,40 @@ void TryJpeg(Bytes changes) {
 
 }  // namespace
 
-/// Any bytes are a message that the edge understands, or nothing, or an InvalidInput: never a crash, never a huge allocation.
+/// Any bytes are a message that the edge understands, or nothing, or an InvalidInput: never a crash, never a huge
+/// allocation.
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   if (size < 1) return 0;
   const Bytes content(data + 1, size - 1);
   try {
     switch (data[0] % 9) {
-      case 0: Try<evac::chunk_t>(content); break;
-      case 1: Try<evac::image_t>(content); break;
-      case 2: Try<evac::observation_t>(content); break;
-      case 3: Try<evac::episode_start_t>(content); break;
-      case 4: Try<evac::hello_t>(content); break;
-      case 5: Try<evac::declaration_t>(content); break;
-      case 6: Try<evac::episode_started_t>(content); break;
-      case 7: Try<evac::bye_t>(content); break;
-      case 8: TryJpeg(content); break;
+      case 0:
+        Try<evac::chunk_t>(content);
+        break;
+      case 1:
+        Try<evac::image_t>(content);
+        break;
+      case 2:
+        Try<evac::observation_t>(content);
+        break;
+      case 3:
+        Try<evac::episode_start_t>(content);
+        break;
+      case 4:
+        Try<evac::hello_t>(content);
+        break;
+      case 5:
+        Try<evac::declaration_t>(content);
+        break;
+      case 6:
+        Try<evac::episode_started_t>(content);
+        break;
+      case 7:
+        Try<evac::bye_t>(content);
+        break;
+      case 8:
+        TryJpeg(content);
+        break;
     }
   } catch (const evac::Error& error) {
     if (error.exit_code() != evac::ExitCode::kInvalidInput) std::abort();

@@ -67,10 +67,13 @@ class PolicyProcessTest : public testing::Test {
   fs::path folder_;
 };
 
-constexpr const char* kWritePids = "sleep 1000 & echo $! > $FOLDER/child; setsid sleep 1001 & echo $! > $FOLDER/runaway; echo $$ > $FOLDER/self; wait";
+constexpr const char* kWritePids =
+    "sleep 1000 & echo $! > $FOLDER/child; setsid sleep 1001 & echo $! > $FOLDER/runaway; echo $$ > $FOLDER/self; wait";
 
 TEST_F(PolicyProcessTest, ItsOutputAndEnvironmentAreItsOwn) {
-  PolicyProcessOptions options = Shell("echo out $EVAC_TOKEN; echo err >&2; pwd; cut -d ' ' -f 6 /proc/$$/stat > $FOLDER/session; echo $$ > $FOLDER/self; sleep 1000");
+  PolicyProcessOptions options = Shell(
+      "echo out $EVAC_TOKEN; echo err >&2; pwd; cut -d ' ' -f 6 /proc/$$/stat > $FOLDER/session; echo $$ > "
+      "$FOLDER/self; sleep 1000");
   options.environment["EVAC_TOKEN"] = "word";
   options.working_directory = folder_;
   std::ofstream(options.log) << "before\n";
@@ -81,7 +84,8 @@ TEST_F(PolicyProcessTest, ItsOutputAndEnvironmentAreItsOwn) {
 }
 
 TEST_F(PolicyProcessTest, OneThatDiesIsStartedAgain) {
-  PolicyProcess process(Shell("test -e $FOLDER/second && echo $$ > $FOLDER/self && exec sleep 1000; touch $FOLDER/second; exit 7"));
+  PolicyProcess process(
+      Shell("test -e $FOLDER/second && echo $$ > $FOLDER/self && exec sleep 1000; touch $FOLDER/second; exit 7"));
   EXPECT_TRUE(IsAlive(PidIn("self")));
   EXPECT_EQ(process.restarts(), 1);
   EXPECT_EQ(process.WhyGone(), std::nullopt);
@@ -92,7 +96,9 @@ TEST_F(PolicyProcessTest, OneThatDiesAgainAndAgainIsGivenUpWithItsLastWords) {
   options.restarts = 2;
   PolicyProcess process(options);
   ASSERT_TRUE(Eventually([&] { return process.WhyGone().has_value(); }));
-  EXPECT_EQ(*process.WhyGone(), "its process ended 3 times within 60 s, at last with exit code 3: no such checkpoint (" + options.log.string() + ")");
+  EXPECT_EQ(*process.WhyGone(),
+            "its process ended 3 times within 60 s, at last with exit code 3: no such checkpoint (" +
+                options.log.string() + ")");
   EXPECT_EQ(process.restarts(), 2);
 }
 
@@ -122,7 +128,8 @@ TEST_F(PolicyProcessTest, AnEmptyCommandOrALogThatCannotBeWrittenIsRefused) {
 }
 
 TEST_F(PolicyProcessTest, StopLetsItLeaveInPeace) {
-  PolicyProcess process(Shell("trap 'echo goodbye; exit 0' TERM; echo $$ > $FOLDER/self; while :; do sleep 0.01; done"));
+  PolicyProcess process(
+      Shell("trap 'echo goodbye; exit 0' TERM; echo $$ > $FOLDER/self; while :; do sleep 0.01; done"));
   const pid_t self = PidIn("self");
   process.Stop();
   EXPECT_FALSE(IsAlive(self));

@@ -12,12 +12,14 @@ namespace evac {
 namespace {
 
 TEST(LcmAddress, EveryNameHasAnAddressOfItsOwnAndAlwaysTheSame) {
-  const LcmAddress a = LcmAddress::For("out/demo 17 hold"), again = LcmAddress::For("out/demo 17 hold"), b = LcmAddress::For("out/demo 18 hold");
+  const LcmAddress a = LcmAddress::For("out/demo 17 hold"), again = LcmAddress::For("out/demo 17 hold"),
+                   b = LcmAddress::For("out/demo 18 hold");
   EXPECT_EQ(a.url, again.url);
   EXPECT_EQ(a.token, again.token);
   EXPECT_NE(a.url, b.url);
   EXPECT_NE(a.token, b.token);
-  EXPECT_THAT(a.url, testing::MatchesRegex("udpm://239.255.76.67:[12][0-9][0-9][0-9][0-9]\\?ttl=0&recv_buf_size=4194304"));
+  EXPECT_THAT(a.url,
+              testing::MatchesRegex("udpm://239.255.76.67:[12][0-9][0-9][0-9][0-9]\\?ttl=0&recv_buf_size=4194304"));
 }
 
 TEST(LcmAddress, ATokenThatWouldBreakAChannelsNameIsRefused) {

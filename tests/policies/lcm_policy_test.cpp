@@ -15,8 +15,12 @@ using wire::Told;
 
 class LcmPolicyTest : public wire::WireTest {
  protected:
-  static LcmPolicyOptions Patient(const LcmAddress& address) { return {.address = address, .deadline_s = 60, .repeat_after_s = 20}; }
-  static LcmPolicyOptions Hasty(const LcmAddress& address) { return {.address = address, .deadline_s = 0.2, .repeat_after_s = 0.05}; }
+  static LcmPolicyOptions Patient(const LcmAddress& address) {
+    return {.address = address, .deadline_s = 60, .repeat_after_s = 20};
+  }
+  static LcmPolicyOptions Hasty(const LcmAddress& address) {
+    return {.address = address, .deadline_s = 0.2, .repeat_after_s = 0.05};
+  }
 
   /// Resets the scenes (each once) and asks for all of them.
   static std::vector<Acted> Ask(LcmPolicy& policy, const std::vector<SceneId>& scenes, const Task& task) {
@@ -46,7 +50,8 @@ TEST_F(LcmPolicyTest, WhatThePolicySeesIsWhatTheHarnessShows) {
   ASSERT_EQ(Told(answers.at(0)), "chunk");
   const auto& chunk = std::get<ActionChunk>(answers[0]);
   ASSERT_EQ(chunk.targets.size(), 2u);
-  EXPECT_DOUBLE_EQ(chunk.targets[1][0].base_from_gripper.translation().z(), shown.arms[0].base_from_gripper.translation().z() + 0.01);
+  EXPECT_DOUBLE_EQ(chunk.targets[1][0].base_from_gripper.translation().z(),
+                   shown.arms[0].base_from_gripper.translation().z() + 0.01);
 
   const wire::ProbePolicy::Seen seen = probe.seen().begin()->second;
   EXPECT_EQ(seen.seed, 0xFFFFFFFFFFFFFFFF);
@@ -146,7 +151,9 @@ TEST_F(LcmPolicyTest, AnErrorOfThePolicyFailsItsSceneAlone) {
   const auto answers = Ask(policy, {0, 1, 2, 3, 4}, wire::TwoCameraTask());
   EXPECT_EQ(Told(answers[0]), "policy_error: the policy answered with an error: out of memory on the policy's side");
   EXPECT_EQ(Told(answers[1]), "chunk");
-  EXPECT_EQ(Told(answers[2]), "policy_error: malformed answer to request 0: target 0 of 2, right arm: position_m[1] is nan, wanted a finite number");
+  EXPECT_EQ(Told(answers[2]),
+            "policy_error: malformed answer to request 0: target 0 of 2, right arm: position_m[1] is nan, wanted a "
+            "finite number");
   EXPECT_EQ(Told(answers[3]), "policy_error: the policy refuses the task: I do not know how");
   EXPECT_EQ(Told(answers[4]), "policy_error: the policy answered with an error: I see nothing");
 }
@@ -163,7 +170,8 @@ TEST_F(LcmPolicyTest, AMalformedAnswerIsToldWithWhatAndWhere) {
   LcmPolicy policy(Patient(address));
   for (int scene = 0; scene < 4; ++scene) policy.Reset(scene, wire::TwoCameraTask(), 1);
   const auto answers = Ask(policy, {0, 1, 2, 3}, wire::TwoCameraTask());
-  EXPECT_THAT(Told(answers[0]), HasSubstr("target 0 of 1, right arm: orientation_xyzw has norm 0.5, wanted 1 within 0.001"));
+  EXPECT_THAT(Told(answers[0]),
+              HasSubstr("target 0 of 1, right arm: orientation_xyzw has norm 0.5, wanted 1 within 0.001"));
   EXPECT_THAT(Told(answers[1]), HasSubstr("the chunk's targets have 2 arms, wanted 1 (right)"));
   EXPECT_THAT(Told(answers[2]), HasSubstr("the chunk has 0 targets, wanted at least 1"));
   EXPECT_EQ(Told(answers[3]), "chunk");
@@ -190,7 +198,9 @@ TEST_F(LcmPolicyTest, APolicyThatHangsFailsItsSceneAloneWithTheNumbers) {
   for (int scene = 0; scene < 3; ++scene) policy.Reset(scene, wire::TwoCameraTask(), 1);
   const auto answers = Ask(policy, {0, 1, 2}, wire::TwoCameraTask());
   EXPECT_EQ(Told(answers[0]), "chunk");
-  EXPECT_THAT(Told(answers[1]), testing::ContainsRegex("policy_timeout: no answer to request 0 within 0\\.[0-9] s \\(sent [2-9] times; deadline 0.2 s\\); the policy was last heard"));
+  EXPECT_THAT(Told(answers[1]),
+              testing::ContainsRegex("policy_timeout: no answer to request 0 within 0\\.[0-9] s \\(sent [2-9] times; "
+                                     "deadline 0.2 s\\); the policy was last heard"));
   EXPECT_EQ(Told(answers[2]), "chunk");
   EXPECT_EQ(Count(policy.counters(), "timeouts"), 1);
   EXPECT_GE(Count(policy.counters(), "repeats"), 1);
@@ -199,7 +209,8 @@ TEST_F(LcmPolicyTest, APolicyThatHangsFailsItsSceneAloneWithTheNumbers) {
 TEST_F(LcmPolicyTest, APolicyThatIsNotThereTimesOut) {
   LcmPolicy policy(Hasty(wire::OwnAddress()));
   policy.Reset(0, wire::TwoCameraTask(), 1);
-  EXPECT_THAT(Told(Ask(policy, {0}, wire::TwoCameraTask())[0]), testing::ContainsRegex("no answer to the episode's start within .*never heard"));
+  EXPECT_THAT(Told(Ask(policy, {0}, wire::TwoCameraTask())[0]),
+              testing::ContainsRegex("no answer to the episode's start within .*never heard"));
 }
 
 TEST_F(LcmPolicyTest, AProcessThatIsGivenUpIsNotWaitedFor) {
@@ -207,7 +218,8 @@ TEST_F(LcmPolicyTest, AProcessThatIsGivenUpIsNotWaitedFor) {
   options.why_gone = [] { return std::optional<std::string>("exit code 3: no such checkpoint"); };
   LcmPolicy policy(options);
   policy.Reset(0, wire::TwoCameraTask(), 1);
-  EXPECT_EQ(Told(Ask(policy, {0}, wire::TwoCameraTask())[0]), "policy_error: the policy is gone: exit code 3: no such checkpoint");
+  EXPECT_EQ(Told(Ask(policy, {0}, wire::TwoCameraTask())[0]),
+            "policy_error: the policy is gone: exit code 3: no such checkpoint");
   EXPECT_THROW(policy.Handshake(HarnessSpec(wire::TwoCameraTask(), 2), 1000), Error);
 }
 
@@ -300,7 +312,8 @@ TEST_F(LcmPolicyTest, AnAnswerAfterTheDeadlineIsLateAndHarmsNoOther) {
 TEST_F(LcmPolicyTest, TwoRunsOnOneMachineDoNotHearEachOther) {
   const LcmAddress left = wire::OwnAddress("left"), right = wire::OwnAddress("right"), same_port{left.url, right.token};
   wire::ProbePolicy one, other, third;
-  wire::Served first(one, wire::ProbeSpec(), left), second(other, wire::ProbeSpec(), right), neighbour(third, wire::ProbeSpec(), same_port);
+  wire::Served first(one, wire::ProbeSpec(), left), second(other, wire::ProbeSpec(), right),
+      neighbour(third, wire::ProbeSpec(), same_port);
   LcmPolicy a(Patient(left)), b(Patient(right)), c(Patient(same_port));
   const Task task = wire::TwoCameraTask();
   for (LcmPolicy* policy : {&a, &b, &c}) {
@@ -310,8 +323,8 @@ TEST_F(LcmPolicyTest, TwoRunsOnOneMachineDoNotHearEachOther) {
   EXPECT_EQ(one.seen().at(0).observations.size(), 1u);
   EXPECT_EQ(other.seen().at(0).observations.size(), 1u);
   EXPECT_EQ(third.seen().at(0).observations.size(), 1u);
-  EXPECT_EQ(Count(b.counters(), "foreign_replies"), 0);      // another port: nothing comes
-  EXPECT_GE(Count(c.counters(), "foreign_replies"), 1);      // the same port: it comes, and is known for what it is
+  EXPECT_EQ(Count(b.counters(), "foreign_replies"), 0);  // another port: nothing comes
+  EXPECT_GE(Count(c.counters(), "foreign_replies"), 1);  // the same port: it comes, and is known for what it is
   EXPECT_GE(Count(first.counters(), "foreign_messages"), 1);
   EXPECT_EQ(Count(second.counters(), "foreign_messages"), 0);
 }

@@ -20,7 +20,8 @@ ArmState SomeArm() {
 cv::Mat Gradient(int height_px, int width_px) {
   cv::Mat image(height_px, width_px, CV_8UC3);
   for (int y = 0; y < height_px; ++y) {
-    for (int x = 0; x < width_px; ++x) image.at<cv::Vec3b>(y, x) = {static_cast<uchar>(200 - y), static_cast<uchar>(x), static_cast<uchar>(30 + y / 2)};
+    for (int x = 0; x < width_px; ++x)
+      image.at<cv::Vec3b>(y, x) = {static_cast<uchar>(200 - y), static_cast<uchar>(x), static_cast<uchar>(30 + y / 2)};
   }
   return image;
 }
@@ -31,7 +32,8 @@ void SurvivesTheWireAndNothingShorterDoes(const Message& message) {
   const auto decoded = Decoded<Message>(bytes);
   ASSERT_TRUE(decoded.has_value());
   EXPECT_EQ(Encoded(*decoded), bytes);
-  for (std::size_t size = 0; size < bytes.size(); ++size) EXPECT_FALSE(Decoded<Message>(std::span(bytes).first(size)).has_value()) << size;
+  for (std::size_t size = 0; size < bytes.size(); ++size)
+    EXPECT_FALSE(Decoded<Message>(std::span(bytes).first(size)).has_value()) << size;
 }
 
 TEST(Messages, WhatIsEncodedIsDecodedAndCutMessagesAreRefused) {
@@ -66,7 +68,8 @@ TEST(Messages, AnAnnouncedSizeThatTheBytesCannotHoldIsRefusedBeforeItIsAllocated
 TEST(Messages, ATextOfImpossibleLengthIsRefused) {
   std::vector<std::uint8_t> bytes = Encoded(bye_t{.client = "harness"});
   ASSERT_TRUE(Decoded<bye_t>(bytes).has_value());
-  for (const std::array<std::uint8_t, 4> length : {std::array<std::uint8_t, 4>{0x80, 0, 0, 0}, {0xFF, 0xFF, 0xFF, 0xFF}, {0, 0, 0, 0}, {0, 0, 0, 9}}) {
+  for (const std::array<std::uint8_t, 4> length :
+       {std::array<std::uint8_t, 4>{0x80, 0, 0, 0}, {0xFF, 0xFF, 0xFF, 0xFF}, {0, 0, 0, 0}, {0, 0, 0, 9}}) {
     std::copy(length.begin(), length.end(), bytes.begin() + 8);
     EXPECT_FALSE(Decoded<bye_t>(bytes).has_value());
   }

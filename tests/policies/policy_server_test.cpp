@@ -17,7 +17,8 @@ using wire::Told;
 /// A harness of bare messages: what the server sends is kept as bytes.
 class BareClient {
  public:
-  explicit BareClient(LcmAddress address, std::string name = "bare") : address_(std::move(address)), link_(address_.url), name_(std::move(name)) {
+  explicit BareClient(LcmAddress address, std::string name = "bare")
+      : address_(std::move(address)), link_(address_.url), name_(std::move(name)) {
     Keep("chunk", chunks);
     Keep("started", started);
   }
@@ -169,7 +170,8 @@ TEST_F(PolicyServerTest, ImagesThatAreNotTheTasksAreAnErrorReply) {
   client.Send("observation", client.Header(0, 0, observation_));
   client.Send("image", client.Image(0, 0, 0, wire::Noise(8, 8, 1)));
   client.Send("image", client.Image(0, 0, 1, observation_.images[1]));
-  EXPECT_THAT(client.NextChunk().error, testing::HasSubstr("the image of camera head is 8x8 with 3 channels, wanted 48x32 RGB"));
+  EXPECT_THAT(client.NextChunk().error,
+              testing::HasSubstr("the image of camera head is 8x8 with 3 channels, wanted 48x32 RGB"));
   image_t broken = client.Image(0, 1, 0, observation_.images[0]);
   broken.data.pop_back();
   broken.num_bytes -= 1;

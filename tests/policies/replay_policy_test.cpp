@@ -23,7 +23,8 @@ Recording Counting(int steps) {
 
 std::vector<double> Rows(const Acted& acted) {
   std::vector<double> rows;
-  for (const Arms& target : std::get<ActionChunk>(acted).targets) rows.push_back(target[0].base_from_gripper.translation().x());
+  for (const Arms& target : std::get<ActionChunk>(acted).targets)
+    rows.push_back(target[0].base_from_gripper.translation().x());
   return rows;
 }
 
@@ -32,7 +33,8 @@ TEST(ReplayPolicy, EveryRowAfterTheStartIsPlayedOnceAndTheLastChunkEndsIt) {
   policy.Reset(0, Task(), 1);
   const Observation observation;
   const SceneObservation asked{0, &observation};
-  const Acted first = policy.Act({&asked, 1})[0], second = policy.Act({&asked, 1})[0], third = policy.Act({&asked, 1})[0];
+  const Acted first = policy.Act({&asked, 1})[0], second = policy.Act({&asked, 1})[0],
+              third = policy.Act({&asked, 1})[0];
   EXPECT_EQ(Rows(first), (std::vector<double>{1, 2, 3}));
   EXPECT_FALSE(std::get<ActionChunk>(first).ends_recording);
   EXPECT_EQ(Rows(second), (std::vector<double>{4, 5, 6}));

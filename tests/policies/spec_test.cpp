@@ -11,7 +11,11 @@ namespace {
 using testing::HasSubstr;
 
 PolicySpec Harness() {
-  return {.name = "evac", .arms = {"left", "right"}, .period_s = 0.1, .chunk_size = 8, .cameras = {{"head", 192, 128}, {"hand_left", 96, 64}}};
+  return {.name = "evac",
+          .arms = {"left", "right"},
+          .period_s = 0.1,
+          .chunk_size = 8,
+          .cameras = {{"head", 192, 128}, {"hand_left", 96, 64}}};
 }
 
 /// Needs nothing in particular.
@@ -44,10 +48,16 @@ TEST(Spec, EveryDifferenceIsNamed) {
       {"image_format", [](PolicySpec& s) { s.image_format = "BGR"; }},
       {"gripper", [](PolicySpec& s) { s.gripper_open = 1, s.gripper_closed = 0; }},
       {"gripper", [](PolicySpec& s) { s.gripper_closed = 120; }},
-      {"arms", [](PolicySpec& s) { s.arms = {"right", "left"}; }},
+      {"arms",
+       [](PolicySpec& s) {
+         s.arms = {"right", "left"};
+       }},
       {"period", [](PolicySpec& s) { s.period_s = 1.0 / 30; }},
       {"cameras", [](PolicySpec& s) { s.cameras = {{"hand_right"}}; }},
-      {"cameras", [](PolicySpec& s) { s.cameras = {{"head", 224, 224}}; }},
+      {"cameras",
+       [](PolicySpec& s) {
+         s.cameras = {{"head", 224, 224}};
+       }},
       {"needs", [](PolicySpec& s) { s.needs = {"depth"}; }},
   };
   for (const auto& [field, change] : changes) {

@@ -15,7 +15,8 @@ using wire::Told;
 /// A bad network between harness and policy: loses, doubles and delays messages, by its own seeded dice.
 class BadNetwork {
  public:
-  BadNetwork(const LcmAddress& harness, const LcmAddress& policy, double loss) : harness_(harness.url), policy_(policy.url), loss_(loss) {
+  BadNetwork(const LcmAddress& harness, const LcmAddress& policy, double loss)
+      : harness_(harness.url), policy_(policy.url), loss_(loss) {
     Carry(harness_, policy_, harness, policy, {"hello", "start", "observation", "image", "bye"});
     Carry(policy_, harness_, policy, harness, {"declaration", "started", "chunk"});
     thread_ = std::thread([this] {
@@ -37,9 +38,11 @@ class BadNetwork {
     std::vector<std::uint8_t> bytes;
   };
 
-  void Carry(LcmLink& from, LcmLink& to, const LcmAddress& here, const LcmAddress& there, const std::vector<std::string>& messages) {
+  void Carry(LcmLink& from, LcmLink& to, const LcmAddress& here, const LcmAddress& there,
+             const std::vector<std::string>& messages) {
     for (const std::string& message : messages) {
-      from.Subscribe(here.Channel(message), [this, &to, channel = there.Channel(message)](const std::string&, std::span<const std::uint8_t> bytes) {
+      from.Subscribe(here.Channel(message), [this, &to, channel = there.Channel(message)](
+                                                const std::string&, std::span<const std::uint8_t> bytes) {
         Pass({&to, channel, {bytes.begin(), bytes.end()}});
       });
     }
@@ -47,7 +50,8 @@ class BadNetwork {
 
   void Pass(Delayed message) {
     if (dice_.Uniform() < loss_) return;
-    if (delayed_.to == nullptr && dice_.Uniform() < loss_) return void(delayed_ = std::move(message));  // overtaken by the next
+    if (delayed_.to == nullptr && dice_.Uniform() < loss_)
+      return void(delayed_ = std::move(message));  // overtaken by the next
     const int copies = dice_.Uniform() < loss_ ? 2 : 1;
     for (int i = 0; i < copies; ++i) message.to->PublishBytes(message.channel, message.bytes);
     if (delayed_.to == nullptr) return;
@@ -76,7 +80,8 @@ class WireFaultsTest : public wire::WireTest {
       for (int scene = 0; scene < scenes; ++scene) batch.push_back({scene, &observation});
       for (const Acted& acted : policy.Act(batch)) {
         EXPECT_EQ(Told(acted), "chunk");
-        if (wire::IsChunk(acted)) heights.push_back(std::get<ActionChunk>(acted).targets[0][0].base_from_gripper.translation().z());
+        if (wire::IsChunk(acted))
+          heights.push_back(std::get<ActionChunk>(acted).targets[0][0].base_from_gripper.translation().z());
       }
     }
     return heights;
@@ -84,9 +89,11 @@ class WireFaultsTest : public wire::WireTest {
 };
 
 TEST_F(WireFaultsTest, LossDoublesAndDelaysChangeNoAnswer) {
-  const LcmAddress here = wire::OwnAddress("harness"), there = wire::OwnAddress("policy"), straight = wire::OwnAddress("straight");
+  const LcmAddress here = wire::OwnAddress("harness"), there = wire::OwnAddress("policy"),
+                   straight = wire::OwnAddress("straight");
   wire::ProbePolicy lossy_probe, straight_probe;
-  wire::Served lossy_server(lossy_probe, wire::ProbeSpec(), there), straight_server(straight_probe, wire::ProbeSpec(), straight);
+  wire::Served lossy_server(lossy_probe, wire::ProbeSpec(), there),
+      straight_server(straight_probe, wire::ProbeSpec(), straight);
   BadNetwork network(here, there, 0.15);
   LcmPolicy lossy({.address = here, .deadline_s = 120, .repeat_after_s = 0.03});
   LcmPolicy undisturbed({.address = straight, .deadline_s = 120, .repeat_after_s = 20});
@@ -104,7 +111,8 @@ TEST_F(WireFaultsTest, EightLanesWithTwoImagesEachArriveAtTheFirstSending) {
   wire::ProbePolicy probe;
   wire::Served served(probe, wire::ProbeSpec(), address);
   for (const bool raw : {false, true}) {
-    LcmPolicy policy({.address = address, .deadline_s = 60, .repeat_after_s = has_room ? 55.0 : 0.5, .raw_images = raw});
+    LcmPolicy policy(
+        {.address = address, .deadline_s = 60, .repeat_after_s = has_room ? 55.0 : 0.5, .raw_images = raw});
     const Task task = wire::TwoCameraTask(128, 192);
     const Observation observation = wire::ObservationFor(task, 3);
     std::vector<SceneObservation> batch;
@@ -131,7 +139,8 @@ TEST_F(WireFaultsTest, ABurstIsHeldToThePace) {
 
 TEST_F(WireFaultsTest, AHandlersExceptionComesOutOfHandleAndNotThroughC) {
   LcmLink link(wire::OwnAddress().url);
-  link.Subscribe("EVAC_throw", [](const std::string&, std::span<const std::uint8_t>) { throw InternalError("from a handler"); });
+  link.Subscribe("EVAC_throw",
+                 [](const std::string&, std::span<const std::uint8_t>) { throw InternalError("from a handler"); });
   link.PublishBytes("EVAC_throw", std::vector<std::uint8_t>(8));
   EXPECT_THROW(link.Handle(30), Error);
   link.Handle(0);  // it is still usable

@@ -27,7 +27,13 @@ inline Task TwoCameraTask(int height_px = 32, int width_px = 48) {
   task.id = "take_bottle";
   task.instruction = "take the bottle out of the box";
   for (const char* name : {"head", "hand_right"}) {
-    task.cameras.push_back({.name = name, .width_px = width_px, .height_px = height_px, .fx_px = 60.5, .fy_px = 61.5, .cx_px = 24, .cy_px = 16.25});
+    task.cameras.push_back({.name = name,
+                            .width_px = width_px,
+                            .height_px = height_px,
+                            .fx_px = 60.5,
+                            .fy_px = 61.5,
+                            .cx_px = 24,
+                            .cy_px = 16.25});
   }
   task.cameras[1].mount = Mount::kRightGripper;
   task.cameras[1].mount_from_camera.translation() = Eigen::Vector3d(0.1, 0, 0.05);
@@ -44,15 +50,18 @@ inline cv::Mat Noise(int height_px, int width_px, std::uint64_t seed) {
 
 inline Observation ObservationFor(const Task& task, std::uint64_t seed) {
   Observation observation;
-  for (const Camera& camera : task.cameras) observation.images.push_back(Noise(camera.height_px, camera.width_px, seed++));
+  for (const Camera& camera : task.cameras)
+    observation.images.push_back(Noise(camera.height_px, camera.width_px, seed++));
   observation.arms.resize(task.arms.size());
-  observation.arms[0].base_from_gripper.translation() = Eigen::Vector3d(0.3, 0.01 * static_cast<double>(seed % 100), 0.2);
+  observation.arms[0].base_from_gripper.translation() =
+      Eigen::Vector3d(0.3, 0.01 * static_cast<double>(seed % 100), 0.2);
   observation.arms[0].closure = 0.25;
   return observation;
 }
 
-/// Answers, `chunk_size` times, where the arm is, raised by a centimetre per request it has had in the episode: an answer
-/// that was computed twice, or for another request, shows. Keeps what it was shown. Instructions make it misbehave.
+/// Answers, `chunk_size` times, where the arm is, raised by a centimetre per request it has had in the episode: an
+/// answer that was computed twice, or for another request, shows. Keeps what it was shown. Instructions make it
+/// misbehave.
 class ProbePolicy : public Policy {
  public:
   struct Seen {
@@ -133,7 +142,8 @@ class RawServer {
  public:
   using Reply = std::function<void(LcmLink& link, const observation_t& header)>;
 
-  RawServer(LcmAddress address, Reply reply) : address_(std::move(address)), link_(address_.url), reply_(std::move(reply)) {
+  RawServer(LcmAddress address, Reply reply)
+      : address_(std::move(address)), link_(address_.url), reply_(std::move(reply)) {
     link_.Subscribe(address_.Channel("start"), [this](const std::string&, std::span<const std::uint8_t> bytes) {
       const auto start = Decoded<episode_start_t>(bytes);
       episode_started_t started;

@@ -38,7 +38,8 @@ class PolicyProgramsTest : public testing::Test {
   }
 
   const TempFolder folder_;
-  const LcmAddress address_ = LcmAddress::For(fmt::format("{} {}", ::getpid(), testing::UnitTest::GetInstance()->current_test_info()->name()));
+  const LcmAddress address_ =
+      LcmAddress::For(fmt::format("{} {}", ::getpid(), testing::UnitTest::GetInstance()->current_test_info()->name()));
   const Task task_;
   const Observation observation_{.images = {}, .arms = Arms(1)};
 };
@@ -56,7 +57,8 @@ TEST_F(PolicyProgramsTest, AnOptionOutranksTheEnvironment) {
 }
 
 TEST_F(PolicyProgramsTest, APolicyThatIsKilledFailsItsEpisodeAndIsThereForTheNext) {
-  PolicyProcess process(Options({"sh", "-c", fmt::format("echo $$ > {0}/pid; exec {1} hold", folder_.path().string(), Binary("evac-policy"))}));
+  PolicyProcess process(Options(
+      {"sh", "-c", fmt::format("echo $$ > {0}/pid; exec {1} hold", folder_.path().string(), Binary("evac-policy"))}));
   LcmPolicy policy({.address = address_, .deadline_s = 60});
   policy.Handshake(HarnessSpec(task_, 16), 60);
   policy.Reset(0, task_, 1);
