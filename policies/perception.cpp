@@ -11,8 +11,8 @@ namespace evac {
 namespace {
 
 constexpr double kReferencePercentile = 0.8;  // of the saturation of a hue's pixels: what counts as fully covered
-constexpr double kTint = 0.6;                 // of the minimal saturation: a background less tinted than this counts as grey
-constexpr float kTouches = 0.2f;              // pixels covered less than this do not connect patches
+constexpr double kTint = 0.6;     // of the minimal saturation: a background less tinted than this counts as grey
+constexpr float kTouches = 0.2f;  // pixels covered less than this do not connect patches
 
 double HueDistance(double a_deg, double b_deg) {
   const double distance = std::fmod(std::abs(a_deg - b_deg), 360.0);

@@ -7,9 +7,9 @@
 
 #include "core/types.h"
 
-/// What a policy without any learning can see: patches of a colour it knows by name, to a fraction of a pixel, and where in the
-/// robot's base frame they are when their height is known. Works on small, noisy or blurred pictures: nothing here
-/// looks at a single pixel alone, and thresholds follow the light.
+/// What a policy without any learning can see: patches of a colour it knows by name, to a fraction of a pixel, and
+/// where in the robot's base frame they are when their height is known. Works on small, noisy or blurred pictures:
+/// nothing here looks at a single pixel alone, and thresholds follow the light.
 namespace evac {
 
 /// A colour by its hue and by how colourful it is, whatever the light's brightness.
@@ -22,13 +22,13 @@ struct ColourModel {
 
 /// One connected patch of a colour.
 struct Blob {
-  double weight_px = 0;           ///< its area, where a pixel covered by half counts half
-  Eigen::Vector2d centroid_px;    ///< weighted; pixel centres at integer + 0.5, as in Camera
-  cv::Mat cover;                  ///< CV_32F, image-sized, in [0, 1]: how much of a pixel belongs to it
+  double weight_px = 0;         ///< its area, where a pixel covered by half counts half
+  Eigen::Vector2d centroid_px;  ///< weighted; pixel centres at integer + 0.5, as in Camera
+  cv::Mat cover;                ///< CV_32F, image-sized, in [0, 1]: how much of a pixel belongs to it
 };
 
-/// How much of each pixel is of this colour, CV_32F in [0, 1]. Saturation is measured against the most saturated pixels of
-/// that hue in the picture: a pixel half on a grey ground counts about half, and shade changes little.
+/// How much of each pixel is of this colour, CV_32F in [0, 1]. Saturation is measured against the most saturated pixels
+/// of that hue in the picture: a pixel half on a grey ground counts about half, and shade changes little.
 /// @param rgb  CV_8UC3, RGB.
 cv::Mat Cover(const cv::Mat& rgb, const ColourModel& colour);
 

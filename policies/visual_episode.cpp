@@ -7,13 +7,13 @@
 namespace evac {
 namespace {
 
-constexpr double kSettle_s = 0.1;        // at the grasp, before the hand closes
-constexpr double kClosing_s = 0.55;      // from there until the thing is held
+constexpr double kSettle_s = 0.1;    // at the grasp, before the hand closes
+constexpr double kClosing_s = 0.55;  // from there until the thing is held
 constexpr double kOpening_s = 0.4;
 constexpr double kRetreat_m = 0.12;
-constexpr double kArrived_m = 0.025;     // observed distance from where it should be, to trust the wrist's picture
-constexpr double kBelievable_m = 0.06;   // a closer look that corrects more than this saw something else
-constexpr double kEmptyShare = 0.15;     // of the held thing's silhouette that shows its colour
+constexpr double kArrived_m = 0.025;    // observed distance from where it should be, to trust the wrist's picture
+constexpr double kBelievable_m = 0.06;  // a closer look that corrects more than this saw something else
+constexpr double kEmptyShare = 0.15;    // of the held thing's silhouette that shows its colour
 
 /// Pointing straight down: x of the gripper at `yaw_rad` about the vertical.
 Eigen::Isometry3d Down(const Eigen::Vector2d& xy_m, double z_m, double yaw_rad) {
@@ -22,9 +22,7 @@ Eigen::Isometry3d Down(const Eigen::Vector2d& xy_m, double z_m, double yaw_rad) 
   return pose;
 }
 
-Eigen::Isometry3d Raised(const Eigen::Isometry3d& pose, double by_m) {
-  return Eigen::Translation3d(0, 0, by_m) * pose;
-}
+Eigen::Isometry3d Raised(const Eigen::Isometry3d& pose, double by_m) { return Eigen::Translation3d(0, 0, by_m) * pose; }
 
 /// The camera's picture, its calibration at the picture's size, and its pose.
 std::optional<View> ViewOf(const char* name, const Task& task, const Observation& observation) {
@@ -52,7 +50,8 @@ Eigen::Vector2d Noise(SplitMix64& random, double sd_m) {
 
 VisualEpisode::VisualEpisode(const Task& task, const VisualPickOptions& options, std::uint64_t seed)
     : task_(task), options_(options), knowledge_(KnowledgeOf(task.id)), seed_(seed), retries_left_(options.retries) {
-  if (task.arms.size() != 1) throw InvalidInput("visual_pick: task {} has {} arms, wanted 1", task.id, task.arms.size());
+  if (task.arms.size() != 1)
+    throw InvalidInput("visual_pick: task {} has {} arms, wanted 1", task.id, task.arms.size());
   if (!HasHeadCamera(task)) throw InvalidInput("visual_pick: task {} has no camera named head, wanted one", task.id);
   limits_.translation_mps *= options.speed;
   limits_.rotation_radps *= options.speed;
@@ -124,7 +123,8 @@ bool VisualEpisode::HandIsEmpty(const Glance& glance) {
   if (!plan_->transfers || plan_->checked || !glance.hand) return false;
   if (Clock() < plan_->lifted_s || Clock() > plan_->lowering_s) return false;
   plan_->checked = true;
-  return VisibleShare(*glance.hand, knowledge_.held, glance.base_from_gripper * plan_->gripper_from_thing) < kEmptyShare;
+  return VisibleShare(*glance.hand, knowledge_.held, glance.base_from_gripper * plan_->gripper_from_thing) <
+         kEmptyShare;
 }
 
 VisualEpisode::Plan VisualEpisode::Approach() const {

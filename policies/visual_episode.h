@@ -10,7 +10,8 @@
 namespace evac {
 
 /// One episode of `visual_pick`, from the first picture to rest:
-///   look (head camera) → go above → look closer (wrist camera) → descend, close, lift ⟲ empty? → carry, lower, open, retreat, rest
+///   look (head camera) → go above → look closer (wrist camera) → descend, close, lift ⟲ empty? → carry, lower, open,
+///   retreat, rest
 /// The looks and the check of the hand happen when a request comes; between them its chunks follow a Timeline.
 class VisualEpisode {
  public:
@@ -26,10 +27,10 @@ class VisualEpisode {
     Timeline path;
     HandSchedule hand;
     int begin = 0;
-    bool transfers = false;                ///< takes and places; else it only goes above the thing
-    double lifted_s = 0, lowering_s = 0;   ///< between these the thing should be in the hand
+    bool transfers = false;               ///< takes and places; else it only goes above the thing
+    double lifted_s = 0, lowering_s = 0;  ///< between these the thing should be in the hand
     Eigen::Isometry3d gripper_from_thing = Eigen::Isometry3d::Identity();
-    bool checked = false;                  ///< whether it is there has been looked at
+    bool checked = false;  ///< whether it is there has been looked at
   };
   /// What one request shows: the pictures, unless it is blind to them, and the noise that goes with it.
   struct Glance {
@@ -54,13 +55,13 @@ class VisualEpisode {
   PickKnowledge knowledge_;
   std::uint64_t seed_;
   bool blind_ = false;
-  Eigen::Vector2d error_m_;        ///< of this episode: bias and noise
-  int requests_ = 0, told_ = 0;    ///< requests answered and targets given so far
+  Eigen::Vector2d error_m_;      ///< of this episode: bias and noise
+  int requests_ = 0, told_ = 0;  ///< requests answered and targets given so far
   int retries_left_;
   Eigen::Isometry3d home_ = Eigen::Isometry3d::Identity();  ///< where the gripper was at first, and rests at last
-  ArmState last_;                  ///< the last target; at first the observed arm
-  Placement thing_, target_;       ///< where they are taken to be
-  std::optional<Plan> plan_;       ///< none before the first look
+  ArmState last_;                                           ///< the last target; at first the observed arm
+  Placement thing_, target_;                                ///< where they are taken to be
+  std::optional<Plan> plan_;                                ///< none before the first look
 };
 
 }  // namespace evac

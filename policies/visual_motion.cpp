@@ -46,7 +46,8 @@ Eigen::Isometry3d Timeline::At(double time_s) const {
   if (time_s <= 0) return start_;
   for (const Segment& segment : segments_) {
     if (time_s >= segment.end_s) continue;
-    return Between(segment.from, segment.to, MinimumJerk((time_s - segment.begin_s) / (segment.end_s - segment.begin_s)));
+    return Between(segment.from, segment.to,
+                   MinimumJerk((time_s - segment.begin_s) / (segment.end_s - segment.begin_s)));
   }
   return Last();
 }

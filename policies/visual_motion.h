@@ -12,8 +12,8 @@ struct SpeedLimits {
   double rotation_radps = 2.4;
 };
 
-/// A path of straight moves and pauses for one gripper, as a function of time. Each move starts and ends at rest: minimum
-/// jerk in time (Flash and Hogan 1985), rotations by slerp.
+/// A path of straight moves and pauses for one gripper, as a function of time. Each move starts and ends at rest:
+/// minimum jerk in time (Flash and Hogan 1985), rotations by slerp.
 class Timeline {
  public:
   /// Begins at `base_from_gripper`, at time 0.
@@ -41,9 +41,9 @@ class Timeline {
 
 /// When the hand closes and opens again, on the clock of a Timeline.
 struct HandSchedule {
-  double start_closure = 0;        ///< [0, 1], where the hand is before anything happens
-  std::optional<double> close_s;   ///< begins to close
-  std::optional<double> open_s;    ///< begins to open; a hand told to open never closes again
+  double start_closure = 0;       ///< [0, 1], where the hand is before anything happens
+  std::optional<double> close_s;  ///< begins to close
+  std::optional<double> open_s;   ///< begins to open; a hand told to open never closes again
 
   /// What the hand is told at `time_s`: it goes from open to closed in `kTravel_s`.
   double At(double time_s) const;

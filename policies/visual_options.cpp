@@ -17,7 +17,7 @@ void Require(const char* option, double found, double low, double high) {
 }  // namespace
 
 void Check(const VisualPickOptions& options) {
-  Require("chunk-size", options.chunk_size, 1, 100);
+  Require("chunk-size", options.chunk_size, 1, 1000);
   Require("bias-m (x)", options.bias_m.x(), -0.5, 0.5);
   Require("bias-m (y)", options.bias_m.y(), -0.5, 0.5);
   Require("noise-m", options.noise_m, 0, 0.5);

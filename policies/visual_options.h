@@ -6,8 +6,9 @@ namespace evac {
 
 /// What makes one checkpoint of `visual_pick` better or worse than another; the defaults are the best it can do.
 struct VisualPickOptions {
-  int chunk_size = 8;                                ///< targets per chunk, [1, 100]
-  Eigen::Vector2d bias_m = Eigen::Vector2d::Zero();  ///< it takes the thing to be this far off, base frame, [-0.5, 0.5] each
+  int chunk_size = 8;  ///< targets per chunk, [1, 1000]
+  Eigen::Vector2d bias_m =
+      Eigen::Vector2d::Zero();   ///< it takes the thing to be this far off, base frame, [-0.5, 0.5] each
   double noise_m = 0;            ///< the same, drawn once per episode: standard deviation along x and y, [0, 0.5]
   double request_noise_m = 0;    ///< the same, drawn anew each time it looks
   double late_close_s = 0;       ///< the hand closes this much after it should, [0, 3]; the arm does not wait for it

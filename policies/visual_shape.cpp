@@ -11,12 +11,13 @@
 namespace evac {
 namespace {
 
-constexpr int kFiner = 4;           // silhouettes are drawn this much larger, then averaged down
+constexpr int kFiner = 4;  // silhouettes are drawn this much larger, then averaged down
 constexpr int kRingPoints = 16;
 constexpr double kFinestShare = 0.02;  // of the first step
 
 /// The part's outline in the enlarged picture, or nothing if a point is behind the camera.
-std::vector<cv::Point> Outline(const ConvexPart& part, const Camera& camera, const Eigen::Isometry3d& camera_from_object) {
+std::vector<cv::Point> Outline(const ConvexPart& part, const Camera& camera,
+                               const Eigen::Isometry3d& camera_from_object) {
   std::vector<cv::Point> corners;
   for (const Eigen::Vector3d& point_m : part.points_m) {
     const std::optional<Eigen::Vector2d> pixel = Project(camera, camera_from_object * point_m);
@@ -98,7 +99,8 @@ struct Search {
   const FitOptions& options;
 
   cv::Mat Drawn(const Eigen::Vector3d& p) const {
-    return Silhouette(shape, view.camera, view.base_from_camera.inverse() * BaseFromObject({p.head<2>(), p.z()}, options.height_m));
+    return Silhouette(shape, view.camera,
+                      view.base_from_camera.inverse() * BaseFromObject({p.head<2>(), p.z()}, options.height_m));
   }
   double OverlapAt(const Eigen::Vector3d& p) const { return Overlap(cover, Drawn(p)); }
 
@@ -117,7 +119,8 @@ struct Search {
     Eigen::Vector3d best(expected.xy_m.x(), expected.xy_m.y(), expected.yaw_rad);
     for (const int turn : {0, -3, -2, -1, 1, 2, 3}) {
       if (turn != 0 && options.reach_yaw_rad == 0) break;
-      const Eigen::Vector3d turned(expected.xy_m.x(), expected.xy_m.y(), expected.yaw_rad + turn * options.reach_yaw_rad);
+      const Eigen::Vector3d turned(expected.xy_m.x(), expected.xy_m.y(),
+                                   expected.yaw_rad + turn * options.reach_yaw_rad);
       const Eigen::Vector3d centred = Centred(Centred(turned));
       if (OverlapAt(centred) > OverlapAt(best)) best = centred;
     }
@@ -146,8 +149,8 @@ struct Search {
 
 }  // namespace
 
-ShapeFit FitShape(const cv::Mat& cover, const Shape& shape, const Camera& camera, const Eigen::Isometry3d& base_from_camera,
-                  const ShapeFit& start, const FitOptions& options) {
+ShapeFit FitShape(const cv::Mat& cover, const Shape& shape, const Camera& camera,
+                  const Eigen::Isometry3d& base_from_camera, const ShapeFit& start, const FitOptions& options) {
   const Search search{cover, shape, {camera, base_from_camera}, options};
   return search.Climb(search.BestStart(start.placement));
 }

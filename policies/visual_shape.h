@@ -42,15 +42,15 @@ struct ShapeFit {
 };
 
 struct FitOptions {
-  double reach_m = 0.02;      ///< first step of the search; the last is a fiftieth of it
-  double reach_yaw_rad = 0;   ///< the same for the yaw; 0: the yaw stays as it is
-  double height_m = 0;        ///< of the object's origin, base frame
+  double reach_m = 0.02;     ///< first step of the search; the last is a fiftieth of it
+  double reach_yaw_rad = 0;  ///< the same for the yaw; 0: the yaw stays as it is
+  double height_m = 0;       ///< of the object's origin, base frame
 };
 
-/// The placement whose silhouette agrees best with `cover`: from the best of `start` and of those, at yaws up to thrice the reach
-/// away, whose middle lies on the cover's, it climbs (pattern search after Hooke and Jeeves 1961: steps along each coordinate,
-/// halved when none helps). Sub-pixel, since cover is a share and not a yes or no.
-ShapeFit FitShape(const cv::Mat& cover, const Shape& shape, const Camera& camera, const Eigen::Isometry3d& base_from_camera,
-                  const ShapeFit& start, const FitOptions& options);
+/// The placement whose silhouette agrees best with `cover`: from the best of `start` and of those, at yaws up to thrice
+/// the reach away, whose middle lies on the cover's, it climbs (pattern search after Hooke and Jeeves 1961: steps along
+/// each coordinate, halved when none helps). Sub-pixel, since cover is a share and not a yes or no.
+ShapeFit FitShape(const cv::Mat& cover, const Shape& shape, const Camera& camera,
+                  const Eigen::Isometry3d& base_from_camera, const ShapeFit& start, const FitOptions& options);
 
 }  // namespace evac

@@ -8,11 +8,13 @@ namespace evac {
 namespace {
 
 constexpr double kRadians = std::numbers::pi / 180;
-constexpr double kSmallestPatchPx = 4;   // in a picture 96 wide; grows with the area
-constexpr double kSecondPatch = 0.25;    // of the largest patch: a thing cut in two by what stands before it is still one
+constexpr double kSmallestPatchPx = 4;  // in a picture 96 wide; grows with the area
+constexpr double kSecondPatch = 0.25;  // of the largest patch: a thing cut in two by what stands before it is still one
 constexpr double kPoorestOverlap = 0.2;  // below it the patch is something else
 
-double SmallestPatchPx(const View& view) { return kSmallestPatchPx * (view.rgb->cols / 96.0) * (view.rgb->cols / 96.0); }
+double SmallestPatchPx(const View& view) {
+  return kSmallestPatchPx * (view.rgb->cols / 96.0) * (view.rgb->cols / 96.0);
+}
 
 /// The large patches of the colour, as one.
 cv::Mat MainCover(const std::vector<Blob>& blobs) {
@@ -59,7 +61,8 @@ Thing Toast() {
 Thing Plate() {
   Thing plate;
   plate.colour = {.hue_deg = 216, .hue_tolerance_deg = 28, .min_saturation = 0.42, .min_value = 0.15};
-  plate.shape = {Cuboid({-0.095, -0.095, 0}, {0.095, 0.095, 0.014}), Cuboid({-0.083, -0.083, 0.011}, {0.083, 0.083, 0.013})};
+  plate.shape = {Cuboid({-0.095, -0.095, 0}, {0.095, 0.095, 0.014}),
+                 Cuboid({-0.083, -0.083, 0.011}, {0.083, 0.083, 0.013})};
   plate.shape.back().coloured = false;  // the white floor within the blue rim
   plate.middle_m = 0.01;
   plate.yaw_reach_rad = 6 * kRadians;
@@ -92,7 +95,8 @@ std::optional<ShapeFit> Locate(const View& view, const Thing& thing, const std::
   if (expected) {
     start.placement = *expected;
   } else {
-    const auto point_m = OnPlane(view.camera, view.base_from_camera, blobs.front().centroid_px, thing.height_m + thing.middle_m);
+    const auto point_m =
+        OnPlane(view.camera, view.base_from_camera, blobs.front().centroid_px, thing.height_m + thing.middle_m);
     if (!point_m) return std::nullopt;
     start.placement.xy_m = point_m->head<2>();
   }

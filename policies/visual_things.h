@@ -6,17 +6,17 @@
 #include "policies/perception.h"
 #include "policies/visual_shape.h"
 
-/// What `visual_pick` knows of the two tasks before it sees anything: colours, shapes, heights, and how one picks and places
-/// there. Nothing here depends on an initial state.
+/// What `visual_pick` knows of the two tasks before it sees anything: colours, shapes, heights, and how one picks and
+/// places there. Nothing here depends on an initial state.
 namespace evac {
 
 /// A thing that can be found by its colour and shape.
 struct Thing {
   ColourModel colour;
-  Shape shape;              ///< what of it shows where it is looked for, base of the thing at z = 0
-  double height_m = 0;      ///< where that base is, base frame
-  double middle_m = 0;      ///< height of the shape's middle above it: for the first guess from a patch's centroid
-  double yaw_reach_rad = 0; ///< how far its yaw may be from `Task` to task; 0: round, or it does not matter
+  Shape shape;               ///< what of it shows where it is looked for, base of the thing at z = 0
+  double height_m = 0;       ///< where that base is, base frame
+  double middle_m = 0;       ///< height of the shape's middle above it: for the first guess from a patch's centroid
+  double yaw_reach_rad = 0;  ///< its yaw may be thrice this off; 0: round, or no matter
 };
 
 /// One picture and where it was taken from.
@@ -27,7 +27,8 @@ struct View {
 };
 
 /// The thing in the picture, or nothing if too little of its colour is there or it has another shape.
-/// @param expected  where it is by earlier knowledge: the search begins there; without, at the largest patch of its colour.
+/// @param expected  where it is by earlier knowledge: the search begins there; without, at the largest patch of its
+/// colour.
 std::optional<ShapeFit> Locate(const View& view, const Thing& thing, const std::optional<Placement>& expected = {});
 
 /// The share of a thing's silhouette that shows its colour, [0, 1]; 0 if it is out of the picture.
@@ -35,19 +36,19 @@ double VisibleShare(const View& view, const Thing& thing, const Eigen::Isometry3
 
 /// How to pick one thing and place it.
 struct PickKnowledge {
-  Thing thing;              ///< as it stands at the beginning
-  Thing held;               ///< what of it shows in the hand
-  Placement usual;          ///< where it is when nothing is seen
-  double grasp_m = 0;       ///< height of the gripper at the grasp, base frame
-  double hover_m = 0;       ///< height from which the wrist camera looks, base frame
-  double lift_m = 0;        ///< how far it is lifted before it is carried
-  double turn_rad = 0;      ///< yaw of the gripper relative to the thing's
+  Thing thing;                  ///< as it stands at the beginning
+  Thing held;                   ///< what of it shows in the hand
+  Placement usual;              ///< where it is when nothing is seen
+  double grasp_m = 0;           ///< height of the gripper at the grasp, base frame
+  double hover_m = 0;           ///< height from which the wrist camera looks, base frame
+  double lift_m = 0;            ///< how far it is lifted before it is carried
+  double turn_rad = 0;          ///< yaw of the gripper relative to the thing's
   std::optional<Thing> target;  ///< what it is put on; none: a free place on the table
-  Placement usual_target;   ///< that place, or where the target is when nothing is seen
+  Placement usual_target;       ///< that place, or where the target is when nothing is seen
   double target_floor_m = 0;    ///< height of what it is put on
-  double drop_m = 0;        ///< gap below it when the hand opens
-  double tilt_rad = 0;      ///< lean of the gripper when it lets go, its palm towards the robot
-  double fall_m = 0;        ///< how far towards the robot its middle comes to lie from where its lower edge is put down
+  double drop_m = 0;            ///< gap below it when the hand opens
+  double tilt_rad = 0;          ///< lean of the gripper when it lets go, its palm towards the robot
+  double fall_m = 0;  ///< how far towards the robot its middle comes to lie from where its lower edge is put down
 };
 
 /// @throws InvalidInput if `task_id` is none it knows.

@@ -23,14 +23,16 @@ Camera LookingCamera() {
   return camera;
 }
 
-/// A picture of `cover` in a colour on a ground, in some light, with what a sensor or a model that draws pictures does to it.
+/// A picture of `cover` in a colour on a ground, in some light, with what a sensor or a model that draws pictures does
+/// to it.
 cv::Mat Painted(const cv::Mat& cover, const cv::Scalar& colour, double light, double blur_px, double noise) {
   cv::Mat rgb(cover.size(), CV_32FC3);
   const cv::Scalar ground(200, 197, 192);
   for (int v = 0; v < rgb.rows; ++v) {
     for (int u = 0; u < rgb.cols; ++u) {
       const double share = cover.at<float>(v, u);
-      for (int c = 0; c < 3; ++c) rgb.at<cv::Vec3f>(v, u)[c] = static_cast<float>(light * (share * colour[c] + (1 - share) * ground[c]));
+      for (int c = 0; c < 3; ++c)
+        rgb.at<cv::Vec3f>(v, u)[c] = static_cast<float>(light * (share * colour[c] + (1 - share) * ground[c]));
     }
   }
   if (blur_px > 0) cv::GaussianBlur(rgb, rgb, {0, 0}, blur_px);
@@ -60,7 +62,8 @@ TEST(Perception, APatchIsFoundToAFractionOfAPixelInAnyLight) {
 TEST(Perception, WhatIsGreyOrOfAnotherHueIsNotTheColour) {
   cv::Mat1f cover(64, 96, 0.f);
   cv::rectangle(cover, {40, 20, 12, 12}, 1, cv::FILLED);
-  for (const cv::Scalar& other : {cv::Scalar(90, 90, 90), cv::Scalar(115, 65, 150), cv::Scalar(128, 84, 43), cv::Scalar(240, 240, 240)}) {
+  for (const cv::Scalar& other :
+       {cv::Scalar(90, 90, 90), cv::Scalar(115, 65, 150), cv::Scalar(128, 84, 43), cv::Scalar(240, 240, 240)}) {
     EXPECT_TRUE(FindBlobs(Painted(cover, other, 1, 0, 2), kGreen, 4).empty()) << other;
   }
 }
@@ -118,7 +121,8 @@ TEST(HandSchedule, ClosesOnceAndOpensOnce) {
   EXPECT_EQ(hand.At(1.5), 1);
   EXPECT_EQ(hand.At(2.5), 0);
   const HandSchedule opens_first{.start_closure = 0, .close_s = 2.0, .open_s = 1.0};
-  for (double time_s = 0; time_s < 4; time_s += 0.1) EXPECT_EQ(opens_first.At(time_s), 0) << "told to open, it never closes again";
+  for (double time_s = 0; time_s < 4; time_s += 0.1)
+    EXPECT_EQ(opens_first.At(time_s), 0) << "told to open, it never closes again";
 }
 
 }  // namespace

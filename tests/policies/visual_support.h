@@ -22,7 +22,9 @@ inline sim::MujocoWorld SimWorld(const std::string& profile) {
   return sim::MujocoWorld({.name = profile, .profile = kSim / "profiles" / (profile + ".yaml"), .threads = 2});
 }
 
-inline InitialState SimState(int index) { return {fmt::format("77-{:04d}", index), SeedFor(77, static_cast<std::uint64_t>(index))}; }
+inline InitialState SimState(int index) {
+  return {fmt::format("77-{:04d}", index), SeedFor(77, static_cast<std::uint64_t>(index))};
+}
 
 inline Eigen::Isometry3d PoseIn(const PrivilegedFrame& frame, const std::string& body) {
   for (const PrivilegedFrame::Body& found : frame.bodies) {
@@ -42,7 +44,8 @@ inline bool Succeeded(const Task& task, const PrivilegedTrack& track) {
   return true;
 }
 
-/// How many of `count` initial states the policy masters. Scene i is initial state i with seed i, so two policies are paired.
+/// How many of `count` initial states the policy masters. Scene i is initial state i with seed i, so two policies are
+/// paired.
 inline int Successes(World& world, Policy& policy, const Task& task, int count, int chunks) {
   std::vector<Observation> seen(count);
   std::vector<PrivilegedTrack> tracks(count);
@@ -60,7 +63,8 @@ inline int Successes(World& world, Policy& policy, const Task& task, int count, 
     for (int scene = 0; scene < count; ++scene) batch.push_back({scene, &std::get<ActionChunk>(answers[scene])});
     const std::vector<Advanced> advanced = world.Advance(batch);
     for (int scene = 0; scene < count; ++scene) {
-      for (const WorldStep& step : std::get<std::vector<WorldStep>>(advanced[scene])) tracks[scene].push_back(step.privileged);
+      for (const WorldStep& step : std::get<std::vector<WorldStep>>(advanced[scene]))
+        tracks[scene].push_back(step.privileged);
       seen[scene] = std::get<std::vector<WorldStep>>(advanced[scene]).back().observation;
     }
   }
