@@ -13,6 +13,7 @@ constexpr double kOpening_s = 0.4;
 constexpr double kRetreat_m = 0.12;
 constexpr double kArrived_m = 0.025;    // observed distance from where it should be, to trust the wrist's picture
 constexpr double kBelievable_m = 0.06;  // a closer look that corrects more than this saw something else
+constexpr double kMargin_m = 0.005;     // targets keep this far within the workspace
 constexpr double kEmptyShare = 0.15;    // of the held thing's silhouette that shows its colour
 
 /// Pointing straight down: x of the gripper at `yaw_rad` about the vertical.
@@ -23,6 +24,13 @@ Eigen::Isometry3d Down(const Eigen::Vector2d& xy_m, double z_m, double yaw_rad) 
 }
 
 Eigen::Isometry3d Raised(const Eigen::Isometry3d& pose, double by_m) { return Eigen::Translation3d(0, 0, by_m) * pose; }
+
+/// The nearest pose in the workspace: a degraded policy misses, but asks for nothing that is refused.
+Eigen::Isometry3d Inside(Eigen::Isometry3d pose, const Eigen::AlignedBox3d& workspace_m) {
+  const Eigen::Vector3d margin = Eigen::Vector3d::Constant(kMargin_m);
+  pose.translation() = pose.translation().cwiseMax(workspace_m.min() + margin).cwiseMin(workspace_m.max() - margin);
+  return pose;
+}
 
 /// The camera's picture, its calibration at the picture's size, and its pose.
 std::optional<View> ViewOf(const char* name, const Task& task, const Observation& observation) {
@@ -58,8 +66,8 @@ VisualEpisode::VisualEpisode(const Task& task, const VisualPickOptions& options,
   SplitMix64 random(SeedFor(seed, "visual_pick episode"));
   blind_ = random.Uniform() < options.blindness;
   error_m_ = options.bias_m + Noise(random, options.noise_m);
-  thing_ = knowledge_.usual;
-  target_ = knowledge_.usual_target;
+  thing_ = knowledge_.usual.placement;
+  target_ = knowledge_.usual_target.placement;
 }
 
 ActionChunk VisualEpisode::Answer(const Observation& observation) {
@@ -79,7 +87,7 @@ ActionChunk VisualEpisode::Answer(const Observation& observation) {
   ActionChunk chunk;
   for (int k = 0; k < options_.chunk_size; ++k) {
     ++told_;
-    last_ = {plan_->path.At(Clock()), plan_->hand.At(Clock())};
+    last_ = {Inside(plan_->path.At(Clock()), task_.workspace_m), plan_->hand.At(Clock())};
     chunk.targets.push_back({last_});
   }
   return chunk;
@@ -101,15 +109,14 @@ VisualEpisode::Glance VisualEpisode::GlanceAt(const Observation& observation) {
 
 void VisualEpisode::Look(const Glance& glance) {
   if (!glance.head) return;
-  if (const auto fit = Locate(*glance.head, knowledge_.thing)) thing_ = fit->placement;
+  if (const auto fit = Locate(*glance.head, knowledge_.thing, knowledge_.usual)) thing_ = fit->placement;
   if (!knowledge_.target) return;
-  if (const auto fit = Locate(*glance.head, *knowledge_.target)) target_ = fit->placement;
+  if (const auto fit = Locate(*glance.head, *knowledge_.target, knowledge_.usual_target)) target_ = fit->placement;
 }
 
 void VisualEpisode::LookCloser(const Glance& glance) {
   if (!glance.hand) return;
-  const auto fit = Locate(*glance.hand, knowledge_.thing, thing_);
-  if (fit && (fit->placement.xy_m - thing_.xy_m).norm() < kBelievable_m) thing_ = fit->placement;
+  if (const auto fit = Locate(*glance.hand, knowledge_.thing, {thing_, kBelievable_m})) thing_ = fit->placement;
 }
 
 bool VisualEpisode::ArrivedAbove(const Glance& glance) const {
@@ -123,7 +130,7 @@ bool VisualEpisode::HandIsEmpty(const Glance& glance) {
   if (!plan_->transfers || plan_->checked || !glance.hand) return false;
   if (Clock() < plan_->lifted_s || Clock() > plan_->lowering_s) return false;
   plan_->checked = true;
-  return VisibleShare(*glance.hand, knowledge_.held, glance.base_from_gripper * plan_->gripper_from_thing) <
+  return VisibleShare(*glance.hand, knowledge_.thing, glance.base_from_gripper * plan_->gripper_from_thing) <
          kEmptyShare;
 }
 

@@ -118,11 +118,11 @@ struct Search {
   Eigen::Vector3d BestStart(const Placement& expected) const {
     Eigen::Vector3d best(expected.xy_m.x(), expected.xy_m.y(), expected.yaw_rad);
     for (const int turn : {0, -3, -2, -1, 1, 2, 3}) {
-      if (turn != 0 && options.reach_yaw_rad == 0) break;
       const Eigen::Vector3d turned(expected.xy_m.x(), expected.xy_m.y(),
                                    expected.yaw_rad + turn * options.reach_yaw_rad);
       const Eigen::Vector3d centred = Centred(Centred(turned));
       if (OverlapAt(centred) > OverlapAt(best)) best = centred;
+      if (options.reach_yaw_rad == 0) break;
     }
     return best;
   }

@@ -9,7 +9,8 @@ namespace {
 
 constexpr double kRadians = std::numbers::pi / 180;
 constexpr double kSmallestPatchPx = 4;  // in a picture 96 wide; grows with the area
-constexpr double kSecondPatch = 0.25;  // of the largest patch: a thing cut in two by what stands before it is still one
+constexpr double kSecondPatch = 0.15;  // of the largest patch: a thing cut in two by what stands before it is still one
+constexpr double kThingReach_m = 0.30;   // a tall thing's upper end is seen against the table this far behind its foot
 constexpr double kPoorestOverlap = 0.2;  // below it the patch is something else
 
 double SmallestPatchPx(const View& view) {
@@ -25,6 +26,19 @@ cv::Mat MainCover(const std::vector<Blob>& blobs) {
   return cover;
 }
 
+/// The picture, black where it cannot show the thing.
+cv::Mat WhereItMayBe(const View& view, const Thing& thing, const Prior& prior) {
+  cv::Mat3b rgb = view.rgb->clone();
+  for (int v = 0; v < rgb.rows; ++v) {
+    for (int u = 0; u < rgb.cols; ++u) {
+      const auto point_m = OnPlane(view.camera, view.base_from_camera, {u + 0.5, v + 0.5}, thing.height_m);
+      const bool may = point_m && (point_m->head<2>() - prior.placement.xy_m).norm() < prior.within_m + kThingReach_m;
+      if (!may) rgb(v, u) = cv::Vec3b(0, 0, 0);
+    }
+  }
+  return rgb;
+}
+
 Thing Bottle() {
   Thing bottle;
   bottle.colour = {.hue_deg = 143, .hue_tolerance_deg = 32, .min_saturation = 0.3, .min_value = 0.08};
@@ -32,18 +46,17 @@ Thing Bottle() {
                   Frustum(0.12, 0.014, 0.168, 0.014), Frustum(0.168, 0.0148, 0.186, 0.0148)};
   bottle.shape.back().coloured = false;  // the white cap
   bottle.height_m = 0.004;
-  bottle.middle_m = 0.12;
   return bottle;
 }
 
 PickKnowledge TakeBottle() {
   PickKnowledge knowledge;
-  knowledge.thing = knowledge.held = Bottle();
-  knowledge.usual.xy_m = {0.44, -0.12};
+  knowledge.thing = Bottle();
+  knowledge.usual = {{{0.44, -0.12}, 0}, 0.12};
   knowledge.grasp_m = 0.155;
   knowledge.hover_m = 0.26;
   knowledge.lift_m = 0.13;
-  knowledge.usual_target.xy_m = {0.44, 0.12};
+  knowledge.usual_target = {{{0.44, 0.12}, 0}, 0};
   knowledge.drop_m = 0.003;
   return knowledge;
 }
@@ -53,32 +66,30 @@ Thing Toast() {
   toast.colour = {.hue_deg = 31, .hue_tolerance_deg = 22, .min_saturation = 0.4, .min_value = 0.15};
   toast.shape = {Cuboid({-0.007, -0.035, 0.038}, {0.007, 0.035, 0.080})};
   toast.height_m = 0.006;
-  toast.middle_m = 0.06;
   toast.yaw_reach_rad = 10 * kRadians;
   return toast;
 }
 
 Thing Plate() {
   Thing plate;
-  plate.colour = {.hue_deg = 216, .hue_tolerance_deg = 28, .min_saturation = 0.42, .min_value = 0.15};
+  plate.colour = {.hue_deg = 216, .hue_tolerance_deg = 28, .min_saturation = 0.3, .min_value = 0.15};
   plate.shape = {Cuboid({-0.095, -0.095, 0}, {0.095, 0.095, 0.014}),
                  Cuboid({-0.083, -0.083, 0.011}, {0.083, 0.083, 0.013})};
   plate.shape.back().coloured = false;  // the white floor within the blue rim
-  plate.middle_m = 0.01;
   plate.yaw_reach_rad = 6 * kRadians;
   return plate;
 }
 
 PickKnowledge TakeToast() {
   PickKnowledge knowledge;
-  knowledge.thing = knowledge.held = Toast();
-  knowledge.usual.xy_m = {0.44, -0.14};
+  knowledge.thing = Toast();
+  knowledge.usual = {{{0.44, -0.14}, 0}, 0.12};
   knowledge.grasp_m = 0.070;
   knowledge.hover_m = 0.165;
   knowledge.lift_m = 0.12;
   knowledge.turn_rad = std::numbers::pi / 2;
   knowledge.target = Plate();
-  knowledge.usual_target.xy_m = {0.45, 0.14};
+  knowledge.usual_target = {{{0.45, 0.14}, 0}, 0.12};
   knowledge.target_floor_m = 0.008;
   knowledge.drop_m = 0.006;
   knowledge.tilt_rad = 33 * kRadians;
@@ -88,24 +99,16 @@ PickKnowledge TakeToast() {
 
 }  // namespace
 
-std::optional<ShapeFit> Locate(const View& view, const Thing& thing, const std::optional<Placement>& expected) {
-  const std::vector<Blob> blobs = FindBlobs(*view.rgb, thing.colour, SmallestPatchPx(view));
+std::optional<ShapeFit> Locate(const View& view, const Thing& thing, const Prior& prior) {
+  const std::vector<Blob> blobs = FindBlobs(WhereItMayBe(view, thing, prior), thing.colour, SmallestPatchPx(view));
   if (blobs.empty()) return std::nullopt;
-  ShapeFit start;
-  if (expected) {
-    start.placement = *expected;
-  } else {
-    const auto point_m =
-        OnPlane(view.camera, view.base_from_camera, blobs.front().centroid_px, thing.height_m + thing.middle_m);
-    if (!point_m) return std::nullopt;
-    start.placement.xy_m = point_m->head<2>();
-  }
   FitOptions options;
   options.reach_yaw_rad = thing.yaw_reach_rad;
   options.height_m = thing.height_m;
-  const ShapeFit fit = FitShape(MainCover(blobs), thing.shape, view.camera, view.base_from_camera, start, options);
-  if (fit.overlap < kPoorestOverlap) return std::nullopt;
-  return fit;
+  const ShapeFit fit =
+      FitShape(MainCover(blobs), thing.shape, view.camera, view.base_from_camera, {prior.placement, 0}, options);
+  const double off_m = (fit.placement.xy_m - prior.placement.xy_m).norm();
+  return fit.overlap >= kPoorestOverlap && off_m <= prior.within_m ? std::optional(fit) : std::nullopt;
 }
 
 double VisibleShare(const View& view, const Thing& thing, const Eigen::Isometry3d& base_from_thing) {

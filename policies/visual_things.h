@@ -15,7 +15,6 @@ struct Thing {
   ColourModel colour;
   Shape shape;               ///< what of it shows where it is looked for, base of the thing at z = 0
   double height_m = 0;       ///< where that base is, base frame
-  double middle_m = 0;       ///< height of the shape's middle above it: for the first guess from a patch's centroid
   double yaw_reach_rad = 0;  ///< its yaw may be thrice this off; 0: round, or no matter
 };
 
@@ -26,10 +25,15 @@ struct View {
   Eigen::Isometry3d base_from_camera = Eigen::Isometry3d::Identity();
 };
 
-/// The thing in the picture, or nothing if too little of its colour is there or it has another shape.
-/// @param expected  where it is by earlier knowledge: the search begins there; without, at the largest patch of its
-/// colour.
-std::optional<ShapeFit> Locate(const View& view, const Thing& thing, const std::optional<Placement>& expected = {});
+/// Where a thing is by earlier knowledge.
+struct Prior {
+  Placement placement;
+  double within_m = 0;  ///< it is no further off than this
+};
+
+/// The thing in the picture, or nothing if too little of its colour is where it may be, or it has another shape.
+/// Only pixels that may show it are looked at: the sky is no blue plate.
+std::optional<ShapeFit> Locate(const View& view, const Thing& thing, const Prior& prior);
 
 /// The share of a thing's silhouette that shows its colour, [0, 1]; 0 if it is out of the picture.
 double VisibleShare(const View& view, const Thing& thing, const Eigen::Isometry3d& base_from_thing);
@@ -37,14 +41,13 @@ double VisibleShare(const View& view, const Thing& thing, const Eigen::Isometry3
 /// How to pick one thing and place it.
 struct PickKnowledge {
   Thing thing;                  ///< as it stands at the beginning
-  Thing held;                   ///< what of it shows in the hand
-  Placement usual;              ///< where it is when nothing is seen
+  Prior usual;                  ///< where it is when nothing is seen
   double grasp_m = 0;           ///< height of the gripper at the grasp, base frame
   double hover_m = 0;           ///< height from which the wrist camera looks, base frame
   double lift_m = 0;            ///< how far it is lifted before it is carried
   double turn_rad = 0;          ///< yaw of the gripper relative to the thing's
   std::optional<Thing> target;  ///< what it is put on; none: a free place on the table
-  Placement usual_target;       ///< that place, or where the target is when nothing is seen
+  Prior usual_target;           ///< that place, or where the target is when nothing is seen
   double target_floor_m = 0;    ///< height of what it is put on
   double drop_m = 0;            ///< gap below it when the hand opens
   double tilt_rad = 0;          ///< lean of the gripper when it lets go, its palm towards the robot
