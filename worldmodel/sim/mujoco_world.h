@@ -53,7 +53,7 @@ class MujocoWorld : public World {
   Profile profile_;
   std::map<std::string, std::unique_ptr<Stage>> stages_;  ///< by the task page's path and text
   std::map<SceneId, std::unique_ptr<Scene>> scenes_;
-  std::unique_ptr<Workers> workers_;  ///< last: their OpenGL contexts know the models above
+  std::unique_ptr<Workers> workers_;  ///< last: their renderers know the models above
 };
 
 }  // namespace evac::sim

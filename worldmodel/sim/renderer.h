@@ -8,13 +8,13 @@
 #include <vector>
 
 #include "core/types.h"
+#include "worldmodel/sim/draw_process.h"
 
 namespace evac::sim {
 
-/// Draws scenes without a display: one OpenGL context by EGL (surfaceless, else EGL's default display; Mesa's software
-/// rasteriser where there is no GPU). The same model and data give the same bytes on the same machine.
-///
-/// Make, use and destroy it in one thread; any number of renderers may live in threads of their own.
+/// Draws scenes without a display, in a process of its own (draw_server.h): one OpenGL context by EGL (surfaceless, else
+/// EGL's default display; Mesa's software rasteriser where there is no GPU). The same model and data give the same bytes
+/// on the same machine. Several renderers draw at the same time; one is for one thread at a time.
 class Renderer {
  public:
   /// @throws InternalError naming the step that failed if there is no OpenGL.
@@ -23,25 +23,34 @@ class Renderer {
   Renderer(const Renderer&) = delete;
   Renderer& operator=(const Renderer&) = delete;
 
-  /// @param base    whose textures and meshes `model` has: `model` itself or what it was copied from. What is sent to
-  /// OpenGL is
-  ///                kept per base, which must outlive the renderer.
-  /// @param camera  size and intrinsics. fx must equal fy, see RefuseUndrawable.
+  /// @param base    whose textures and meshes `model` has: `model` itself or what it was copied from. It must outlive
+  ///                the renderer, which sends it to the drawing process once.
+  /// @param camera  size and intrinsics, see RefuseUndrawable.
   /// @returns [height_px, width_px] CV_8UC3 RGB, continuous.
+  /// @throws InvalidInput if the scene has more shapes than kMaxGeoms, or skins; InternalError if the drawing process
+  ///         dies at this picture twice: the first time another one is started and stderr told.
   cv::Mat Draw(const mjModel& base, const mjModel& model, mjData& data, const Camera& camera,
                const Eigen::Isometry3d& base_from_camera);
 
- private:
-  class Display;
-  struct Canvas;
-  Canvas& CanvasFor(const mjModel& base, const Camera& camera);
+  /// Of the process that draws; another one after a crash.
+  pid_t DrawingPid() const { return process_->pid(); }
 
-  std::unique_ptr<Display> display_;
-  std::vector<std::unique_ptr<Canvas>> canvases_;
+ private:
+  struct Shapes;
+  Shapes& ShapesOf(const mjModel& base);
+  /// Has drawn what `order` writes on the board, which it may have to do twice.
+  template <typename Order>
+  void DrawSurely(const Order& order);
+  std::optional<std::string> TeachTheRest();
+
+  std::unique_ptr<DrawProcess> process_;
+  std::vector<std::unique_ptr<Shapes>> shapes_;  ///< per base model, in the order in which they are sent
+  std::size_t taught_ = 0;                       ///< how many of them the process has
 };
 
 /// MuJoCo draws square pixels with the principal point in the middle of the picture.
-/// @throws InvalidInput naming the camera, what was found and what was wanted, for any other.
+/// @throws InvalidInput naming the camera, what was found and what was wanted, for any other, and for pictures larger
+///         than kMaxPicture_px.
 void RefuseUndrawable(const Camera& camera);
 
 }  // namespace evac::sim

@@ -1,13 +1,8 @@
 #include "worldmodel/sim/workers.h"
 
-#include <cstdlib>
-
 namespace evac::sim {
 
 Workers::Workers(int threads) {
-  // Mesa's software rasteriser would start threads of its own in each context; ours already use every core. A user's
-  // choice stands.
-  setenv("LP_NUM_THREADS", "0", 0);
   for (int i = 0; i < threads; ++i) threads_.emplace_back([this] { Live(); });
   std::unique_lock lock(mutex_);
   changed_.wait(lock, [&] { return ready_ == threads; });
@@ -45,12 +40,14 @@ void Workers::Run(int count, const Work& work) {
 
 void Workers::Live() {
   std::unique_ptr<Renderer> renderer;
-  std::unique_lock lock(mutex_);
-  try {  // one after the other: opening the display is not thread-safe everywhere
+  std::exception_ptr error;
+  try {
     renderer = std::make_unique<Renderer>();
   } catch (...) {
-    start_error_ = std::current_exception();
+    error = std::current_exception();
   }
+  std::unique_lock lock(mutex_);
+  if (error) start_error_ = error;
   ++ready_;
   changed_.notify_all();
   if (!renderer) return;
@@ -60,9 +57,9 @@ void Workers::Live() {
     const int item = next_++;
     const Work& work = *work_;
     lock.unlock();
-    const std::exception_ptr error = Do(work, item, *renderer);
+    const std::exception_ptr failure = Do(work, item, *renderer);
     lock.lock();
-    errors_[static_cast<std::size_t>(item)] = error;
+    errors_[static_cast<std::size_t>(item)] = failure;
     if (--unfinished_ == 0) changed_.notify_all();
   }
 }

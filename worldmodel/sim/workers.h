@@ -11,12 +11,12 @@
 
 namespace evac::sim {
 
-/// A few threads, each with an OpenGL context of its own, that share out numbered items.
+/// A few threads, each with a renderer of its own, that share out numbered items.
 class Workers {
  public:
   using Work = std::function<void(int item, Renderer& renderer)>;
 
-  /// @throws Error of the first thread that gets no OpenGL context.
+  /// @throws Error of a thread that gets no renderer.
   explicit Workers(int threads);
   ~Workers();
   Workers(const Workers&) = delete;

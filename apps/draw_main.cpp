@@ -1,0 +1,3 @@
+#include "worldmodel/sim/draw_server.h"
+
+int main() { return evac::sim::ServeDrawings(); }
