@@ -20,7 +20,8 @@
 namespace evac::sim {
 namespace {
 
-constexpr int kPatienceMs = 300'000;  ///< for one answer; a picture takes milliseconds, a crowded machine minutes at most
+constexpr int kPatienceMs =
+    300'000;  ///< for one answer; a picture takes milliseconds, a crowded machine minutes at most
 
 [[noreturn]] void CannotStart(const std::string& what, int error) {
   throw InternalError("cannot render: {}: {}", what, std::strerror(error));
@@ -116,7 +117,8 @@ void DrawProcess::Start() {
   socket_fd_ = Above(ends[0]);
   const int theirs = Above(ends[1]);
   try {
-    pid_ = SpawnPlan(theirs, board_fd_, model_fd_).Spawn(std::filesystem::read_symlink("/proc/self/exe").parent_path() / "evac-draw");
+    pid_ = SpawnPlan(theirs, board_fd_, model_fd_)
+               .Spawn(std::filesystem::read_symlink("/proc/self/exe").parent_path() / "evac-draw");
   } catch (...) {
     ::close(theirs);
     throw;
@@ -165,7 +167,8 @@ std::string DrawProcess::HowItDied() {
   ::kill(pid_, SIGKILL);  // if it closed the socket and lives on
   ::waitpid(pid_, &status, 0);
   pid_ = -1;
-  if (WIFSIGNALED(status)) return fmt::format("was ended by signal {} ({})", WTERMSIG(status), ::strsignal(WTERMSIG(status)));
+  if (WIFSIGNALED(status))
+    return fmt::format("was ended by signal {} ({})", WTERMSIG(status), ::strsignal(WTERMSIG(status)));
   return fmt::format("ended with exit code {}", WEXITSTATUS(status));
 }
 

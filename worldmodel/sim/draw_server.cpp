@@ -42,7 +42,8 @@ void OpenOpenGl() {
   Check(eglBindAPI(EGL_OPENGL_API), "binding OpenGL");
   EGLContext context = eglCreateContext(display, config, EGL_NO_CONTEXT, nullptr);
   Check(context != EGL_NO_CONTEXT, "making a context");
-  Check(eglMakeCurrent(display, EGL_NO_SURFACE, EGL_NO_SURFACE, context), "making the context current without a surface");
+  Check(eglMakeCurrent(display, EGL_NO_SURFACE, EGL_NO_SURFACE, context),
+        "making the context current without a surface");
 }
 
 /// What OpenGL keeps for one base model and size of picture.
@@ -99,7 +100,8 @@ class DrawServer {
  private:
   Canvas& CanvasForOrder() {
     const auto fits = [&](const auto& canvas) {
-      return canvas->base == board_.base && canvas->width_px == board_.width_px && canvas->height_px == board_.height_px;
+      return canvas->base == board_.base && canvas->width_px == board_.width_px &&
+             canvas->height_px == board_.height_px;
     };
     const auto found = std::find_if(canvases_.begin(), canvases_.end(), fits);
     if (found != canvases_.end()) return **found;

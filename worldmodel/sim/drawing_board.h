@@ -21,7 +21,7 @@ struct DrawingBoard {
   mjvLight lights[mjMAXLIGHT];
   mjvGeom geoms[kMaxGeoms];
   // the answer, written by the drawing process
-  char error[512];                         ///< of an answer that is kRefused, zero-terminated
+  char error[512];                          ///< of an answer that is kRefused, zero-terminated
   std::uint8_t rgb[3ULL * kMaxPicture_px];  ///< [height_px, width_px, 3], bottom row first
 };
 

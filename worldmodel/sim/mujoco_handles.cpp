@@ -39,6 +39,12 @@ std::string NameOf(const mjModel& model, mjtObj kind, int id) {
   return name ? name : "";
 }
 
+bool IsFree(const mjModel& model, int body) {
+  return model.body_jntnum[body] == 1 && model.jnt_type[model.body_jntadr[body]] == mjJNT_FREE;
+}
+
+bool IsOfThing(const mjModel& model, int body) { return IsFree(model, model.body_rootid[body]); }
+
 Eigen::Isometry3d PoseOf(const mjtNum* position, const mjtNum* rotation) {
   Eigen::Isometry3d pose = Eigen::Isometry3d::Identity();
   pose.linear() = Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(rotation);

@@ -9,19 +9,21 @@ namespace {
 
 bool IsReported(const mjModel& model, int body) {
   const std::string name = NameOf(model, mjOBJ_BODY, body);
-  const bool is_free = model.body_jntnum[body] == 1 && model.jnt_type[model.body_jntadr[body]] == mjJNT_FREE;
-  return is_free || name == "table" || name == "finger_left" || name == "finger_right";
+  return IsOfThing(model, body) || name == "table" || name == "finger_left" || name == "finger_right";
 }
 
-std::string BodyOfGeom(const mjModel& model, int geom) {
+/// What a geom belongs to, as forces are summed: a thing of several linked bodies is one.
+std::string OwnerOfGeom(const mjModel& model, int geom) {
   const int body = model.geom_bodyid[geom];
-  return body == 0 ? "floor" : NameOf(model, mjOBJ_BODY, body);
+  if (body == 0) return "floor";
+  return NameOf(model, mjOBJ_BODY, IsOfThing(model, body) ? model.body_rootid[body] : body);
 }
 
 std::map<std::pair<std::string, std::string>, double> NormalForces(const mjModel& model, const mjData& data) {
   std::map<std::pair<std::string, std::string>, double> forces_n;
   for (int i = 0; i < data.ncon; ++i) {
-    std::pair bodies(BodyOfGeom(model, data.contact[i].geom1), BodyOfGeom(model, data.contact[i].geom2));
+    std::pair bodies(OwnerOfGeom(model, data.contact[i].geom1), OwnerOfGeom(model, data.contact[i].geom2));
+    if (bodies.first == bodies.second) continue;
     if (bodies.second < bodies.first) std::swap(bodies.first, bodies.second);
     mjtNum force_n[6];
     mj_contactForce(&model, &data, i, force_n);  // the first is along the contact's normal

@@ -35,7 +35,8 @@ mjvGLCamera ViewOf(const Camera& camera, const Eigen::Isometry3d& base_from_came
 /// What is to be seen of one base model's scenes, one scene at a time.
 struct Renderer::Shapes {
   explicit Shapes(const mjModel& model) : base(&model) {
-    if (model.nskin > 0) throw InvalidInput("scene {}: found {} skins, wanted none: they are not drawn", model.names, model.nskin);
+    if (model.nskin > 0)
+      throw InvalidInput("scene {}: found {} skins, wanted none: they are not drawn", model.names, model.nskin);
     mjv_defaultScene(&scene);
     mjv_makeScene(&model, &scene, kMaxGeoms);
     mjv_defaultOption(&options);
@@ -62,7 +63,8 @@ Renderer::Renderer() : process_(std::make_unique<DrawProcess>()) {}
 Renderer::~Renderer() = default;
 
 Renderer::Shapes& Renderer::ShapesOf(const mjModel& base) {
-  const auto found = std::find_if(shapes_.begin(), shapes_.end(), [&](const auto& shapes) { return shapes->base == &base; });
+  const auto found =
+      std::find_if(shapes_.begin(), shapes_.end(), [&](const auto& shapes) { return shapes->base == &base; });
   if (found != shapes_.end()) return **found;
   shapes_.push_back(std::make_unique<Shapes>(base));
   return *shapes_.back();
@@ -84,7 +86,8 @@ void Renderer::DrawSurely(const Order& order) {
       how_it_died = process_->Draw();
     }
     if (!how_it_died) return;
-    if (is_last_try) throw InternalError("cannot render: the drawing process {}, twice at the same picture", *how_it_died);
+    if (is_last_try)
+      throw InternalError("cannot render: the drawing process {}, twice at the same picture", *how_it_died);
     std::fprintf(stderr, "evac: warning: a drawing process %s; another one goes on\n", how_it_died->c_str());
     process_ = std::make_unique<DrawProcess>();
     taught_ = 0;
@@ -96,7 +99,9 @@ cv::Mat Renderer::Draw(const mjModel& base, const mjModel& model, mjData& data, 
   Shapes& shapes = ShapesOf(base);
   shapes.Update(model, data);
   DrawSurely([&](DrawingBoard& board) {
-    board.base = static_cast<int>(std::find_if(shapes_.begin(), shapes_.end(), [&](const auto& one) { return one->base == &base; }) - shapes_.begin());
+    board.base = static_cast<int>(
+        std::find_if(shapes_.begin(), shapes_.end(), [&](const auto& one) { return one->base == &base; }) -
+        shapes_.begin());
     board.width_px = kSupersampling * camera.width_px;
     board.height_px = kSupersampling * camera.height_px;
     board.camera = ViewOf(camera, base_from_camera);
@@ -105,7 +110,8 @@ cv::Mat Renderer::Draw(const mjModel& base, const mjModel& model, mjData& data, 
     std::copy_n(shapes.scene.geoms, board.geom_count, board.geoms);
     std::copy_n(shapes.scene.lights, board.light_count, board.lights);
   });
-  const cv::Mat bottom_up(kSupersampling * camera.height_px, kSupersampling * camera.width_px, CV_8UC3, process_->board().rgb);
+  const cv::Mat bottom_up(kSupersampling * camera.height_px, kSupersampling * camera.width_px, CV_8UC3,
+                          process_->board().rgb);
   cv::Mat image;
   cv::resize(bottom_up, image, {camera.width_px, camera.height_px}, 0, 0, cv::INTER_AREA);
   cv::flip(image, image, 0);

@@ -12,9 +12,9 @@
 
 namespace evac::sim {
 
-/// Draws scenes without a display, in a process of its own (draw_server.h): one OpenGL context by EGL (surfaceless, else
-/// EGL's default display; Mesa's software rasteriser where there is no GPU). The same model and data give the same bytes
-/// on the same machine. Several renderers draw at the same time; one is for one thread at a time.
+/// Draws scenes without a display, in a process of its own (draw_server.h): one OpenGL context by EGL (surfaceless,
+/// else EGL's default display; Mesa's software rasteriser where there is no GPU). The same model and data give the same
+/// bytes on the same machine. Several renderers draw at the same time; one is for one thread at a time.
 class Renderer {
  public:
   /// @throws InternalError naming the step that failed if there is no OpenGL.

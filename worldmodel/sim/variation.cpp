@@ -19,10 +19,6 @@ constexpr double kDegree = std::numbers::pi / 180;
 
 double Draw(SplitMix64& random, const Range& range) { return random.Uniform(range.low, range.high); }
 
-bool IsFree(const mjModel& model, int body) {
-  return model.body_jntnum[body] == 1 && model.jnt_type[model.body_jntadr[body]] == mjJNT_FREE;
-}
-
 void PlaceFreeBody(mjModel& model, int body, const Eigen::Isometry3d& base_from_body) {
   mjtNum* qpos = model.qpos0 + model.jnt_qposadr[model.body_jntadr[body]];
   const Eigen::Quaterniond q(base_from_body.linear());
@@ -115,7 +111,7 @@ void Scatter(mjModel& model, const Clutter& clutter, SplitMix64 random) {
 
 void ScaleMass(mjModel& model, double factor) {
   for (int body = 1; body < model.nbody; ++body) {
-    if (!IsFree(model, body)) continue;
+    if (!IsOfThing(model, body)) continue;
     model.body_mass[body] *= factor;
     Eigen::Map<Vector3d>(model.body_inertia + 3 * body) *= factor;
   }
