@@ -3,13 +3,18 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <fmt/ranges.h>
+
+#include <algorithm>
 #include <functional>
 #include <limits>
 #include <opencv2/imgproc.hpp>
+#include <set>
 
 #include "core/check.h"
 #include "core/error.h"
 #include "core/file.h"
+#include "judges/oracle_judge.h"
 #include "tests/worldmodel/sim/scripted_pick.h"
 #include "tests/worldmodel/sim/sim_test_support.h"
 
@@ -31,6 +36,17 @@ std::vector<Arms> Circle(const ArmState& start, int periods, double radius_m = 0
   return targets;
 }
 
+/// x, y, z of everything that can be moved, in the order of names.
+std::vector<double> ThingPositions(const PrivilegedFrame& frame) {
+  std::vector<double> numbers;
+  for (const auto& body : frame.bodies) {
+    if (body.name.find("gripper") != std::string::npos || body.name.find("finger") != std::string::npos) continue;
+    const Eigen::Vector3d at_m = body.base_from_body.translation();
+    numbers.insert(numbers.end(), at_m.begin(), at_m.end());
+  }
+  return numbers;
+}
+
 std::string Complaint(const std::function<void()>& act) {
   try {
     act();
@@ -50,6 +66,45 @@ TEST(MujocoWorld, TheFirstObservationIsWhatTheTaskDeclares) {
     EXPECT_NEAR((first.observation.arms[0].base_from_gripper.translation() - Eigen::Vector3d(0.30, 0, 0.30)).norm(), 0,
                 0.003);
     EXPECT_LT(first.observation.arms[0].closure, 0.05);
+  }
+}
+
+/// The pages that are shipped: whoever adds one gets this test for it.
+std::vector<std::filesystem::path> TaskPages() {
+  std::vector<std::filesystem::path> pages;
+  for (const auto& entry : std::filesystem::directory_iterator(SceneFolder())) {
+    if (entry.path().extension() == ".yaml") pages.push_back(entry.path());
+  }
+  std::sort(pages.begin(), pages.end());
+  return pages;
+}
+
+class EveryPage : public ::testing::TestWithParam<std::filesystem::path> {};
+INSTANTIATE_TEST_SUITE_P(Scenes, EveryPage, ::testing::ValuesIn(TaskPages()),
+                         [](const auto& info) { return info.param.stem().string(); });
+
+TEST_P(EveryPage, StartsInAHundredDifferentStatesThatStandStillAndShowWhatItDeclares) {
+  MujocoWorld world = MakeWorld("real");
+  const Task task = WithTinyPictures(ReadTaskPage(GetParam()));
+  EXPECT_EQ(task.id, GetParam().stem().string());
+  std::set<std::string> states;
+  for (std::uint64_t seed = 0; seed < 100; ++seed) {
+    const WorldStep first = world.Reset(0, task, State(seed), 1);
+    EXPECT_EQ(WhatIsWrong(first.observation, task), std::nullopt) << seed;
+    EXPECT_EQ(WhatIsWrong(task.rubric, first.privileged), std::nullopt);
+    states.insert(fmt::format("{:.4f}", fmt::join(ThingPositions(first.privileged), " ")));
+  }
+  EXPECT_EQ(states.size(), 100U);
+}
+
+TEST_P(EveryPage, ThingsThatNobodyTouchesStayWhereTheyAre) {
+  MujocoWorld world = MakeWorld("real");
+  const Task task = WithTinyPictures(ReadTaskPage(GetParam()));
+  for (std::uint64_t seed = 0; seed < 3; ++seed) {
+    const WorldStep first = world.Reset(0, task, State(seed), 1);
+    const auto steps = Advance(world, 0, std::vector<Arms>(30, first.observation.arms));
+    const auto before = ThingPositions(first.privileged), after = ThingPositions(steps.back().privileged);
+    for (std::size_t i = 0; i < before.size(); ++i) EXPECT_NEAR(before[i], after[i], 0.004) << seed << " " << i;
   }
 }
 

@@ -106,6 +106,32 @@ inline PickAndPlace PlanToast(const PrivilegedFrame& frame, const ArmState& home
   return p;
 }
 
+/// How a flat thing with something standing up in its middle is taken by that, across its y axis.
+struct Pinch {
+  std::string thing, target;
+  double above_thing_m, above_target_m;  ///< the gripper over the origins, at the grasp and when it lets go
+};
+
+inline PickAndPlace PlanPinch(const PrivilegedFrame& frame, const ArmState& home, const Pinch& pinch) {
+  const Eigen::Isometry3d thing = PoseIn(frame, pinch.thing);
+  PickAndPlace p;
+  p.home = home;
+  p.pick_rotation = p.place_rotation = Downward(thing.linear().col(1));
+  p.pick_m = thing.translation() + Eigen::Vector3d(0, 0, pinch.above_thing_m);
+  p.place_m = PoseIn(frame, pinch.target).translation() + Eigen::Vector3d(0, 0, pinch.above_target_m);
+  return p;
+}
+
+/// The ham by its fold, down onto the bread.
+inline PickAndPlace PlanHam(const PrivilegedFrame& frame, const ArmState& home) {
+  return PlanPinch(frame, home, {"ham", "bread", 0.022, 0.043});
+}
+
+/// The leaf by its rib; let go over the middle of the bowl.
+inline PickAndPlace PlanLettuce(const PrivilegedFrame& frame, const ArmState& home) {
+  return PlanPinch(frame, home, {"leaf", "bowl", 0.021, 0.075});
+}
+
 /// One target per period: straight lines and slerp from waypoint to waypoint; fingers move at once.
 inline std::vector<Arms> Targets(ArmState from, const std::vector<Waypoint>& waypoints) {
   std::vector<Arms> targets;

@@ -19,9 +19,11 @@ inline sim::MujocoWorld MakeWorld(const std::string& profile, int threads = 1) {
   return sim::MujocoWorld({profile, ProfilePage(profile), threads});
 }
 
-inline Task ReadTask(const std::string& id) {
-  return ReadTaskPage(std::filesystem::path(EVAC_SOURCE_DIR) / "worldmodel/sim/scenes" / (id + ".yaml"));
+inline std::filesystem::path SceneFolder() {
+  return std::filesystem::path(EVAC_SOURCE_DIR) / "worldmodel/sim/scenes";
 }
+
+inline Task ReadTask(const std::string& id) { return ReadTaskPage(SceneFolder() / (id + ".yaml")); }
 
 /// The task with pictures too small to cost anything, for tests that do not look at them.
 inline Task WithTinyPictures(Task task) {

@@ -44,6 +44,26 @@ bool ToastLiesOnPlate(const std::vector<WorldStep>& steps) {
          ForceIn(last.privileged, "plate", "toast") > 0.2;
 }
 
+bool HamLiesOnBread(const std::vector<WorldStep>& steps) {
+  const WorldStep& last = steps.back();
+  return HighestOf(steps, "ham") > 0.1 && HeightOf(last, "ham") < 0.03 &&
+         HorizontalDistance(last, "ham", "bread") < 0.03 && ForceIn(last.privileged, "bread", "ham") > 0.2;
+}
+
+bool LeafLiesInBowl(const std::vector<WorldStep>& steps) {
+  const WorldStep& last = steps.back();
+  return HighestOf(steps, "leaf") > 0.1 && HeightOf(last, "leaf") < 0.05 &&
+         HorizontalDistance(last, "leaf", "bowl") < 0.06 && ForceIn(last.privileged, "bowl", "leaf") > 0.2 &&
+         ForceIn(last.privileged, "leaf", "table") == 0;
+}
+
+PickAndPlace PerfectPlan(const std::string& task, const PrivilegedFrame& frame, const ArmState& home) {
+  if (task == "take_bottle") return PlanBottle(frame, home);
+  if (task == "take_toast") return PlanToast(frame, home);
+  if (task == "take_ham") return PlanHam(frame, home);
+  return PlanLettuce(frame, home);
+}
+
 struct Attempt {
   WorldStep first;
   std::vector<WorldStep> steps;
@@ -54,8 +74,7 @@ template <typename Change>
 Attempt Try(World& world, const Task& task, std::uint64_t seed, Change change) {
   Attempt attempt{world.Reset(0, task, State(seed), 1), {}};
   const ArmState home = attempt.first.observation.arms[0];
-  PickAndPlace plan =
-      task.id == "take_bottle" ? PlanBottle(attempt.first.privileged, home) : PlanToast(attempt.first.privileged, home);
+  PickAndPlace plan = PerfectPlan(task.id, attempt.first.privileged, home);
   change(plan);
   attempt.steps = Advance(world, 0, Targets(home, Plan(plan)));
   return attempt;
@@ -83,6 +102,38 @@ TEST_P(InBothProfiles, APerfectMotionPutsTheToastOnThePlateByFrictionAlone) {
   int solved = 0;
   for (std::uint64_t i = 0; i < 10; ++i) solved += ToastLiesOnPlate(Try(world, task, SeedFor(7, i)).steps);
   EXPECT_GE(solved, 9);
+}
+
+TEST_P(InBothProfiles, APerfectMotionLaysTheHamOnTheBreadByFrictionAlone) {
+  sim::MujocoWorld world = MakeWorld(GetParam());
+  const Task task = Unseen(ReadTask("take_ham"));
+  int solved = 0;
+  for (std::uint64_t i = 0; i < 10; ++i) solved += HamLiesOnBread(Try(world, task, SeedFor(7, i)).steps);
+  EXPECT_GE(solved, 9);
+}
+
+TEST_P(InBothProfiles, APerfectMotionPutsTheLeafIntoTheBowlByFrictionAlone) {
+  sim::MujocoWorld world = MakeWorld(GetParam());
+  const Task task = Unseen(ReadTask("take_lettuce"));
+  int solved = 0;
+  for (std::uint64_t i = 0; i < 10; ++i) solved += LeafLiesInBowl(Try(world, task, SeedFor(7, i)).steps);
+  EXPECT_GE(solved, 9);
+}
+
+/// Degrees between the z axes of a thing's middle and of a part linked to it.
+double Bend(const WorldStep& step, const std::string& thing, const std::string& part) {
+  const Eigen::Vector3d of_thing = PoseIn(step.privileged, thing).linear().col(2);
+  return std::acos(std::clamp(of_thing.dot(PoseIn(step.privileged, part).linear().col(2)), -1.0, 1.0)) * 180 / M_PI;
+}
+
+TEST_P(InBothProfiles, HeldHamHangsDownAndLiesFlatAgain) {
+  sim::MujocoWorld world = MakeWorld(GetParam());
+  const Attempt attempt = Try(world, Unseen(ReadTask("take_ham")), 5);
+  const WorldStep& held = attempt.steps[52];
+  ASSERT_GT(HeightOf(held, "ham"), 0.2);
+  EXPECT_LT(Bend(attempt.first, "ham", "ham_left_edge"), 15);
+  EXPECT_GT(Bend(held, "ham", "ham_left_edge"), 40);
+  EXPECT_LT(Bend(attempt.steps.back(), "ham", "ham_left_edge"), 25);
 }
 
 TEST_P(InBothProfiles, AnEmptyGraspStaysAMiss) {
