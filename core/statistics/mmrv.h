@@ -15,7 +15,8 @@ enum class MmrvGap {
   kSim,   ///< |S_i - S_j|: what SIMPLER's README computes by calling its function with swapped arguments
 };
 
-/// When the pair (i, j) is a violation. They differ only where rates are tied (docs/decisions/0010-mmrv-conventions.md).
+/// When the pair (i, j) is a violation. They differ only where rates are tied
+/// (docs/decisions/0010-mmrv-conventions.md).
 enum class MmrvTies {
   kCode,  ///< (S_i > S_j) != (R_i > R_j): SIMPLER's code. A tie in one world violates for one of (i, j), (j, i)
   kSign,  ///< (S_i - S_j)(R_i - R_j) < 0: the signs differ; a tie has no sign and never violates

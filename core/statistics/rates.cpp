@@ -10,15 +10,9 @@
 namespace evac {
 namespace {
 
-void CheckCount(std::int64_t successes, std::int64_t trials) {
-  if (trials < 0 || successes < 0 || successes > trials) {
-    throw InvalidInput("statistics: {} successes of {} trials, wanted 0 <= successes <= trials", successes, trials);
-  }
-}
-
 /// The rate without its interval yet.
 Estimate Rate(std::int64_t successes, std::int64_t trials, double confidence) {
-  CheckCount(successes, trials);
+  CheckCount({successes, trials});
   if (!(confidence > 0 && confidence < 1)) {
     throw InvalidInput("statistics: confidence is {}, wanted 0 < confidence < 1", confidence);
   }
@@ -45,7 +39,7 @@ Interval Wilson(double p, double n, double confidence) {
 std::vector<Count> WithTrials(std::span<const Count> clusters) {
   std::vector<Count> kept;
   for (const Count& cluster : clusters) {
-    CheckCount(cluster.successes, cluster.trials);
+    CheckCount(cluster);
     if (cluster.trials > 0) kept.push_back(cluster);
   }
   return kept;
@@ -103,6 +97,13 @@ double LinearisedSe(std::span<const Count> clusters, double rate) {
 
 }  // namespace
 
+void CheckCount(const Count& count) {
+  if (count.trials < 0 || count.successes < 0 || count.successes > count.trials) {
+    throw InvalidInput("statistics: {} successes of {} trials, wanted 0 <= successes <= trials", count.successes,
+                       count.trials);
+  }
+}
+
 Estimate WilsonInterval(std::int64_t successes, std::int64_t trials, double confidence) {
   Estimate rate = Rate(successes, trials, confidence);
   rate.method = "Wilson";
@@ -129,6 +130,15 @@ Estimate JeffreysInterval(std::int64_t successes, std::int64_t trials, double co
   if (successes > 0) interval.low = BetaQuantile(tail, k + 0.5, n - k + 0.5);
   if (successes < trials) interval.high = BetaQuantile(1 - tail, k + 0.5, n - k + 0.5);
   if (trials > 0) rate.interval = interval;
+  return rate;
+}
+
+Estimate HoeffdingInterval(std::int64_t successes, std::int64_t trials, double confidence) {
+  Estimate rate = Rate(successes, trials, confidence);
+  rate.method = "Hoeffding";
+  if (!rate.value) return rate;
+  const double half_width = std::sqrt(std::log(2 / (1 - confidence)) / (2 * static_cast<double>(trials)));
+  rate.interval = Interval{std::max(0.0, *rate.value - half_width), std::min(1.0, *rate.value + half_width)};
   return rate;
 }
 

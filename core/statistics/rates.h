@@ -13,6 +13,8 @@ namespace evac {
 struct Count {
   std::int64_t successes = 0, trials = 0;
 };
+/// @throws InvalidInput unless 0 <= successes <= trials.
+void CheckCount(const Count& count);
 
 /// Score interval without continuity correction (Wilson 1927). The default of every rate that is shown.
 Estimate WilsonInterval(std::int64_t successes, std::int64_t trials, double confidence = 0.95);
@@ -23,6 +25,9 @@ Estimate ClopperPearsonInterval(std::int64_t successes, std::int64_t trials, dou
 /// Equal-tailed Beta(k + 1/2, n - k + 1/2), its low end 0 at k = 0 and its high end 1 at k = n (Brown, Cai & DasGupta
 /// 2001).
 Estimate JeffreysInterval(std::int64_t successes, std::int64_t trials, double confidence = 0.95);
+
+/// p ± sqrt(ln(2 / alpha) / 2n), clipped to [0, 1] (Hoeffding 1963): needs nothing but independence, and is wide.
+Estimate HoeffdingInterval(std::int64_t successes, std::int64_t trials, double confidence = 0.95);
 
 /// What repeats within one cluster (the same initial state, several seeds) tell about a rate.
 struct ClusterStatistics {

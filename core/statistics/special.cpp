@@ -5,6 +5,7 @@
 #include <boost/math/distributions/normal.hpp>
 #include <boost/math/distributions/students_t.hpp>
 #include <boost/math/special_functions/beta.hpp>
+#include <boost/math/special_functions/gamma.hpp>
 #include <cmath>
 
 #include "core/error.h"
@@ -64,6 +65,26 @@ double FairBinomialCdf(std::int64_t k, std::int64_t n) {
   Require(k >= 0 && k <= n, "k", static_cast<double>(k), "0 <= k <= n");
   if (k == n) return 1;
   return boost::math::cdf(boost::math::binomial(static_cast<double>(n), 0.5), static_cast<double>(k));
+}
+
+double BinomialPmf(std::int64_t k, std::int64_t n, double p) {
+  Require(n >= 0, "n", static_cast<double>(n), "n >= 0");
+  Require(k >= 0 && k <= n, "k", static_cast<double>(k), "0 <= k <= n");
+  Require(p >= 0 && p <= 1, "probability", p, "0 <= p <= 1");
+  return boost::math::pdf(boost::math::binomial(static_cast<double>(n), p), static_cast<double>(k));
+}
+
+double LogChoose(std::int64_t n, std::int64_t k) {
+  Require(n >= 0, "n", static_cast<double>(n), "n >= 0");
+  Require(k >= 0 && k <= n, "k", static_cast<double>(k), "0 <= k <= n");
+  const auto log_factorial = [](std::int64_t m) { return boost::math::lgamma(static_cast<double>(m) + 1); };
+  return log_factorial(n) - log_factorial(k) - log_factorial(n - k);
+}
+
+double LogBeta(double a, double b) {
+  Require(a > 0 && std::isfinite(a), "a", a, "above 0");
+  Require(b > 0 && std::isfinite(b), "b", b, "above 0");
+  return boost::math::lgamma(a) + boost::math::lgamma(b) - boost::math::lgamma(a + b);
 }
 
 }  // namespace evac

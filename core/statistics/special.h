@@ -24,5 +24,12 @@ double ChiSquareTail(double x, double degrees);
 double StudentTwoSided(double t, double degrees);
 /// P(X <= k), X ~ Bin(n, 1/2). @param k in [0, n].
 double FairBinomialCdf(std::int64_t k, std::int64_t n);
+/// P(X = k), X ~ Bin(n, p). @param k in [0, n]. @param p in [0, 1].
+double BinomialPmf(std::int64_t k, std::int64_t n, double p);
+
+/// log of n choose k. @param k in [0, n].
+double LogChoose(std::int64_t n, std::int64_t k);
+/// log B(a, b) = log Gamma(a) + log Gamma(b) - log Gamma(a + b). @param a, b > 0.
+double LogBeta(double a, double b);
 
 }  // namespace evac

@@ -43,14 +43,25 @@ Difference CompareAll(const Json& got, const GoldenCase& golden) {
 
 }  // namespace
 
-std::vector<GoldenCase> ReadGoldenCases(const std::filesystem::path& file, const std::string& fn) {
-  std::vector<GoldenCase> cases;
+std::vector<GoldenCase> ReadGoldenCases(const std::filesystem::path& file) {
   std::ifstream stream(file);
-  const Json all = Json::parse(stream);
-  for (const Json& json : all.at("cases")) {
-    if (json.at("fn") != fn) continue;
-    cases.push_back({json.at("id"), fn, json.at("status"), json.at("inputs"), json.at("expect"), json.at("tol")});
+  if (!stream) throw InvalidInput("{}: cannot be read", file.string());
+  std::vector<GoldenCase> cases;
+  try {
+    const Json all = Json::parse(stream);
+    for (const Json& json : all.at("cases")) {
+      cases.push_back({json.at("id"), json.at("fn"), json.value("status", "ok"), json.at("inputs"),
+                       json.value("expect", Json::object()), json.value("tol", 1e-9)});
+    }
+  } catch (const Json::exception& error) {
+    throw InvalidInput("{}: is no file of golden cases: {}", file.string(), error.what());
   }
+  return cases;
+}
+
+std::vector<GoldenCase> ReadGoldenCases(const std::filesystem::path& file, const std::string& fn) {
+  std::vector<GoldenCase> cases = ReadGoldenCases(file);
+  std::erase_if(cases, [&](const GoldenCase& golden) { return golden.fn != fn; });
   return cases;
 }
 
@@ -62,6 +73,9 @@ std::optional<std::string> FirstDifference(const GoldenCase& golden) {
   } catch (const Error& error) {
     if (golden.status == "error") return std::nullopt;
     return fmt::format("rejected: {}", error.what());
+  } catch (const Json::exception& error) {  // a missing argument, or one of another type
+    if (golden.status == "error") return std::nullopt;
+    return fmt::format("inputs not understood: {}", error.what());
   }
 }
 

@@ -16,6 +16,8 @@ struct GoldenCase {
   double tolerance = 0;  ///< |got - want| <= tolerance * max(1, |want|); 0: exact
 };
 
+/// All cases, in the file's order. @throws InvalidInput if the file cannot be read or is not of that format.
+std::vector<GoldenCase> ReadGoldenCases(const std::filesystem::path& file);
 /// The cases of one function, in the file's order.
 std::vector<GoldenCase> ReadGoldenCases(const std::filesystem::path& file, const std::string& fn);
 

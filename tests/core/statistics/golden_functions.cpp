@@ -14,17 +14,14 @@
 #include "core/statistics/rate_agreement.h"
 #include "core/statistics/rates.h"
 #include "core/statistics/special.h"
+#include "tests/core/statistics/golden_parts.h"
 
 namespace evac {
 namespace {
 
 using Json = nlohmann::json;
 using Doubles = std::vector<double>;
-
-Json ToJson(const Number& number) { return number ? Json(*number) : Json(nullptr); }
-Json ToJson(const Defined<Interval>& interval) {
-  return interval ? Json::array({interval->low, interval->high}) : Json(nullptr);
-}
+using golden::ToJson;
 
 // --- rates -----------------------------------------------------------------------------------------------------------
 
@@ -133,7 +130,7 @@ Json QuantileType7(const Json& in) {
   return {{"values", values}};
 }
 
-Json ToJson(const BootstrapIntervals& intervals) {
+Json AllIntervals(const BootstrapIntervals& intervals) {
   return {{"percentile", ToJson(intervals.percentile)},
           {"basic", ToJson(intervals.basic)},
           {"bca", ToJson(intervals.bca)},
@@ -143,7 +140,7 @@ Json ToJson(const BootstrapIntervals& intervals) {
 
 Json BootstrapFromReplicates(const Json& in) {
   const Resampled resampled{in.at("theta"), in.at("replicates"), in.at("jackknife")};
-  return ToJson(IntervalsOf(resampled, in.value("conf", 0.95)));
+  return AllIntervals(IntervalsOf(resampled, in.value("conf", 0.95)));
 }
 
 BootstrapOptions Options(const Json& in) {
@@ -159,7 +156,7 @@ Json ClusterBootstrap(const Json& in) {
   const Resampled resampled = ClusterBootstrapRate(Clusters(in), options);
   double sum = 0;
   for (const double replicate : resampled.replicates) sum += replicate;
-  Json result = ToJson(IntervalsOf(resampled, options.confidence));
+  Json result = AllIntervals(IntervalsOf(resampled, options.confidence));
   result["theta"] = resampled.theta;
   result["first5"] = First(resampled.replicates, 5);
   result["mean_replicates"] = sum / static_cast<double>(resampled.replicates.size());
@@ -222,10 +219,8 @@ Json Chi2Sf(const Json& in) {
   return Each(in, "x_df", [](const Json& a) { return ChiSquareTail(a[0], a[1]); });
 }
 
-using Function = Json (*)(const Json&);
-
-const std::map<std::string, Function>& Functions() {
-  static const std::map<std::string, Function> functions = {
+golden::Functions OwnFunctions() {
+  return {
       {"beta_ppf", BetaPpf},
       {"betainc_reg", BetaincReg},
       {"bootstrap_ci_from_replicates", BootstrapFromReplicates},
@@ -246,20 +241,30 @@ const std::map<std::string, Function>& Functions() {
       {"splitmix64_below", Splitmix64Below},
       {"wilson_ci", Wilson},
   };
+}
+
+const golden::Functions& AllFunctions() {
+  static const golden::Functions functions = [] {
+    golden::Functions all = OwnFunctions();
+    all.merge(golden::RaterFunctions());
+    all.merge(golden::ComparisonFunctions());
+    all.merge(golden::PlanningFunctions());
+    return all;
+  }();
   return functions;
 }
 
 }  // namespace
 
 Json CallGolden(const std::string& fn, const Json& inputs) {
-  const auto function = Functions().find(fn);
-  if (function == Functions().end()) throw InvalidInput("statistics: no function is called {}", fn);
+  const auto function = AllFunctions().find(fn);
+  if (function == AllFunctions().end()) throw InvalidInput("statistics: no function is called {}", fn);
   return function->second(inputs);
 }
 
 std::vector<std::string> GoldenNames() {
   std::vector<std::string> names;
-  for (const auto& [name, function] : Functions()) names.push_back(name);
+  for (const auto& [name, function] : AllFunctions()) names.push_back(name);
   return names;
 }
 

@@ -1,0 +1,164 @@
+#include "core/statistics/confusion.h"
+
+#include <algorithm>
+#include <cmath>
+#include <vector>
+
+#include "core/error.h"
+#include "core/statistics/special.h"
+
+namespace evac {
+namespace {
+
+Number Ratio(double numerator, double denominator, const char* if_zero) {
+  if (denominator == 0) return Undefined{if_zero};
+  return numerator / denominator;
+}
+
+/// The table as shares, [judge][human], and its margins.
+struct Shares {
+  explicit Shares(const Confusion& c) {
+    const double n = static_cast<double>(c.total());
+    both = static_cast<double>(c.both_success) / n;
+    judge_only = static_cast<double>(c.only_judge_success) / n;
+    human_only = static_cast<double>(c.only_human_success) / n;
+    neither = static_cast<double>(c.both_failure) / n;
+    judge = static_cast<double>(c.both_success + c.only_judge_success) / n;
+    human = static_cast<double>(c.both_success + c.only_human_success) / n;
+  }
+  double both, judge_only, human_only, neither, judge, human;
+};
+
+/// Fleiss, Cohen & Everitt 1969, eq. 13, without the division by n.
+double KappaVariance(const Shares& s, double chance, double kappa) {
+  const auto squared = [](double x) { return x * x; };
+  const double diagonal = s.both * squared(1 - (s.judge + s.human) * (1 - kappa)) +
+                          s.neither * squared(1 - (2 - s.judge - s.human) * (1 - kappa));
+  const double off_diagonal = squared(1 - kappa) * (s.judge_only * squared(s.human + 1 - s.judge) +
+                                                    s.human_only * squared(1 - s.human + s.judge));
+  return (diagonal + off_diagonal - squared(kappa - chance * (1 - kappa))) / squared(1 - chance);
+}
+
+void AddKappa(const Confusion& confusion, double confidence, ConfusionStatistics& result) {
+  const Shares s(confusion);
+  const double chance = s.judge * s.human + (1 - s.judge) * (1 - s.human), n = static_cast<double>(result.n);
+  result.chance = chance;
+  const bool is_constant = confusion.both_success == result.n || confusion.both_failure == result.n;
+  result.kappa.value = result.kappa_se = Undefined{"both always gave the same one answer"};
+  result.kappa.interval = Undefined{"both always gave the same one answer"};
+  if (is_constant) return;
+  const double kappa = (*result.accuracy - chance) / (1 - chance);
+  result.kappa.value = kappa;
+  const double variance = KappaVariance(s, chance, kappa) / n;
+  result.kappa_se = Undefined{"the estimated spread is 0"};
+  result.kappa.interval = Undefined{"the estimated spread is 0"};
+  if (variance * n < 1e-12) return;
+  const double se = std::sqrt(variance), z = TwoSidedZ(confidence);
+  result.kappa_se = se;
+  result.kappa.interval = Interval{kappa - z * se, kappa + z * se};
+}
+
+void RequireShare(double share, const char* name) {
+  if (!(share >= 0 && share <= 1)) throw InvalidInput("statistics: {} is {}, wanted 0 <= {} <= 1", name, share, name);
+}
+
+void Check(std::span<const double> probabilities, std::span<const int> outcomes, const CalibrationOptions& options) {
+  if (probabilities.size() != outcomes.size()) {
+    throw InvalidInput("statistics: {} probabilities of {} outcomes, wanted the same number", probabilities.size(),
+                       outcomes.size());
+  }
+  if (options.bins < 1) throw InvalidInput("statistics: {} bins, wanted at least 1", options.bins);
+  if (!(options.epsilon >= 0 && options.epsilon < 0.5)) {
+    throw InvalidInput("statistics: epsilon is {}, wanted 0 <= epsilon < 0.5", options.epsilon);
+  }
+  for (const double p : probabilities) RequireShare(p, "probability");
+  for (const int outcome : outcomes) {
+    if (outcome != 0 && outcome != 1) throw InvalidInput("statistics: an outcome of {}, wanted 0 or 1", outcome);
+  }
+}
+
+}  // namespace
+
+ConfusionStatistics StatisticsOf(const Confusion& confusion, double confidence) {
+  const auto [tp, fp, fn, tn] = confusion;
+  if (std::min({tp, fp, fn, tn}) < 0) throw InvalidInput("statistics: a confusion table with a negative count");
+  TwoSidedZ(confidence);  // complains
+  ConfusionStatistics result;
+  result.n = confusion.total();
+  result.kappa.method = "Fleiss-Cohen-Everitt";
+  result.kappa.confidence = confidence;
+  result.kappa.n = result.n;
+  result.kappa.value = Undefined{"no items"};
+  result.kappa.interval = Undefined{"no items"};
+  if (result.n == 0) return result;
+
+  const double n = static_cast<double>(result.n), dtp = static_cast<double>(tp), dfp = static_cast<double>(fp),
+               dfn = static_cast<double>(fn), dtn = static_cast<double>(tn);
+  const double accuracy = (dtp + dtn) / n;
+  result.accuracy = accuracy;
+  result.pabak = 2 * accuracy - 1;
+  AddKappa(confusion, confidence, result);
+  const double q = (2 * dtp + dfp + dfn) / (2 * n), by_chance = 2 * q * (1 - q);
+  result.gwet_ac1 = (accuracy - by_chance) / (1 - by_chance);  // by_chance is at most 1/2
+  result.matthews =
+      Ratio(dtp * dtn - dfp * dfn, std::sqrt((dtp + dfp) * (dtp + dfn)) * std::sqrt((dtn + dfp) * (dtn + dfn)),
+            "one of the two always gave the same answer");
+  result.sensitivity = Ratio(dtp, dtp + dfn, "the human saw no success");
+  result.specificity = Ratio(dtn, dtn + dfp, "the human saw no failure");
+  result.balanced_accuracy = Undefined{"the human always gave the same answer"};
+  if (result.sensitivity && result.specificity) {
+    result.balanced_accuracy = (*result.sensitivity + *result.specificity) / 2;
+  }
+  result.precision = Ratio(dtp, dtp + dfp, "the judge saw no success");
+  result.f1 = Ratio(2 * dtp, 2 * dtp + dfp + dfn, "nobody saw a success");
+  result.bias = (dfp - dfn) / n;
+  return result;
+}
+
+CorrectedRate RoganGladen(const JudgedRate& judged, const JudgeQuality& quality) {
+  RequireShare(judged.rate, "rate");
+  RequireShare(quality.sensitivity, "sensitivity");
+  RequireShare(quality.specificity, "specificity");
+  CorrectedRate result;
+  const double youden = quality.sensitivity + quality.specificity - 1;
+  if (std::abs(youden) < 1e-12) {
+    result.raw = result.rate = result.se = Undefined{"the judge is no better than chance"};
+    return result;
+  }
+  const double raw = (judged.rate + quality.specificity - 1) / youden;
+  result.raw = raw;
+  result.rate = std::clamp(raw, 0.0, 1.0);
+  result.se = Undefined{"no items behind the rate, the sensitivity or the specificity"};
+  if (judged.n <= 0 || quality.positives <= 0 || quality.negatives <= 0) return result;
+  const auto variance = [](double p, std::int64_t n) { return p * (1 - p) / static_cast<double>(n); };
+  result.se = std::sqrt(variance(judged.rate, judged.n) + raw * raw * variance(quality.sensitivity, quality.positives) +
+                        (1 - raw) * (1 - raw) * variance(quality.specificity, quality.negatives)) /
+              std::abs(youden);
+  return result;
+}
+
+Calibration CalibrationOf(std::span<const double> probabilities, std::span<const int> outcomes,
+                          const CalibrationOptions& options) {
+  Check(probabilities, outcomes, options);
+  Calibration result;
+  if (probabilities.empty()) return result;
+  const double n = static_cast<double>(probabilities.size());
+  std::vector<double> excess(static_cast<std::size_t>(options.bins), 0);  // of stated probability over outcomes, by bin
+  double brier = 0, log_loss = 0;
+  for (std::size_t i = 0; i < probabilities.size(); ++i) {
+    const double p = probabilities[i], outcome = outcomes[i];
+    const double clipped = std::clamp(p, options.epsilon, 1 - options.epsilon);
+    const int bin = std::min(static_cast<int>(std::floor(p * options.bins)), options.bins - 1);
+    excess[static_cast<std::size_t>(bin)] += p - outcome;
+    brier += (p - outcome) * (p - outcome) / n;
+    log_loss -= std::log(outcomes[i] == 1 ? clipped : 1 - clipped) / n;
+  }
+  double ece = 0;
+  for (const double difference : excess) ece += std::abs(difference) / n;
+  result.brier = brier;
+  result.ece = ece;
+  result.log_loss = Finite(log_loss);
+  return result;
+}
+
+}  // namespace evac

@@ -1,0 +1,71 @@
+#pragma once
+
+#include <cstdint>
+#include <span>
+
+#include "core/statistics/estimate.h"
+
+/// One judge against the truth (a human's verdicts): statistics.md 3.3.
+namespace evac {
+
+/// How often the judge and the human said what. "Positive" is success.
+struct Confusion {
+  std::int64_t both_success = 0;        ///< true positives
+  std::int64_t only_judge_success = 0;  ///< false positives
+  std::int64_t only_human_success = 0;  ///< false negatives
+  std::int64_t both_failure = 0;        ///< true negatives
+  std::int64_t total() const { return both_success + only_judge_success + only_human_success + both_failure; }
+};
+
+/// Each undefined where its denominator is 0.
+struct ConfusionStatistics {
+  Number accuracy = Undefined{"no items"};
+  Number chance = Undefined{"no items"};  ///< agreement by chance, p_e
+  Estimate kappa;  ///< Cohen's; interval from the SE of Fleiss, Cohen & Everitt 1969, not clipped
+  Number kappa_se =
+      Undefined{"no items"};             ///< undefined where it comes out as 0: kappa has no spread to estimate there
+  Number pabak = Undefined{"no items"};  ///< prevalence- and bias-adjusted: 2 accuracy - 1
+  Number gwet_ac1 = Undefined{"no items"};  ///< chance 2 q (1 - q), q the mean share of successes
+  Number matthews = Undefined{"no items"};  ///< Matthews' correlation
+  Number sensitivity = Undefined{"no items"}, specificity = Undefined{"no items"};
+  Number balanced_accuracy = Undefined{"no items"};  ///< mean of the two
+  Number precision = Undefined{"no items"}, f1 = Undefined{"no items"};
+  Number bias = Undefined{"no items"};  ///< judge's success rate - human's: above 0 where the judge is too kind
+  std::int64_t n = 0;
+};
+/// @throws InvalidInput if a count is negative or unless 0 < confidence < 1.
+ConfusionStatistics StatisticsOf(const Confusion& confusion, double confidence = 0.95);
+
+/// What a judge with known errors saw, corrected (Rogan & Gladen 1978).
+struct JudgedRate {
+  double rate = 0;  ///< share that the judge called success
+  std::int64_t n = 0;
+};
+struct JudgeQuality {
+  double sensitivity = 1, specificity = 1;
+  std::int64_t positives = 0, negatives = 0;  ///< how many human verdicts the two rest on
+};
+struct CorrectedRate {
+  Number raw = Undefined{"not computed"};   ///< (rate + specificity - 1) / (sensitivity + specificity - 1)
+  Number rate = Undefined{"not computed"};  ///< the same, within [0, 1]
+  Number se = Undefined{"not computed"};    ///< delta method, of the unclipped rate
+};
+/// Undefined for a judge no better than chance. @throws InvalidInput for shares outside [0, 1].
+CorrectedRate RoganGladen(const JudgedRate& judged, const JudgeQuality& quality);
+
+/// How far stated probabilities of success can be believed.
+struct Calibration {
+  Number brier = Undefined{"no items"};  ///< mean (p - outcome)²
+  Number ece = Undefined{"no items"};  ///< expected calibration error over equal bins of p, [i / bins, (i + 1) / bins)
+  Number log_loss = Undefined{"no items"};  ///< with p clipped to [epsilon, 1 - epsilon]
+};
+struct CalibrationOptions {
+  int bins = 10;
+  double epsilon = 1e-6;
+};
+/// @param probabilities in [0, 1]. @param outcomes 1 success, 0 failure, of the same length.
+/// @throws InvalidInput for anything else.
+Calibration CalibrationOf(std::span<const double> probabilities, std::span<const int> outcomes,
+                          const CalibrationOptions& options = {});
+
+}  // namespace evac

@@ -1,0 +1,233 @@
+#include "core/statistics/planning.h"
+
+#include <algorithm>
+#include <cmath>
+#include <vector>
+
+#include "core/error.h"
+#include "core/statistics/hypergeometric.h"
+#include "core/statistics/mcnemar.h"
+#include "core/statistics/special.h"
+
+namespace evac {
+namespace {
+
+/// p <= alpha for p-values that may equal alpha exactly but for rounding.
+constexpr double kRounding = 1e-12;
+
+void RequireShare(double share, const char* name) {
+  if (!(share >= 0 && share <= 1)) throw InvalidInput("statistics: {} is {}, wanted 0 <= {} <= 1", name, share, name);
+}
+
+void RequireInside(double share, const char* name) {
+  if (!(share > 0 && share < 1)) throw InvalidInput("statistics: {} is {}, wanted 0 < {} < 1", name, share, name);
+}
+
+void Check(const Promise& promise) {
+  RequireInside(promise.alpha, "alpha");
+  RequireInside(promise.power, "power");
+}
+
+SampleSize RoundedUp(double exact) { return {.exact = exact, .n = static_cast<std::int64_t>(std::ceil(exact - 1e-9))}; }
+
+double TwoSided(const Promise& promise) { return TwoSidedZ(1 - promise.alpha); }
+double OneSidedSum(const Promise& promise) { return NormalQuantile(1 - promise.alpha) + NormalQuantile(promise.power); }
+
+/// (z_alpha sqrt(2 p q) + z_power sqrt(p1 q1 + p2 q2))² / (p1 - p2)², p the mean.
+double PerArm(double p1, double p2, const Promise& promise) {
+  const double mean = (p1 + p2) / 2;
+  const double root = TwoSided(promise) * std::sqrt(2 * mean * (1 - mean)) +
+                      NormalQuantile(promise.power) * std::sqrt(p1 * (1 - p1) + p2 * (1 - p2));
+  return root * root / ((p1 - p2) * (p1 - p2));
+}
+
+double ExactMcNemarP(std::int64_t b, std::int64_t flips) {
+  const std::int64_t least = std::min(b, flips - b);
+  return flips == 0 ? 1 : std::min(1.0, 2 * FairBinomialCdf(least, flips));
+}
+
+/// The most successes of the rarer kind among `flips` that exact McNemar still rejects; -1: none.
+std::int64_t RejectedUpTo(std::int64_t flips, double alpha) {
+  std::int64_t limit = -1;
+  while (limit + 1 <= flips / 2 && ExactMcNemarP(limit + 1, flips) <= alpha * (1 + kRounding)) ++limit;
+  return limit;
+}
+
+/// P(exact McNemar rejects | flips), each flip the first's with probability `share`.
+double RejectionGiven(std::int64_t flips, double share, std::int64_t limit) {
+  double power = 0;
+  for (std::int64_t b = 0; b <= limit; ++b) power += BinomialPmf(b, flips, share);
+  for (std::int64_t c = 0; c <= limit && flips - c > limit; ++c) power += BinomialPmf(flips - c, flips, share);
+  return power;
+}
+
+/// What exact McNemar rejects for 0 … most flips; the same for every number of pairs.
+struct McNemarRejections {
+  McNemarRejections(const FlipRates& flip_rates, std::int64_t most, double alpha) : rates(flip_rates) {
+    RequireShare(rates.only_first, "only_first");
+    RequireShare(rates.only_second, "only_second");
+    discordance = rates.only_first + rates.only_second;
+    if (discordance > 1 + kRounding)
+      throw InvalidInput("statistics: flips of {} of the pairs, wanted at most 1", discordance);
+    discordance = std::min(discordance, 1.0);
+    for (std::int64_t flips = 0; flips <= most && discordance > 0; ++flips) {
+      given.push_back(RejectionGiven(flips, rates.only_first / discordance, RejectedUpTo(flips, alpha)));
+    }
+  }
+  double Power(std::int64_t pairs) const {
+    if (discordance == 0) return 0;
+    double power = 0;
+    for (std::int64_t flips = 0; flips <= pairs; ++flips) {
+      power += BinomialPmf(flips, pairs, discordance) * given[static_cast<std::size_t>(flips)];
+    }
+    return power;
+  }
+  FlipRates rates;
+  double discordance = 0;
+  std::vector<double> given;  ///< [flips] power
+};
+
+/// Two-sided Fisher p of every table with these margins, by successes of the first group.
+std::vector<long double> FisherPValues(const Margins& margins) {
+  const std::vector<long double> pmf = HypergeometricPmf(margins);
+  std::vector<long double> p_values;
+  for (const long double observed : pmf) {
+    long double p = 0;
+    for (const long double other : pmf) p += other <= observed * (1 + kClearlyDifferent) ? other : 0;
+    p_values.push_back(p);
+  }
+  return p_values;
+}
+
+}  // namespace
+
+double WilsonHalfWidth(double p, std::int64_t n, double confidence) {
+  RequireShare(p, "p");
+  if (n < 1) throw InvalidInput("statistics: {} trials, wanted at least 1", n);
+  const double z = TwoSidedZ(confidence), trials = static_cast<double>(n);
+  return z * std::sqrt(p * (1 - p) / trials + z * z / (4 * trials * trials)) / (1 + z * z / trials);
+}
+
+std::int64_t TrialsForHalfWidth(double p, double half_width, double confidence) {
+  if (!(half_width > 0 && half_width < 0.5)) {
+    throw InvalidInput("statistics: half_width is {}, wanted 0 < half_width < 0.5", half_width);
+  }
+  std::int64_t enough = 1;
+  while (WilsonHalfWidth(p, enough, confidence) > half_width) {
+    if (enough > (std::int64_t{1} << 50))
+      throw InvalidInput("statistics: half_width {} needs more trials than can be counted", half_width);
+    enough *= 2;
+  }
+  std::int64_t too_few = enough / 2;  // the width falls with n
+  while (enough - too_few > 1) {
+    const std::int64_t middle = (enough + too_few) / 2;
+    (WilsonHalfWidth(p, middle, confidence) > half_width ? too_few : enough) = middle;
+  }
+  return enough;
+}
+
+SampleSize TrialsPerPolicy(double p1, double p2, const Promise& promise) {
+  Check(promise);
+  RequireShare(p1, "p1");
+  RequireShare(p2, "p2");
+  if (p1 == p2) return {.exact = Undefined{"the two rates are equal"}, .n = 0};
+  return RoundedUp(PerArm(p1, p2, promise));
+}
+
+Number DetectableDifference(double p, std::int64_t n, const Promise& promise) {
+  Check(promise);
+  RequireShare(p, "p");
+  if (n < 1) throw InvalidInput("statistics: {} trials, wanted at least 1", n);
+  const double furthest = p >= 0.5 ? 0 : 1, room = std::abs(p - furthest);
+  const auto is_enough = [&](double d) {
+    return PerArm(p, p + (furthest - p) / room * d, promise) <= static_cast<double>(n);
+  };
+  if (!is_enough(room)) return Undefined{"too few trials to tell any two rates apart"};
+  double no = 0, yes = room;
+  for (int halving = 0; halving < 60; ++halving) {
+    const double middle = (no + yes) / 2;
+    (is_enough(middle) ? yes : no) = middle;
+  }
+  return yes;
+}
+
+double McNemarPower(std::int64_t pairs, const FlipRates& rates, double alpha) {
+  RequireInside(alpha, "alpha");
+  if (pairs < 0) throw InvalidInput("statistics: {} pairs, wanted at least 0", pairs);
+  return McNemarRejections(rates, pairs, alpha).Power(pairs);
+}
+
+SampleSize PairsForMcNemar(const FlipRates& rates, const Promise& promise, std::int64_t most) {
+  Check(promise);
+  if (rates.only_first == rates.only_second) return {.exact = Undefined{"both flips are equally frequent"}, .n = 0};
+  const McNemarRejections rejections(rates, most, promise.alpha);
+  const Undefined too_many{fmt::format("more than {} pairs", most)};
+  std::int64_t enough = 2;
+  while (enough < most && rejections.Power(enough) < promise.power) enough = std::min(most, enough * 2);
+  if (rejections.Power(enough) < promise.power) return {.exact = too_many, .n = 0};
+  // The power is a saw: from where it held last, walk down to the last size at which it does not.
+  std::int64_t n = std::min(most, enough + enough / 4);
+  while (n > 0 && rejections.Power(n) >= promise.power) --n;
+  if (n == std::min(most, enough + enough / 4)) return {.exact = too_many, .n = 0};
+  return {.exact = static_cast<double>(n + 1), .n = n + 1};
+}
+
+double FisherPower(std::int64_t n, double p1, double p2, double alpha) {
+  RequireInside(alpha, "alpha");
+  RequireShare(p1, "p1");
+  RequireShare(p2, "p2");
+  if (n < 0) throw InvalidInput("statistics: {} trials, wanted at least 0", n);
+  double power = 0;
+  for (std::int64_t successes = 0; successes <= 2 * n; ++successes) {
+    const Margins margins{n, n, successes};
+    const std::vector<long double> p_values = FisherPValues(margins);
+    for (std::size_t i = 0; i < p_values.size(); ++i) {
+      const std::int64_t x1 = LeastOf(margins) + static_cast<std::int64_t>(i);
+      if (p_values[i] > alpha * (1 + kRounding)) continue;
+      power += BinomialPmf(x1, n, p1) * BinomialPmf(successes - x1, n, p2);
+    }
+  }
+  return power;
+}
+
+SampleSize PointsForCorrelation(double r, const Promise& promise) {
+  Check(promise);
+  if (!(r >= -1 && r <= 1)) throw InvalidInput("statistics: r is {}, wanted -1 <= r <= 1", r);
+  if (r == 0) return {.exact = Undefined{"the correlation is 0"}, .n = 0};
+  if (std::abs(r) == 1) return {.exact = Undefined{"the correlation is exact"}, .n = 0};
+  const double root = (TwoSided(promise) + NormalQuantile(promise.power)) / std::atanh(r);
+  return RoundedUp(root * root + 3);
+}
+
+SampleSize PairsForNonInferiority(double discordance, double margin, const Promise& promise) {
+  Check(promise);
+  RequireShare(discordance, "discordance");
+  RequireInside(margin, "margin");
+  const double z = OneSidedSum(promise);
+  return RoundedUp(z * z * discordance / (margin * margin));
+}
+
+SampleSize TrialsForNonInferiority(double p, double margin, const Promise& promise) {
+  RequireShare(p, "p");
+  return PairsForNonInferiority(2 * p * (1 - p), margin, promise);
+}
+
+PanelQuality PanelOf(int raters, double accuracy) {
+  RequireShare(accuracy, "accuracy");
+  if (raters < 1) throw InvalidInput("statistics: {} raters, wanted at least 1", raters);
+  PanelQuality quality;
+  for (int right = raters / 2 + 1; right <= raters; ++right)
+    quality.majority_right += BinomialPmf(right, raters, accuracy);
+  quality.split = 1 - std::pow(accuracy, raters) - std::pow(1 - accuracy, raters);
+  return quality;
+}
+
+int RatersFor(double accuracy, double wanted_right) {
+  RequireShare(wanted_right, "wanted_right");
+  for (int raters = 1; raters <= 99; raters += 2) {
+    if (PanelOf(raters, accuracy).majority_right >= wanted_right) return raters;
+  }
+  return 0;
+}
+
+}  // namespace evac

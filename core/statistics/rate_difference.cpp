@@ -1,0 +1,109 @@
+#include "core/statistics/rate_difference.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "core/error.h"
+#include "core/statistics/special.h"
+
+namespace evac {
+namespace {
+
+void Check(const PairedOutcomes& outcomes) {
+  const auto [b, c] = outcomes.flips;
+  if (b < 0 || c < 0 || b + c > outcomes.pairs) {
+    throw InvalidInput("statistics: {} and {} discordant of {} pairs, wanted 0 <= both and their sum <= pairs", b, c,
+                       outcomes.pairs);
+  }
+}
+
+/// The difference without its interval yet.
+Estimate PairedDifference(const PairedOutcomes& outcomes, double confidence) {
+  Check(outcomes);
+  TwoSidedZ(confidence);  // complains
+  Estimate difference;
+  difference.confidence = confidence;
+  difference.n = outcomes.pairs;
+  difference.interval = Interval{-1, 1};
+  difference.value = Undefined{"no pairs"};
+  if (outcomes.pairs > 0) {
+    difference.value = static_cast<double>(outcomes.flips.only_first - outcomes.flips.only_second) /
+                       static_cast<double>(outcomes.pairs);
+  }
+  return difference;
+}
+
+/// Tango's score statistic of "the difference is delta"; falls as delta grows. The share of (failure, success) pairs
+/// takes its most likely value under that hypothesis, the root of A q² + B q + C.
+double TangoScore(const PairedOutcomes& outcomes, double delta) {
+  const double n = static_cast<double>(outcomes.pairs), b = static_cast<double>(outcomes.flips.only_first),
+               c = static_cast<double>(outcomes.flips.only_second);
+  const double linear = -b - c + (2 * n - b + c) * delta, constant = -c * delta * (1 - delta);
+  const double root = std::sqrt(std::max(0.0, linear * linear - 8 * n * constant));
+  // The two forms are equal; each cancels where the other does not.
+  const double q = linear <= 0 ? (root - linear) / (4 * n) : -2 * constant / (root + linear);
+  const double variance = n * (2 * q + delta * (1 - delta));
+  const double distance = b - c - n * delta;
+  if (variance <= 0) return distance == 0 ? 0 : std::copysign(INFINITY, distance);
+  return distance / std::sqrt(variance);
+}
+
+/// Where the falling score crosses `target` within [low, high], to the last bit.
+double CrossingOf(const PairedOutcomes& outcomes, double target, Interval within) {
+  for (int halving = 0; halving < 200; ++halving) {
+    const double middle = (within.low + within.high) / 2;
+    (TangoScore(outcomes, middle) > target ? within.low : within.high) = middle;
+  }
+  return (within.low + within.high) / 2;
+}
+
+}  // namespace
+
+Estimate NewcombeDifference(const Count& first, const Count& second, double confidence) {
+  const Estimate one = WilsonInterval(first.successes, first.trials, confidence);
+  const Estimate two = WilsonInterval(second.successes, second.trials, confidence);
+  Estimate difference;
+  difference.method = "Newcombe";
+  difference.confidence = confidence;
+  difference.n = first.trials + second.trials;
+  difference.interval = Interval{-1, 1};
+  difference.value = Undefined{"no trials"};
+  if (!one.value || !two.value) return difference;
+  const double value = *one.value - *two.value;
+  difference.value = value;
+  difference.interval = Interval{value - std::hypot(*one.value - one.interval->low, two.interval->high - *two.value),
+                                 value + std::hypot(one.interval->high - *one.value, *two.value - two.interval->low)};
+  return difference;
+}
+
+Estimate TangoDifference(const PairedOutcomes& outcomes, double confidence) {
+  Estimate difference = PairedDifference(outcomes, confidence);
+  difference.method = "Tango";
+  if (!difference.value) return difference;
+  const double value = *difference.value, z = TwoSidedZ(confidence);
+  Interval interval{-1, 1};
+  if (value > -1) interval.low = CrossingOf(outcomes, z, {-1, value});
+  if (value < 1) interval.high = CrossingOf(outcomes, -z, {value, 1});
+  difference.interval = interval;
+  return difference;
+}
+
+Estimate BonettPriceDifference(const PairedOutcomes& outcomes, double confidence) {
+  Estimate difference = PairedDifference(outcomes, confidence);
+  difference.method = "Bonett-Price";
+  if (!difference.value) return difference;
+  const double n = static_cast<double>(outcomes.pairs) + 2;
+  const double b = (static_cast<double>(outcomes.flips.only_first) + 1) / n,
+               c = (static_cast<double>(outcomes.flips.only_second) + 1) / n;
+  const double half_width = TwoSidedZ(confidence) * std::sqrt((b + c - (b - c) * (b - c)) / n);
+  difference.interval = Interval{std::max(-1.0, b - c - half_width), std::min(1.0, b - c + half_width)};
+  return difference;
+}
+
+Interval MoverSum(const Estimate& theta, const Estimate& delta) {
+  const double sum = *theta.value + *delta.value;
+  return {sum - std::hypot(*theta.value - theta.interval->low, *delta.value - delta.interval->low),
+          sum + std::hypot(theta.interval->high - *theta.value, delta.interval->high - *delta.value)};
+}
+
+}  // namespace evac

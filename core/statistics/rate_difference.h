@@ -1,0 +1,34 @@
+#pragma once
+
+#include <cstdint>
+
+#include "core/statistics/estimate.h"
+#include "core/statistics/mcnemar.h"
+#include "core/statistics/rates.h"
+
+/// How far two success rates are apart: first - second, in [-1, 1] (statistics.md 3.2).
+/// Without data the value is undefined and the interval is [-1, 1]: nothing is known.
+/// All throw InvalidInput for impossible counts and unless 0 < confidence < 1.
+namespace evac {
+
+/// Different initial states: hybrid score interval without continuity correction (Newcombe 1998, method 10).
+Estimate NewcombeDifference(const Count& first, const Count& second, double confidence = 0.95);
+
+/// Outcomes on the same initial states.
+struct PairedOutcomes {
+  Flips flips;             ///< the pairs where the two differ
+  std::int64_t pairs = 0;  ///< all of them, those that agree too
+};
+
+/// Same initial states: score interval (Tango 1998), the one of record. Its test is McNemar's.
+Estimate TangoDifference(const PairedOutcomes& outcomes, double confidence = 0.95);
+
+/// Same initial states: Wald's interval with 1 added to each kind of flip and 2 to the pairs (Bonett & Price 2012). The
+/// quick form; its value is that of the data as they are.
+Estimate BonettPriceDifference(const PairedOutcomes& outcomes, double confidence = 0.95);
+
+/// theta + delta from two independent estimates: the ends by the method of variance estimates recovery (Zou & Donner
+/// 2008), which keeps the asymmetry of both intervals. Both must have a value and an interval; not clipped.
+Interval MoverSum(const Estimate& theta, const Estimate& delta);
+
+}  // namespace evac
