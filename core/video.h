@@ -21,8 +21,9 @@ struct FinishedVideo {
   int frames = 0;
 };
 
-/// Encodes frames as they come: H.264, yuv420p, faststart mp4, playable in a browser. One thread, no clock in the file:
-/// the same frames give the same bytes. Until Finish the file is `path`.tmp; destroyed before that, it is removed.
+/// Encodes frames as they come, in a thread of its own: H.264, yuv420p, faststart mp4, playable in a browser. The codec
+/// has one thread and the file no clock: the same frames give the same bytes. Until Finish the file is `path`.tmp;
+/// destroyed before that, it is removed.
 class VideoWriter {
  public:
   /// @throws Error if the folder cannot be written or there is no H.264 encoder.
@@ -33,7 +34,8 @@ class VideoWriter {
 
   /// @param rgb  CV_8UC3 RGB. The first frame fixes the size; an odd side is padded by repeating its last row or
   /// column.
-  /// @throws Error if the size differs or the disk is full.
+  /// Copied and queued: returns at once unless the encoder is far behind.
+  /// @throws Error if the size differs, or for an earlier frame that could not be written (the disk is full).
   void Append(const cv::Mat& rgb);
 
   /// Writes the trailer, syncs the file, renames it to its final name and syncs the folder. Call once, after at least
@@ -41,8 +43,8 @@ class VideoWriter {
   FinishedVideo Finish();
 
  private:
-  struct Encoder;
-  std::unique_ptr<Encoder> encoder_;
+  class Background;
+  std::unique_ptr<Background> background_;
 };
 
 /// Decodes a video front to back. Bytes come from outside: broken files end in an Error that names the file.

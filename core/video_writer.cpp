@@ -1,226 +1,117 @@
-#include <cmath>
-#include <cstdint>
-#include <numeric>
-#include <opencv2/imgproc.hpp>
-#include <optional>
+#include <condition_variable>
+#include <deque>
+#include <exception>
+#include <mutex>
+#include <thread>
 #include <utility>
 
 #include "core/error.h"
-#include "core/file.h"
-#include "core/hash.h"
 #include "core/video.h"
-#include "core/video_av.h"
+#include "core/video_encoder.h"
 
 namespace evac {
 namespace {
 
-namespace fs = std::filesystem;
-
-/// Ticks of 1 / per_s seconds, `per_frame` of them from one frame to the next: exact for every period that is a
-/// fraction with a denominator below a million, and never coarser than a millisecond.
-struct Ticks {
-  int per_s = 0;
-  int per_frame = 0;
-};
-
-Ticks TicksFor(double period_s) {
-  const AVRational period = av_d2q(period_s, 1'000'000);
-  const int finer = (1000 + period.den - 1) / period.den;
-  return {period.den * finer, period.num * finer};
-}
-
-void Check(const VideoOptions& options, const fs::path& path) {
-  if (!(options.period_s >= 1e-3 && options.period_s <= 1e3)) {
-    throw InvalidInput("{}: the video's period is {} s, wanted .001 … 1000", path.string(), options.period_s);
-  }
-  if (options.crf < 0 || options.crf > 51)
-    throw InvalidInput("{}: the video's crf is {}, wanted 0 … 51", path.string(), options.crf);
-  if (options.scale < 1 || options.scale > 64) {
-    throw InvalidInput("{}: the video's scale is {}, wanted 1 … 64", path.string(), options.scale);
-  }
-}
-
-/// Enlarged, and with even sides, as yuv420p needs them.
-cv::Mat Prepared(const cv::Mat& rgb, int scale) {
-  cv::Mat large = rgb;
-  if (scale > 1) cv::resize(rgb, large, {}, scale, scale, cv::INTER_NEAREST);
-  if (large.cols % 2 == 0 && large.rows % 2 == 0) return large;
-  cv::Mat even;
-  cv::copyMakeBorder(large, even, 0, large.rows % 2, 0, large.cols % 2, cv::BORDER_REPLICATE);
-  return even;
-}
-
-av::Scaler NewRgbToYuv(int width_px, int height_px) {
-  const int flags = SWS_BILINEAR | SWS_ACCURATE_RND | SWS_BITEXACT | SWS_FULL_CHR_H_INP;
-  av::Scaler scaler(sws_getContext(width_px, height_px, AV_PIX_FMT_RGB24, width_px, height_px, AV_PIX_FMT_YUV420P,
-                                   flags, nullptr, nullptr, nullptr));
-  if (!scaler) throw InternalError("there is no conversion from RGB to yuv420p for {}x{}", width_px, height_px);
-  const int* bt709 = sws_getCoefficients(SWS_CS_ITU709);
-  sws_setColorspaceDetails(scaler.get(), bt709, 1, bt709, 0, 0, 1 << 16, 1 << 16);
-  return scaler;
-}
+constexpr std::size_t kMostWaiting = 64;  ///< frames; whoever appends faster than they are encoded waits
 
 }  // namespace
 
-/// One mp4 being written. Until it is finished, its destruction removes the file.
-struct VideoWriter::Encoder {
-  Encoder(fs::path path, const VideoOptions& options);
-  ~Encoder();
-  Encoder(const Encoder&) = delete;
-  Encoder& operator=(const Encoder&) = delete;
+/// An encoder and the thread it works in, so that frames are encoded while the world makes the next ones.
+class VideoWriter::Background {
+ public:
+  Background(std::filesystem::path path, const VideoOptions& options)
+      : encoder_(std::move(path), options), thread_([this] { Work(); }) {}
 
-  void Start(int width_px, int height_px);
-  void Append(const cv::Mat& rgb);
-  FinishedVideo Finish();
+  ~Background() { End(); }
 
-  void SetUpCodec(int width_px, int height_px);
-  void WriteHeader();
-  void Encode(const AVFrame* frame_or_end);
-  void Demand(int code, const char* what) const;
-
-  fs::path path_, part_;
-  VideoOptions options_;
-  Ticks ticks_;
-  av::Output output_;
-  av::Codec codec_;
-  av::Scaler rgb_to_yuv_;
-  av::Frame yuv_;
-  av::Packet packet_;
-  cv::Size size_px_;  ///< of the frames given, before scaling
-  int frames_ = 0;
-  bool finished_ = false;
-};
-
-VideoWriter::Encoder::Encoder(fs::path path, const VideoOptions& options)
-    : path_(std::move(path)), part_(path_.string() + ".tmp"), options_(options) {
-  av::Silence();
-  Check(options_, path_);
-  ticks_ = TicksFor(options_.period_s);
-  AVFormatContext* output = nullptr;
-  Demand(avformat_alloc_output_context2(&output, nullptr, "mp4", av::Url(part_).c_str()), "there is no mp4 format");
-  output_.reset(output);
-  output_->flags |= AVFMT_FLAG_BITEXACT;
-  packet_.reset(av_packet_alloc());
-  if (!avcodec_find_encoder_by_name("libx264"))
-    throw InternalError("{}: libav has no H.264 encoder (libx264)", path_.string());
-  Demand(avio_open(&output_->pb, av::Url(part_).c_str(), AVIO_FLAG_WRITE), "cannot be written");
-}
-
-VideoWriter::Encoder::~Encoder() {
-  if (finished_) return;
-  output_.reset();
-  std::error_code ignored;
-  fs::remove(part_, ignored);
-}
-
-void VideoWriter::Encoder::Demand(int code, const char* what) const {
-  if (code < 0) throw InternalError("{}: {}: {}", path_.string(), what, av::Reason(code));
-}
-
-void VideoWriter::Encoder::SetUpCodec(int width_px, int height_px) {
-  const AVCodec* h264 = avcodec_find_encoder_by_name("libx264");
-  codec_.reset(avcodec_alloc_context3(h264));
-  codec_->width = width_px;
-  codec_->height = height_px;
-  codec_->pix_fmt = AV_PIX_FMT_YUV420P;
-  codec_->time_base = {1, ticks_.per_s};
-  codec_->framerate = {ticks_.per_s, ticks_.per_frame};
-  codec_->color_range = AVCOL_RANGE_MPEG;
-  codec_->colorspace = AVCOL_SPC_BT709;
-  codec_->color_primaries = AVCOL_PRI_BT709;
-  codec_->color_trc = AVCOL_TRC_BT709;
-  codec_->gop_size = 25;     // raters scrub: no seek decodes more than this
-  codec_->max_b_frames = 0;  // decoding order is time order, the first frame is at 0 without an edit list
-  codec_->thread_count = 1;  // the same bytes on every machine, and lanes run beside each other anyway
-  codec_->flags |= AV_CODEC_FLAG_BITEXACT | AV_CODEC_FLAG_GLOBAL_HEADER;
-  AVDictionary* settings = nullptr;
-  av_dict_set(&settings, "preset", options_.preset.c_str(), 0);
-  av_dict_set_int(&settings, "crf", options_.crf, 0);
-  av_dict_set(&settings, "x264-params", "cpu-independent=1", 0);
-  const int opened = avcodec_open2(codec_.get(), h264, &settings);
-  av_dict_free(&settings);
-  Demand(opened, "the H.264 encoder does not start");
-}
-
-void VideoWriter::Encoder::WriteHeader() {
-  AVStream* stream = avformat_new_stream(output_.get(), nullptr);
-  stream->time_base = codec_->time_base;
-  stream->avg_frame_rate = codec_->framerate;
-  Demand(avcodec_parameters_from_context(stream->codecpar, codec_.get()), "the stream cannot be described");
-  AVDictionary* settings = nullptr;
-  av_dict_set(&settings, "movflags", "+faststart", 0);
-  const int written = avformat_write_header(output_.get(), &settings);
-  av_dict_free(&settings);
-  Demand(written, "the header cannot be written");
-}
-
-void VideoWriter::Encoder::Start(int width_px, int height_px) {
-  SetUpCodec(width_px, height_px);
-  rgb_to_yuv_ = NewRgbToYuv(width_px, height_px);
-  yuv_ = av::NewFrame(AV_PIX_FMT_YUV420P, width_px, height_px);
-  WriteHeader();
-}
-
-void VideoWriter::Encoder::Append(const cv::Mat& rgb) {
-  if (rgb.empty() || rgb.type() != CV_8UC3) throw InternalError("{}: a frame is no 8-bit RGB image", path_.string());
-  const cv::Mat image = Prepared(rgb, options_.scale);
-  if (frames_ == 0) {
-    size_px_ = rgb.size();
-    Start(image.cols, image.rows);
+  void Append(const cv::Mat& rgb) {
+    CheckFrame(rgb);
+    std::unique_lock lock(mutex_);
+    changed_.wait(lock, [&] { return error_ || waiting_.size() < kMostWaiting; });
+    if (error_) std::rethrow_exception(error_);
+    waiting_.push_back(rgb.clone());
+    changed_.notify_all();
   }
-  if (rgb.size() != size_px_) {
-    throw InternalError("{}: frame {} is {}x{}, the first was {}x{}", path_.string(), frames_, rgb.cols, rgb.rows,
+
+  FinishedVideo Finish() {
+    {
+      std::unique_lock lock(mutex_);
+      changed_.wait(lock, [&] { return error_ || (waiting_.empty() && !is_encoding_); });
+    }
+    End();
+    if (error_) std::rethrow_exception(error_);
+    return encoder_.Finish();
+  }
+
+ private:
+  void CheckFrame(const cv::Mat& rgb) {
+    const std::string path = encoder_.path().string();
+    if (rgb.empty() || rgb.type() != CV_8UC3) throw InternalError("{}: a frame is no 8-bit RGB image", path);
+    if (frames_++ == 0) size_px_ = rgb.size();
+    if (rgb.size() == size_px_) return;
+    throw InternalError("{}: frame {} is {}x{}, the first was {}x{}", path, frames_ - 1, rgb.cols, rgb.rows,
                         size_px_.width, size_px_.height);
   }
-  Demand(av_frame_make_writable(yuv_.get()), "no memory for a frame");
-  const std::uint8_t* rows[] = {image.data};
-  const int strides[] = {static_cast<int>(image.step)};
-  sws_scale(rgb_to_yuv_.get(), rows, strides, 0, image.rows, yuv_->data, yuv_->linesize);
-  yuv_->pts = std::int64_t{frames_} * ticks_.per_frame;
-  Encode(yuv_.get());
-  ++frames_;
-}
 
-/// Gives the encoder a frame, or the end, and writes what it has ready.
-void VideoWriter::Encoder::Encode(const AVFrame* frame_or_end) {
-  Demand(avcodec_send_frame(codec_.get(), frame_or_end), "a frame cannot be encoded");
-  for (;;) {
-    const int received = avcodec_receive_packet(codec_.get(), packet_.get());
-    if (received == AVERROR(EAGAIN) || received == AVERROR_EOF) return;
-    Demand(received, "a frame cannot be encoded");
-    packet_->duration = ticks_.per_frame;
-    packet_->stream_index = 0;
-    av_packet_rescale_ts(packet_.get(), codec_->time_base, output_->streams[0]->time_base);
-    Demand(av_write_frame(output_.get(), packet_.get()), "a frame cannot be written");
-    av_packet_unref(packet_.get());
-    Demand(output_->pb->error, "a frame cannot be written");
+  void Work() {
+    std::unique_lock lock(mutex_);
+    while (true) {
+      changed_.wait(lock, [&] { return is_ending_ || !waiting_.empty(); });
+      if (is_ending_) return;
+      const cv::Mat frame = std::exchange(waiting_.front(), {});
+      waiting_.pop_front();
+      is_encoding_ = true;
+      lock.unlock();
+      const std::exception_ptr error = Encode(frame);
+      lock.lock();
+      is_encoding_ = false;
+      if (error) error_ = error;
+      changed_.notify_all();
+      if (error) return;
+    }
   }
-}
 
-FinishedVideo VideoWriter::Encoder::Finish() {
-  if (frames_ == 0) throw InternalError("{}: a video without frames", path_.string());
-  Encode(nullptr);
-  Demand(av_write_trailer(output_.get()), "the end of the file cannot be written");
-  avio_flush(output_->pb);
-  Demand(output_->pb->error, "the end of the file cannot be written");
-  Demand(avio_closep(&output_->pb), "cannot be closed");
-  const std::string sha256 = Sha256HexOfFile(part_);
-  SyncAndRename(part_, path_);
-  finished_ = true;
-  return {path_, sha256, frames_};
-}
+  std::exception_ptr Encode(const cv::Mat& frame) {
+    try {
+      encoder_.Append(frame);
+      return nullptr;
+    } catch (...) {
+      return std::current_exception();
+    }
+  }
 
-VideoWriter::VideoWriter(fs::path path, const VideoOptions& options)
-    : encoder_(std::make_unique<Encoder>(std::move(path), options)) {}
+  /// What still waits is left; idempotent.
+  void End() {
+    {
+      const std::lock_guard lock(mutex_);
+      is_ending_ = true;
+    }
+    changed_.notify_all();
+    if (thread_.joinable()) thread_.join();
+  }
+
+  int frames_ = 0;        ///< appended
+  cv::Size size_px_;      ///< of the first
+  VideoEncoder encoder_;  ///< the thread's while it runs
+  std::mutex mutex_;      ///< guards all below but the thread
+  std::condition_variable changed_;
+  std::deque<cv::Mat> waiting_;
+  bool is_encoding_ = false, is_ending_ = false;
+  std::exception_ptr error_;  ///< of the frame that could not be encoded; nothing is encoded after it
+  std::thread thread_;
+};
+
+VideoWriter::VideoWriter(std::filesystem::path path, const VideoOptions& options)
+    : background_(std::make_unique<Background>(std::move(path), options)) {}
 VideoWriter::~VideoWriter() = default;
 VideoWriter::VideoWriter(VideoWriter&&) noexcept = default;
 VideoWriter& VideoWriter::operator=(VideoWriter&&) noexcept = default;
 
-void VideoWriter::Append(const cv::Mat& rgb) { encoder_->Append(rgb); }
+void VideoWriter::Append(const cv::Mat& rgb) { background_->Append(rgb); }
 
 FinishedVideo VideoWriter::Finish() {
-  FinishedVideo video = encoder_->Finish();
-  encoder_.reset();
+  FinishedVideo video = background_->Finish();
+  background_.reset();
   return video;
 }
 
