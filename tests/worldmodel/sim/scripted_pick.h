@@ -124,7 +124,7 @@ inline PickAndPlace PlanPinch(const PrivilegedFrame& frame, const ArmState& home
 
 /// The ham by its fold, down onto the bread.
 inline PickAndPlace PlanHam(const PrivilegedFrame& frame, const ArmState& home) {
-  return PlanPinch(frame, home, {"ham", "bread", 0.022, 0.043});
+  return PlanPinch(frame, home, {"ham", "bread", 0.027, 0.048});
 }
 
 /// The leaf by its rib; let go over the middle of the bowl.
