@@ -130,8 +130,9 @@ bool VisualEpisode::HandIsEmpty(const Glance& glance) {
   if (!plan_->transfers || plan_->checked || !glance.hand) return false;
   if (Clock() < plan_->lifted_s || Clock() > plan_->lowering_s) return false;
   plan_->checked = true;
-  return VisibleShare(*glance.hand, knowledge_.thing, glance.base_from_gripper * plan_->gripper_from_thing) <
-         kEmptyShare;
+  Thing held = knowledge_.thing;
+  if (!knowledge_.held.empty()) held.shape = knowledge_.held;
+  return VisibleShare(*glance.hand, held, glance.base_from_gripper * plan_->gripper_from_thing) < kEmptyShare;
 }
 
 VisualEpisode::Plan VisualEpisode::Approach() const {

@@ -97,6 +97,70 @@ PickKnowledge TakeToast() {
   return knowledge;
 }
 
+Thing Ham() {
+  Thing ham;
+  ham.colour = {.hue_deg = 3, .hue_tolerance_deg = 15, .min_saturation = 0.3, .min_value = 0.15};
+  ham.shape = {Cuboid({-0.029, -0.046, 0}, {0.029, 0.046, 0.004}), Cuboid({-0.027, -0.003, 0}, {0.027, 0.003, 0.031})};
+  ham.height_m = 0.008;
+  ham.yaw_reach_rad = 11 * kRadians;
+  return ham;
+}
+
+Thing Bread() {
+  Thing bread;
+  bread.colour = {.hue_deg = 35, .hue_tolerance_deg = 16, .min_saturation = 0.4, .min_value = 0.15};
+  bread.shape = {Cuboid({-0.056, -0.056, 0}, {0.056, 0.056, 0.018}), Cuboid({-0.050, -0.050, 0.017}, {0.050, 0.050, 0.018})};
+  bread.shape.back().coloured = false;  // the pale crumb within the crust
+  bread.yaw_reach_rad = 6 * kRadians;
+  return bread;
+}
+
+PickKnowledge TakeHam() {
+  PickKnowledge knowledge;
+  knowledge.thing = Ham();
+  knowledge.held = {Cuboid({-0.028, -0.010, -0.020}, {0.028, 0.010, 0.031})};
+  knowledge.usual = {{{0.44, -0.14}, 0}, 0.12};
+  knowledge.grasp_m = 0.035;
+  knowledge.hover_m = 0.165;
+  knowledge.lift_m = 0.12;
+  knowledge.target = Bread();
+  knowledge.usual_target = {{{0.45, 0.14}, 0}, 0.12};
+  knowledge.target_floor_m = 0.018;
+  knowledge.drop_m = 0.006;
+  return knowledge;
+}
+
+Thing Leaf() {
+  Thing leaf;
+  leaf.colour = {.hue_deg = 97, .hue_tolerance_deg = 26, .min_saturation = 0.3, .min_value = 0.1};
+  leaf.shape = {Cuboid({-0.024, -0.038, 0.004}, {0.024, 0.038, 0.010}), Cuboid({0.022, -0.029, 0.008}, {0.064, 0.029, 0.014}),
+                Cuboid({-0.021, -0.004, 0.0}, {0.021, 0.004, 0.026})};
+  leaf.yaw_reach_rad = 14 * kRadians;
+  return leaf;
+}
+
+Thing Bowl() {
+  Thing bowl;
+  bowl.colour = {.hue_deg = 218, .hue_tolerance_deg = 28, .min_saturation = 0.3, .min_value = 0.1};
+  bowl.shape = {Frustum(0.0, 0.056, 0.050, 0.092)};
+  return bowl;
+}
+
+PickKnowledge TakeLettuce() {
+  PickKnowledge knowledge;
+  knowledge.thing = Leaf();
+  knowledge.held = {Cuboid({-0.022, -0.012, -0.010}, {0.055, 0.012, 0.020})};
+  knowledge.usual = {{{0.44, -0.14}, 0}, 0.12};
+  knowledge.grasp_m = 0.027;
+  knowledge.hover_m = 0.165;
+  knowledge.lift_m = 0.14;
+  knowledge.target = Bowl();
+  knowledge.usual_target = {{{0.45, 0.14}, 0}, 0.12};
+  knowledge.target_floor_m = 0.006;
+  knowledge.drop_m = 0.045;
+  return knowledge;
+}
+
 }  // namespace
 
 std::optional<ShapeFit> Locate(const View& view, const Thing& thing, const Prior& prior) {
@@ -120,7 +184,9 @@ double VisibleShare(const View& view, const Thing& thing, const Eigen::Isometry3
 PickKnowledge KnowledgeOf(const std::string& task_id) {
   if (task_id == "take_bottle") return TakeBottle();
   if (task_id == "take_toast") return TakeToast();
-  throw InvalidInput("visual_pick: found task {}, wanted take_bottle or take_toast", task_id);
+  if (task_id == "take_ham") return TakeHam();
+  if (task_id == "take_lettuce") return TakeLettuce();
+  throw InvalidInput("visual_pick: found task {}, wanted take_bottle, take_toast, take_ham or take_lettuce", task_id);
 }
 
 }  // namespace evac

@@ -6,7 +6,7 @@
 #include "policies/perception.h"
 #include "policies/visual_shape.h"
 
-/// What `visual_pick` knows of the two tasks before it sees anything: colours, shapes, heights, and how one picks and
+/// What `visual_pick` knows of its tasks before it sees anything: colours, shapes, heights, and how one picks and
 /// places there. Nothing here depends on an initial state.
 namespace evac {
 
@@ -41,6 +41,7 @@ double VisibleShare(const View& view, const Thing& thing, const Eigen::Isometry3
 /// How to pick one thing and place it.
 struct PickKnowledge {
   Thing thing;                  ///< as it stands at the beginning
+  Shape held;                   ///< as it hangs in the hand, in the same frame; empty: as it stands
   Prior usual;                  ///< where it is when nothing is seen
   double grasp_m = 0;           ///< height of the gripper at the grasp, base frame
   double hover_m = 0;           ///< height from which the wrist camera looks, base frame

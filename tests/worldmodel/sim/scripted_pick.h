@@ -129,7 +129,7 @@ inline PickAndPlace PlanHam(const PrivilegedFrame& frame, const ArmState& home) 
 
 /// The leaf by its rib; let go over the middle of the bowl.
 inline PickAndPlace PlanLettuce(const PrivilegedFrame& frame, const ArmState& home) {
-  return PlanPinch(frame, home, {"leaf", "bowl", 0.021, 0.075});
+  return PlanPinch(frame, home, {"leaf", "bowl", 0.027, 0.075});
 }
 
 /// One target per period: straight lines and slerp from waypoint to waypoint; fingers move at once.
