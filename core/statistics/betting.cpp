@@ -54,7 +54,7 @@ double LowerEnd(std::span<const double> values, std::span<const double> bets, do
   const auto is_refuted = [&](double m) { return LogCapital(values, bets, m, truncation) >= log_limit; };
   if (!is_refuted(0)) return 0;
   double refuted = 0, open = 1;
-  for (int halving = 0; halving < 200; ++halving) {
+  for (int halving = 0; halving < 64; ++halving) {
     const double middle = (refuted + open) / 2;
     (is_refuted(middle) ? refuted : open) = middle;
   }

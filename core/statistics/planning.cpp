@@ -46,45 +46,49 @@ double ExactMcNemarP(std::int64_t b, std::int64_t flips) {
   return flips == 0 ? 1 : std::min(1.0, 2 * FairBinomialCdf(least, flips));
 }
 
-/// The most successes of the rarer kind among `flips` that exact McNemar still rejects; -1: none.
-std::int64_t RejectedUpTo(std::int64_t flips, double alpha) {
-  std::int64_t limit = -1;
-  while (limit + 1 <= flips / 2 && ExactMcNemarP(limit + 1, flips) <= alpha * (1 + kRounding)) ++limit;
-  return limit;
+/// P(X <= k), X ~ Bin(n, p).
+double BinomialCdf(std::int64_t k, std::int64_t n, double p) {
+  if (k < 0) return 0;
+  if (k >= n) return 1;
+  return BetaCdf(static_cast<double>(n - k), static_cast<double>(k + 1), 1 - p);
 }
 
-/// P(exact McNemar rejects | flips), each flip the first's with probability `share`.
-double RejectionGiven(std::int64_t flips, double share, std::int64_t limit) {
-  double power = 0;
-  for (std::int64_t b = 0; b <= limit; ++b) power += BinomialPmf(b, flips, share);
-  for (std::int64_t c = 0; c <= limit && flips - c > limit; ++c) power += BinomialPmf(flips - c, flips, share);
-  return power;
-}
-
-/// What exact McNemar rejects for 0 … most flips; the same for every number of pairs.
-struct McNemarRejections {
-  McNemarRejections(const FlipRates& flip_rates, std::int64_t most, double alpha) : rates(flip_rates) {
+/// What exact McNemar rejects for 0, 1, 2 … flips; the same for every number of pairs, so kept while sizes are tried.
+class McNemarRejections {
+ public:
+  McNemarRejections(const FlipRates& rates, double alpha) : alpha_(alpha) {
     RequireShare(rates.only_first, "only_first");
     RequireShare(rates.only_second, "only_second");
-    discordance = rates.only_first + rates.only_second;
-    if (discordance > 1 + kRounding)
-      throw InvalidInput("statistics: flips of {} of the pairs, wanted at most 1", discordance);
-    discordance = std::min(discordance, 1.0);
-    for (std::int64_t flips = 0; flips <= most && discordance > 0; ++flips) {
-      given.push_back(RejectionGiven(flips, rates.only_first / discordance, RejectedUpTo(flips, alpha)));
-    }
+    const double sum = rates.only_first + rates.only_second;
+    if (sum > 1 + kRounding) throw InvalidInput("statistics: flips of {} of the pairs, wanted at most 1", sum);
+    discordance_ = std::min(sum, 1.0);
+    share_ = sum > 0 ? rates.only_first / sum : 0;
   }
-  double Power(std::int64_t pairs) const {
-    if (discordance == 0) return 0;
+
+  double Power(std::int64_t pairs) {
+    if (discordance_ == 0) return 0;
     double power = 0;
     for (std::int64_t flips = 0; flips <= pairs; ++flips) {
-      power += BinomialPmf(flips, pairs, discordance) * given[static_cast<std::size_t>(flips)];
+      power += BinomialPmf(flips, pairs, discordance_) * Given(flips);
     }
     return power;
   }
-  FlipRates rates;
-  double discordance = 0;
-  std::vector<double> given;  ///< [flips] power
+
+ private:
+  /// P(it rejects | flips), each flip the first's with probability `share_`.
+  double Given(std::int64_t flips) {
+    while (static_cast<std::int64_t>(given_.size()) <= flips) {
+      const std::int64_t n = static_cast<std::int64_t>(given_.size());
+      // The most flips of the rarer kind that are still rejected; it never falls as n grows.
+      while (limit_ + 1 <= n / 2 && ExactMcNemarP(limit_ + 1, n) <= alpha_ * (1 + kRounding)) ++limit_;
+      given_.push_back(BinomialCdf(limit_, n, share_) + BinomialCdf(limit_, n, 1 - share_));
+    }
+    return given_[static_cast<std::size_t>(flips)];
+  }
+
+  double alpha_, discordance_ = 0, share_ = 0;
+  std::int64_t limit_ = -1;
+  std::vector<double> given_;  ///< [flips]
 };
 
 /// Two-sided Fisher p of every table with these margins, by successes of the first group.
@@ -154,13 +158,13 @@ Number DetectableDifference(double p, std::int64_t n, const Promise& promise) {
 double McNemarPower(std::int64_t pairs, const FlipRates& rates, double alpha) {
   RequireInside(alpha, "alpha");
   if (pairs < 0) throw InvalidInput("statistics: {} pairs, wanted at least 0", pairs);
-  return McNemarRejections(rates, pairs, alpha).Power(pairs);
+  return McNemarRejections(rates, alpha).Power(pairs);
 }
 
 SampleSize PairsForMcNemar(const FlipRates& rates, const Promise& promise, std::int64_t most) {
   Check(promise);
   if (rates.only_first == rates.only_second) return {.exact = Undefined{"both flips are equally frequent"}, .n = 0};
-  const McNemarRejections rejections(rates, most, promise.alpha);
+  McNemarRejections rejections(rates, promise.alpha);
   const Undefined too_many{fmt::format("more than {} pairs", most)};
   std::int64_t enough = 2;
   while (enough < most && rejections.Power(enough) < promise.power) enough = std::min(most, enough * 2);

@@ -50,7 +50,7 @@ double TangoScore(const PairedOutcomes& outcomes, double delta) {
 
 /// Where the falling score crosses `target` within [low, high], to the last bit.
 double CrossingOf(const PairedOutcomes& outcomes, double target, Interval within) {
-  for (int halving = 0; halving < 200; ++halving) {
+  for (int halving = 0; halving < 64; ++halving) {
     const double middle = (within.low + within.high) / 2;
     (TangoScore(outcomes, middle) > target ? within.low : within.high) = middle;
   }

@@ -22,7 +22,7 @@ double Growth(double first_rate, double second_rate, bool first, bool second) {
 /// Bisection for where `is_inside` ends, from a point inside towards one outside.
 template <typename IsInside>
 double EdgeOf(double inside, double outside, IsInside is_inside) {
-  for (int halving = 0; halving < 200; ++halving) {
+  for (int halving = 0; halving < 64; ++halving) {
     const double middle = (inside + outside) / 2;
     (is_inside(middle) ? inside : outside) = middle;
   }

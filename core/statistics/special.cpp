@@ -17,6 +17,24 @@ void Require(bool holds, const char* name, double found, const char* wanted) {
   if (!holds) throw InvalidInput("statistics: {} is {}, wanted {}", name, found, wanted);
 }
 
+/// The distribution function rises through `is_below` to 1; found to the last bit in log x, so that tiny ones are
+/// exact.
+template <typename IsBelow>
+double BisectLog(IsBelow is_below) {
+  double low = -745, high = 0;  // log of the smallest double … of 1
+  for (int halving = 0; halving < 200; ++halving) {
+    const double middle = (low + high) / 2;
+    (is_below(std::exp(middle)) ? low : high) = middle;
+  }
+  return std::exp((low + high) / 2);
+}
+
+/// What Boost's root finder gives up on: shapes so lopsided that the quantile is next to 0 or 1.
+double SlowBetaQuantile(double p, double a, double b) {
+  if (boost::math::ibeta(a, b, 0.5) >= p) return BisectLog([&](double x) { return boost::math::ibeta(a, b, x) < p; });
+  return 1 - BisectLog([&](double rest) { return boost::math::ibetac(b, a, rest) > p; });
+}
+
 }  // namespace
 
 double NormalCdf(double x) {
@@ -45,7 +63,11 @@ double BetaQuantile(double p, double a, double b) {
   Require(a > 0 && std::isfinite(a), "a", a, "above 0");
   Require(b > 0 && std::isfinite(b), "b", b, "above 0");
   Require(p >= 0 && p <= 1, "probability", p, "0 <= p <= 1");
-  return boost::math::ibeta_inv(a, b, p);
+  try {
+    return boost::math::ibeta_inv(a, b, p);
+  } catch (const boost::math::evaluation_error&) {
+    return SlowBetaQuantile(p, a, b);
+  }
 }
 
 double ChiSquareTail(double x, double degrees) {

@@ -51,7 +51,7 @@ class Region {
   /// The largest probability of the set under any common rate: a fine grid in arcsin sqrt(p), where every bump of the
   /// polynomial has about the same width, then each summit by golden section.
   double WorstCase() const {
-    const int steps = 4000;
+    const int steps = 400 + static_cast<int>(40 * std::sqrt(static_cast<double>(total_)));
     std::vector<long double> height;
     for (int i = 0; i <= steps; ++i) height.push_back(At(Angle(i, steps)));
     long double best = std::ranges::max(height);

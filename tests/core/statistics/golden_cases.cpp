@@ -76,6 +76,8 @@ std::optional<std::string> FirstDifference(const GoldenCase& golden) {
   } catch (const Json::exception& error) {  // a missing argument, or one of another type
     if (golden.status == "error") return std::nullopt;
     return fmt::format("inputs not understood: {}", error.what());
+  } catch (const std::exception& error) {
+    return fmt::format("broke down: {}", error.what());
   }
 }
 

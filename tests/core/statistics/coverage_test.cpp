@@ -1,0 +1,78 @@
+#include "tests/core/statistics/coverage.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdlib>
+
+namespace evac::coverage {
+namespace {
+
+/// EVAC_LONG=1: enough to see a per cent; else enough to see a broken formula.
+SimulationOptions Options() {
+  const char* is_long = std::getenv("EVAC_LONG");
+  return {.replicates = is_long && is_long[0] == '1' ? 20000 : 1000, .seed = 11};
+}
+
+/// Four standard errors of a share near `share`.
+double Noise(double share) { return 4 * std::sqrt(share * (1 - share) / Options().replicates); }
+
+const Coverage& Of(const Row& row, const std::string& method) {
+  return *std::ranges::find(row.methods, method, &Coverage::method);
+}
+
+double MeanShare(const std::vector<Row>& rows, const std::string& method) {
+  double sum = 0;
+  for (const Row& row : rows) sum += Of(row, method).share;
+  return sum / static_cast<double>(rows.size());
+}
+
+TEST(Coverage, WilsonHoldsItsPromiseOnAverageAndClopperPearsonAlways) {
+  const std::vector<Row> rows = Rates(Options());
+  EXPECT_NEAR(MeanShare(rows, "Wilson"), 0.95, 0.015);
+  for (const Row& row : rows) {
+    EXPECT_GT(Of(row, "Wilson").share, 0.90 - Noise(0.9)) << row.setting << ", n " << row.n;
+    EXPECT_GT(Of(row, "Clopper-Pearson").share, 0.95 - Noise(0.95)) << row.setting << ", n " << row.n;
+    EXPECT_LT(Of(row, "Wilson").mean_width, Of(row, "Clopper-Pearson").mean_width) << row.setting << ", n " << row.n;
+  }
+}
+
+TEST(Coverage, TangoAndNewcombeHoldTheirPromiseAtTheSizesOfLabs) {
+  for (const Row& row : Differences(Options())) {
+    EXPECT_GT(Of(row, "Tango (paired)").share, 0.93 - Noise(0.93)) << row.setting << ", n " << row.n;
+    EXPECT_GT(Of(row, "Bonett-Price (paired)").share, 0.93 - Noise(0.93)) << row.setting << ", n " << row.n;
+    EXPECT_GT(Of(row, "Newcombe (unpaired)").share, 0.93 - Noise(0.93)) << row.setting << ", n " << row.n;
+  }
+}
+
+TEST(Coverage, MoverAndBettingHoldTheirPromiseWherePpiPlusPlusDoesNot) {
+  double worst_normal = 1;
+  for (const Row& row : FewReal(Options())) {
+    EXPECT_GT(Of(row, "MOVER").share, 0.94 - Noise(0.94)) << row.setting << ", n " << row.n;
+    EXPECT_GT(Of(row, "betting").share, 0.95 - Noise(0.95)) << row.setting << ", n " << row.n;
+    worst_normal = std::min(worst_normal, Of(row, "PPI++ normal").share);
+  }
+  EXPECT_LT(worst_normal, 0.6) << "the reason why it is not shown";
+}
+
+TEST(Coverage, TheBootstrapCoversWhatOtherStatesWouldHaveGiven) {
+  const SimulationOptions options{.replicates = Options().replicates / 10, .seed = 11};
+  for (const Row& row : Bootstrap(options)) {
+    const double noise = 4 * std::sqrt(0.9 * 0.1 / options.replicates);
+    EXPECT_GT(Of(row, "percentile, of the mean r").share, 0.90 - noise) << row.setting << ", n " << row.n;
+  }
+}
+
+TEST(Peeking, SequentialTestsKeepTheirAlphaAndFixedOnesDoNot) {
+  double worst_z = 0;
+  for (const FalseAlarms& row : Peeking(Options())) {
+    if (row.test == "z every 5") worst_z = std::max(worst_z, row.share);
+    if (row.test.find("every step") == std::string::npos) continue;
+    EXPECT_LE(row.share, 0.05 + Noise(0.05)) << row.test << ", " << row.setting;
+  }
+  EXPECT_GT(worst_z, 0.2) << "peeking is what breaks it";
+}
+
+}  // namespace
+}  // namespace evac::coverage

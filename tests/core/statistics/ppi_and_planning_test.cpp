@@ -1,0 +1,125 @@
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "core/error.h"
+#include "core/statistics/betting.h"
+#include "core/statistics/planning.h"
+#include "core/statistics/ppi.h"
+
+namespace evac {
+namespace {
+
+TEST(Betting, TheMirroredValuesHaveTheMirroredInterval) {
+  const std::vector<double> values{0.2, 0.9, 0.4, 0.4, 1, 0, 0.7};
+  std::vector<double> mirrored;
+  for (const double value : values) mirrored.push_back(1 - value);
+  const Interval one = *BettingInterval(values).interval, other = *BettingInterval(mirrored).interval;
+  EXPECT_NEAR(one.low, 1 - other.high, 1e-12);
+  EXPECT_NEAR(one.high, 1 - other.low, 1e-12);
+}
+
+TEST(Betting, EdgesAreAnsweredAndNonsenseIsRefused) {
+  EXPECT_FALSE(BettingInterval({}).value);
+  EXPECT_EQ(BettingInterval({}).interval->high, 1);
+  const std::vector<double> ones(30, 1.0), zeros(30, 0.0);
+  EXPECT_EQ(BettingInterval(ones).interval->high, 1);
+  EXPECT_GT(BettingInterval(ones).interval->low, 0.7);
+  EXPECT_EQ(BettingInterval(zeros).interval->low, 0);
+  EXPECT_THROW(BettingInterval(std::vector{1.5}), Error);
+  EXPECT_THROW(BettingInterval(ones, {.confidence = 1}), Error);
+  EXPECT_THROW(BettingInterval(ones, {.truncation = 0}), Error);
+}
+
+TEST(Betting, AShuffleKeepsTheValuesAndDependsOnTheSeedAlone) {
+  const std::vector<double> values{1, 2, 3, 4, 5, 6, 7, 8};
+  EXPECT_THAT(SeededShuffle(values, 4), testing::UnorderedElementsAreArray(values));
+  EXPECT_EQ(SeededShuffle(values, 4), SeededShuffle(values, 4));
+  EXPECT_NE(SeededShuffle(values, 4), SeededShuffle(values, 5));
+}
+
+TEST(Ppi, TheNormalIntervalMayOnlyBeShownWhereItCovers) {
+  const Count more{1290, 2000};
+  EXPECT_TRUE(PpiMean({22, 3, 4, 11}, more, PpiWeight::kTuned).allowed);
+  EXPECT_FALSE(PpiMean({11, 3, 4, 11}, more, PpiWeight::kTuned).allowed) << "29 real trials";
+  EXPECT_FALSE(PpiMean({25, 2, 2, 11}, more, PpiWeight::kTuned).allowed) << "4 pairs differ";
+}
+
+TEST(Ppi, WithoutFurtherOutcomesTheRealTrialsStandAlone) {
+  const PpiEstimate tuned = PpiMean({5, 1, 2, 2}, {0, 0}, PpiWeight::kTuned);
+  EXPECT_EQ(tuned.lambda, 0);
+  EXPECT_NEAR(*tuned.value, 0.6, 1e-12);
+  EXPECT_FALSE(PpiMean({5, 1, 2, 2}, {0, 0}, PpiWeight::kFull).value);
+  EXPECT_FALSE(PpiMover({5, 1, 2, 2}, {0, 0}).value);
+  EXPECT_FALSE(PpiMover({}, {5, 9}).value);
+  EXPECT_EQ(PpiMover({}, {5, 9}).interval->high, 1);
+  EXPECT_FALSE(PpiBetting({}, {true}).value);
+  EXPECT_THROW(PpiMean({-1, 0, 0, 2}, {0, 0}, PpiWeight::kTuned), Error);
+}
+
+TEST(Ppi, AModelThatIsAlwaysRightIsWorthItsTrials) {
+  const Estimate few = WilsonInterval(30, 40), predicted = PpiMover({30, 0, 0, 10}, {1500, 2000});
+  const double alone = few.interval->high - few.interval->low;
+  EXPECT_LT(predicted.interval->high - predicted.interval->low, 0.75 * alone);
+  EXPECT_NEAR(*predicted.value, 0.75, 1e-12);
+}
+
+TEST(Ppi, BettingDependsOnTheSeedOnlyAndStaysWithinTheUnitInterval) {
+  const std::vector<BothOutcomes> paired(12, {true, true});
+  const std::vector<bool> more(100, true);
+  const Estimate one = PpiBetting(paired, more, {.seed = 3}), again = PpiBetting(paired, more, {.seed = 3});
+  EXPECT_EQ(one.interval->low, again.interval->low);
+  EXPECT_EQ(one.interval->high, 1);
+  EXPECT_EQ(*one.value, 1);
+}
+
+TEST(Planning, TheNumbersOfThePaperReviewComeOut) {
+  EXPECT_NEAR(WilsonHalfWidth(0.5, 40), 0.148, 5e-4);
+  EXPECT_NEAR(WilsonHalfWidth(0.9, 40), 0.095, 1e-3);
+  EXPECT_EQ(TrialsPerPolicy(0.5, 0.65).n, 170);
+  EXPECT_EQ(TrialsPerPolicy(0.5, 0.8).n, 39);
+  EXPECT_NEAR(*DetectableDifference(0.5, 40), 0.30, 0.01);
+  EXPECT_NEAR(McNemarPower(40, {0.30, 0.05}), 0.74, 0.01);
+  EXPECT_NEAR(McNemarPower(100, {0.20, 0.05}), 0.84, 0.01);
+  EXPECT_NEAR(PanelOf(3, 0.9).majority_right, 0.972, 1e-3);
+  EXPECT_NEAR(PanelOf(3, 0.9).split, 0.27, 1e-3);
+}
+
+TEST(Planning, TheSizeIsTheFirstThatIsEnough) {
+  const std::int64_t n = TrialsForHalfWidth(0.3, 0.07);
+  EXPECT_LE(WilsonHalfWidth(0.3, n), 0.07);
+  EXPECT_GT(WilsonHalfWidth(0.3, n - 1), 0.07);
+  const FlipRates rates{0.25, 0.05};
+  const std::int64_t pairs = PairsForMcNemar(rates).n;
+  EXPECT_GE(McNemarPower(pairs, rates), 0.8);
+  EXPECT_LT(McNemarPower(pairs - 1, rates), 0.8);
+  for (int more = 0; more < 20; ++more) EXPECT_GE(McNemarPower(pairs + more, rates), 0.8);
+  EXPECT_EQ(RatersFor(0.9, 0.97), 3);
+  EXPECT_EQ(RatersFor(0.9, 0.9), 1);
+  EXPECT_EQ(RatersFor(0.5, 0.9), 0);
+}
+
+TEST(Planning, WhatNoSizeCanShowIsUndefinedAndNonsenseIsRefused) {
+  EXPECT_FALSE(TrialsPerPolicy(0.4, 0.4).exact);
+  EXPECT_FALSE(PairsForMcNemar({0.1, 0.1}).exact);
+  EXPECT_FALSE(PairsForMcNemar({0.101, 0.1}, {}, 200).exact) << "more than 200";
+  EXPECT_FALSE(PointsForCorrelation(0).exact);
+  EXPECT_FALSE(PointsForCorrelation(1).exact);
+  EXPECT_FALSE(DetectableDifference(0.5, 2));
+  EXPECT_EQ(McNemarPower(0, {0.5, 0.1}), 0);
+  EXPECT_EQ(McNemarPower(40, {0, 0}), 0);
+  EXPECT_NEAR(McNemarPower(40, {1, 0}), 1, 1e-12);
+  EXPECT_NEAR(FisherPower(10, 0, 1), 1, 1e-12);
+  EXPECT_THROW(TrialsPerPolicy(0.4, 1.4), Error);
+  EXPECT_THROW(TrialsPerPolicy(0.4, 0.5, {.alpha = 0}), Error);
+  EXPECT_THROW(McNemarPower(40, {0.7, 0.7}), Error);
+  EXPECT_THROW(TrialsForHalfWidth(0.4, 0), Error);
+  EXPECT_THROW(PanelOf(0, 0.9), Error);
+}
+
+TEST(Planning, NonInferiorityNeedsTheSizesOfTheDesign) {
+  EXPECT_NEAR(static_cast<double>(TrialsForNonInferiority(0.7, 0.1).n), 260, 3);
+  EXPECT_NEAR(static_cast<double>(PairsForNonInferiority(0.2, 0.1).n), 124, 1);
+}
+
+}  // namespace
+}  // namespace evac

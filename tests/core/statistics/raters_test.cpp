@@ -1,0 +1,171 @@
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "core/error.h"
+#include "core/seed.h"
+#include "core/statistics/bradley_terry.h"
+#include "core/statistics/confusion.h"
+#include "core/statistics/dawid_skene.h"
+#include "core/statistics/rater_agreement.h"
+#include "core/statistics/votes.h"
+
+namespace evac {
+namespace {
+
+using testing::HasSubstr;
+using Counts = std::vector<std::vector<std::int64_t>>;
+using Ratings = std::vector<std::vector<std::optional<double>>>;
+
+TEST(FleissKappa, OnCompleteDataItIsRelatedToKrippendorffsAlpha) {
+  SplitMix64 random(5);
+  Counts counts;
+  Ratings ratings(3);
+  for (int item = 0; item < 30; ++item) {
+    counts.push_back({0, 0, 0});
+    for (auto& rater : ratings) {
+      const auto said = random.Below(3);
+      rater.push_back(static_cast<double>(said));
+      ++counts.back()[said];
+    }
+  }
+  const double kappa = *FleissKappaOf(counts).kappa, pairs = 30 * 3;
+  EXPECT_NEAR(*KrippendorffAlpha(ratings, RatingMetric::kNominal), 1 - (1 - kappa) * (pairs - 1) / pairs, 1e-12);
+}
+
+TEST(FleissKappa, WhatItCannotSayIsUndefinedOrRefused) {
+  EXPECT_FALSE(FleissKappaOf({}).kappa);
+  EXPECT_FALSE(FleissKappaOf({{1, 0}, {0, 1}}).kappa);
+  EXPECT_FALSE(FleissKappaOf({{3, 0}, {3, 0}}).kappa);
+  EXPECT_EQ(*FleissKappaOf({{3, 0}, {3, 0}}).agreement, 1);
+  EXPECT_THROW(FleissKappaOf({{3, 0}, {2, 0}}), Error);
+  EXPECT_THROW(FleissKappaOf({{3, 0}, {3}}), Error);
+  EXPECT_THROW(FleissKappaOf({{4, -1}, {3, 0}}), Error);
+  const FleissKappa skewed = FleissKappaOf({{3, 0, 0}, {2, 1, 0}});
+  EXPECT_FALSE(skewed.kappa_of_category[2]) << "nobody chose it";
+}
+
+TEST(KrippendorffAlpha, OrderOfRatersAndScaleDoNotMatter) {
+  const Ratings ratings{{1, 2, 3, 3, {}}, {1, 2, 2, {}, 5}, {{}, 2, 3, 4, 5}};
+  const Ratings swapped{ratings[2], ratings[0], ratings[1]};
+  Ratings doubled = ratings;
+  for (auto& rater : doubled) {
+    for (auto& rating : rater) rating = rating ? std::optional(*rating * 2) : rating;
+  }
+  for (const auto metric :
+       {RatingMetric::kNominal, RatingMetric::kOrdinal, RatingMetric::kInterval, RatingMetric::kRatio}) {
+    EXPECT_NEAR(*KrippendorffAlpha(ratings, metric), *KrippendorffAlpha(swapped, metric), 1e-12);
+    EXPECT_NEAR(*KrippendorffAlpha(ratings, metric), *KrippendorffAlpha(doubled, metric), 1e-12);
+  }
+}
+
+TEST(KrippendorffAlpha, WithoutPairsOrVariationItIsUndefined) {
+  EXPECT_FALSE(KrippendorffAlpha({}, RatingMetric::kNominal));
+  EXPECT_FALSE(KrippendorffAlpha({{1, {}}, {{}, 2}}, RatingMetric::kNominal));
+  EXPECT_FALSE(KrippendorffAlpha({{1, 1}, {1, 1}}, RatingMetric::kOrdinal));
+  EXPECT_THROW(KrippendorffAlpha({{1, 1}, {1}}, RatingMetric::kOrdinal), Error);
+  EXPECT_THROW(KrippendorffAlpha({{-1}, {1}}, RatingMetric::kRatio), Error);
+}
+
+TEST(ConfusionTable, AnEmptyOrConstantOneLeavesUndefinedWhatItMust) {
+  const ConfusionStatistics empty = StatisticsOf({});
+  EXPECT_FALSE(empty.accuracy);
+  EXPECT_FALSE(empty.kappa.value);
+  const ConfusionStatistics all_failures = StatisticsOf({.both_failure = 12});
+  EXPECT_FALSE(all_failures.kappa.value);
+  EXPECT_FALSE(all_failures.sensitivity);
+  EXPECT_FALSE(all_failures.f1);
+  EXPECT_EQ(*all_failures.gwet_ac1, 1);
+  EXPECT_THROW(StatisticsOf({.both_success = -1}), Error);
+}
+
+TEST(ConfusionTable, SwappingJudgeAndHumanKeepsTheAgreementAndTurnsTheBias) {
+  const ConfusionStatistics one = StatisticsOf({25, 4, 3, 8}), other = StatisticsOf({25, 3, 4, 8});
+  EXPECT_NEAR(*one.kappa.value, *other.kappa.value, 1e-12);
+  EXPECT_NEAR(*one.kappa_se, *other.kappa_se, 1e-12);
+  EXPECT_NEAR(*one.bias, -*other.bias, 1e-12);
+  EXPECT_NEAR(*one.matthews, *other.matthews, 1e-12);
+}
+
+TEST(RoganGladen, APerfectJudgeIsBelievedAndAUselessOneIsNot) {
+  EXPECT_NEAR(*RoganGladen({0.3, 100}, {1, 1, 20, 20}).rate, 0.3, 1e-12);
+  EXPECT_FALSE(RoganGladen({0.3, 100}, {0.7, 0.3, 20, 20}).rate);
+  EXPECT_FALSE(RoganGladen({0.3, 100}, {0.9, 0.9, 0, 20}).se);
+  EXPECT_THROW(RoganGladen({1.3, 100}, {}), Error);
+}
+
+TEST(Calibration, PerfectProbabilitiesCostNothingAndBadInputIsRefused) {
+  const std::vector<double> p{1, 0, 1};
+  const std::vector<int> outcomes{1, 0, 1};
+  EXPECT_NEAR(*CalibrationOf(p, outcomes).brier, 0, 1e-12);
+  EXPECT_NEAR(*CalibrationOf(p, outcomes).ece, 0, 1e-12);
+  EXPECT_FALSE(CalibrationOf({}, {}).brier);
+  EXPECT_THROW(CalibrationOf(p, std::vector{1, 0}), Error);
+  EXPECT_THROW(CalibrationOf(p, std::vector{1, 0, 2}), Error);
+  EXPECT_THROW(CalibrationOf(p, outcomes, {.bins = 0}), Error);
+}
+
+TEST(Votes, UnsureAndMissingDecideNothing) {
+  const std::vector<Vote> votes{Vote::kUnsure, Vote::kMissing, Vote::kFailure};
+  const Majority majority = MajorityOf(votes);
+  EXPECT_EQ(majority.success, false);
+  EXPECT_EQ(majority.valid, 1);
+  EXPECT_FALSE(MajorityOf({}).success);
+  EXPECT_FALSE(BangBlindingIndex({}).index);
+  EXPECT_THROW(BangBlindingIndex({-1, 0, 0}), Error);
+}
+
+TEST(DawidSkene, FindsTheBadRater) {
+  SplitMix64 random(2);
+  RaterCounts counts;
+  counts.of_rater.assign(3, Eigen::MatrixXd::Zero(200, 2));
+  const double accuracy[] = {0.95, 0.9, 0.55};
+  for (int item = 0; item < 200; ++item) {
+    const int truth = random.Uniform() < 0.6;
+    for (std::size_t rater = 0; rater < 3; ++rater) {
+      const int said = random.Uniform() < accuracy[rater] ? truth : 1 - truth;
+      counts.of_rater[rater](item, said) = 1;
+    }
+  }
+  const DawidSkene model = FitDawidSkene(counts);
+  EXPECT_NEAR(model.prior(1), 0.6, 0.1);
+  EXPECT_GT(model.confusion[0](1, 1), 0.85);
+  EXPECT_LT(model.confusion[2](1, 1), 0.75);
+  EXPECT_THROW(FitDawidSkene({}), Error);
+  counts.of_rater[0].resize(3, 2);
+  EXPECT_THROW(FitDawidSkene(counts), Error);
+}
+
+TEST(DawidSkene, AnItemThatNobodyRatedHasThePriorAsItsAnswer) {
+  RaterCounts counts;
+  counts.of_rater.assign(1, Eigen::MatrixXd::Zero(3, 2));
+  counts.of_rater[0](0, 1) = counts.of_rater[0](1, 1) = 1;
+  const DawidSkene model = FitDawidSkene(counts);
+  EXPECT_NEAR(model.posterior(2, 1), model.prior(1), 1e-6);
+}
+
+TEST(BradleyTerry, SeparatedOrDisconnectedPoliciesNeedARidge) {
+  Eigen::MatrixXd separated(3, 3);
+  separated << 0, 4, 5, 0, 0, 3, 0, 2, 0;
+  const auto refused = FitBradleyTerry(separated, 0);
+  EXPECT_FALSE(refused);
+  EXPECT_THAT(refused.reason(), HasSubstr("never lost"));
+  const auto ridged = FitBradleyTerry(separated, 1);
+  ASSERT_TRUE(ridged);
+  EXPECT_GT(ridged->strength(0), ridged->strength(1));
+  EXPECT_NEAR(ridged->strength.sum(), 0, 1e-12);
+  EXPECT_FALSE(FitBradleyTerry(Eigen::MatrixXd::Zero(2, 2), 0));
+  EXPECT_FALSE(FitBradleyTerry(Eigen::MatrixXd(), 1));
+  EXPECT_THROW(FitBradleyTerry(Eigen::MatrixXd::Zero(2, 3), 1), Error);
+  EXPECT_THROW(FitBradleyTerry(-Eigen::MatrixXd::Ones(2, 2), 1), Error);
+}
+
+TEST(BradleyTerry, OfTwoPoliciesItIsTheLogOdds) {
+  Eigen::MatrixXd wins(2, 2);
+  wins << 0, 12, 5, 0;
+  const auto fit = FitBradleyTerry(wins, 0);
+  EXPECT_NEAR(fit->strength(0) - fit->strength(1), std::log(12.0 / 5), 1e-10);
+  EXPECT_NEAR(fit->SeOfDifference(0, 1), std::sqrt(1 / 12.0 + 1 / 5.0), 1e-10);
+}
+
+}  // namespace
+}  // namespace evac
