@@ -1,5 +1,6 @@
 #include "policies/visual_things.h"
 
+#include <algorithm>
 #include <numbers>
 
 #include "core/error.h"
@@ -10,7 +11,8 @@ namespace {
 constexpr double kRadians = std::numbers::pi / 180;
 constexpr double kSmallestPatchPx = 4;  // in a picture 96 wide; grows with the area
 constexpr double kSecondPatch = 0.15;  // of the largest patch: a thing cut in two by what stands before it is still one
-constexpr double kThingReach_m = 0.30;   // a tall thing's upper end is seen against the table this far behind its foot
+constexpr double kReach_m = 0.06;        // half a thing's width
+constexpr double kReachOfHeight = 1.3;   // its upper end is seen against the table this far behind its foot, per metre
 constexpr double kPoorestOverlap = 0.2;  // below it the patch is something else
 
 double SmallestPatchPx(const View& view) {
@@ -26,13 +28,23 @@ cv::Mat MainCover(const std::vector<Blob>& blobs) {
   return cover;
 }
 
+/// How far from its place something of the thing can be seen against the table.
+double Reach(const Thing& thing) {
+  double top_m = 0;
+  for (const ConvexPart& part : thing.shape) {
+    for (const Eigen::Vector3d& point_m : part.points_m) top_m = std::max(top_m, point_m.z());
+  }
+  return kReach_m + kReachOfHeight * top_m;
+}
+
 /// The picture, black where it cannot show the thing.
 cv::Mat WhereItMayBe(const View& view, const Thing& thing, const Prior& prior) {
+  const double within_m = prior.within_m + Reach(thing);
   cv::Mat3b rgb = view.rgb->clone();
   for (int v = 0; v < rgb.rows; ++v) {
     for (int u = 0; u < rgb.cols; ++u) {
       const auto point_m = OnPlane(view.camera, view.base_from_camera, {u + 0.5, v + 0.5}, thing.height_m);
-      const bool may = point_m && (point_m->head<2>() - prior.placement.xy_m).norm() < prior.within_m + kThingReach_m;
+      const bool may = point_m && (point_m->head<2>() - prior.placement.xy_m).norm() < within_m;
       if (!may) rgb(v, u) = cv::Vec3b(0, 0, 0);
     }
   }
@@ -99,7 +111,7 @@ PickKnowledge TakeToast() {
 
 Thing Ham() {
   Thing ham;
-  ham.colour = {.hue_deg = 3, .hue_tolerance_deg = 15, .min_saturation = 0.3, .min_value = 0.15};
+  ham.colour = {.hue_deg = 1, .hue_tolerance_deg = 20, .min_saturation = 0.25, .min_value = 0.1};
   ham.shape = {Cuboid({-0.029, -0.046, 0}, {0.029, 0.046, 0.004}), Cuboid({-0.027, -0.003, 0}, {0.027, 0.003, 0.031})};
   ham.height_m = 0.008;
   ham.yaw_reach_rad = 11 * kRadians;
@@ -118,7 +130,7 @@ Thing Bread() {
 PickKnowledge TakeHam() {
   PickKnowledge knowledge;
   knowledge.thing = Ham();
-  knowledge.held = {Cuboid({-0.028, -0.010, -0.020}, {0.028, 0.010, 0.031})};
+  knowledge.held = {Cuboid({0.012, -0.008, -0.020}, {0.028, 0.008, 0.030})};
   knowledge.usual = {{{0.44, -0.14}, 0}, 0.12};
   knowledge.grasp_m = 0.035;
   knowledge.hover_m = 0.165;
@@ -149,7 +161,7 @@ Thing Bowl() {
 PickKnowledge TakeLettuce() {
   PickKnowledge knowledge;
   knowledge.thing = Leaf();
-  knowledge.held = {Cuboid({-0.022, -0.012, -0.010}, {0.055, 0.012, 0.020})};
+  knowledge.held = {Cuboid({0.012, -0.012, -0.010}, {0.055, 0.012, 0.020})};
   knowledge.usual = {{{0.44, -0.14}, 0}, 0.12};
   knowledge.grasp_m = 0.027;
   knowledge.hover_m = 0.165;

@@ -41,7 +41,7 @@ double VisibleShare(const View& view, const Thing& thing, const Eigen::Isometry3
 /// How to pick one thing and place it.
 struct PickKnowledge {
   Thing thing;                  ///< as it stands at the beginning
-  Shape held;                   ///< as it hangs in the hand, in the same frame; empty: as it stands
+  Shape held;                   ///< what shows of it beside the fingers while it hangs in the hand; empty: as it stands
   Prior usual;                  ///< where it is when nothing is seen
   double grasp_m = 0;           ///< height of the gripper at the grasp, base frame
   double hover_m = 0;           ///< height from which the wrist camera looks, base frame
