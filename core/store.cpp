@@ -190,6 +190,22 @@ std::map<std::string, std::map<std::string, Verdict>> Store::CurrentVerdicts() c
   return current;
 }
 
+void Store::AddRealTrials(const std::vector<RealTrial>& trials) {
+  database_->Write([&](auto& connection) {
+    for (const RealTrial& trial : trials) rows::InsertRealTrial(connection, trial);
+  });
+}
+
+std::vector<RealTrial> Store::RealTrials() const { return database_->Read(rows::SelectRealTrials); }
+
+void Store::AddLooks(const std::vector<SequentialLook>& looks) {
+  database_->Write([&](auto& connection) {
+    for (const SequentialLook& look : looks) rows::InsertLook(connection, look);
+  });
+}
+
+std::vector<SequentialLook> Store::Looks() const { return database_->Read(rows::SelectLooks); }
+
 void Store::Count(const std::string& policy, const Counters& counters) {
   database_->Write([&](auto& connection) { rows::AddToCounters(connection, policy, counters); });
 }

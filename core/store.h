@@ -41,6 +41,25 @@ struct EpisodeRecord {
   std::string thumbnail_jpeg;          ///< bytes; empty when there is no frame
 };
 
+/// One trial on a real robot that evac did not run: imported, append-only.
+struct RealTrial {
+  std::string task, initial_state, policy, checkpoint;
+  std::int64_t trial = 0;  ///< counts repeats of the same (task, initial state, policy, checkpoint)
+  Label outcome = Label::kCannotTell;
+  std::string video;   ///< relative to the run's folder; empty: none
+  std::string source;  ///< where it came from: "trials.csv:12"
+  bool operator==(const RealTrial&) const = default;
+};
+
+/// One look at a sequential comparison: what the bet was worth then. Its p-value is 1 / the largest of all looks.
+struct SequentialLook {
+  std::string comparison;  ///< which policies, world and judge
+  std::string task;        ///< empty: all tasks together
+  std::int64_t pairs = 0, only_first = 0, only_second = 0;
+  double e_value = 1;
+  bool operator==(const SequentialLook&) const = default;
+};
+
 /// How often the wire misbehaved, by name ("repeats", "stale_replies", …): counts of effort, no part of a result.
 using Counters = std::map<std::string, std::int64_t>;
 
@@ -98,6 +117,17 @@ class Store {
   std::vector<Verdict> Verdicts() const;
   /// The current one per (episode id, judge): the last added.
   std::map<std::string, std::map<std::string, Verdict>> CurrentVerdicts() const;
+
+  /// All of them or none. @throws InternalError if one of the same task, state, policy, checkpoint and trial is there,
+  /// or its task is not.
+  void AddRealTrials(const std::vector<RealTrial>& trials);
+  /// In the order they were added.
+  std::vector<RealTrial> RealTrials() const;
+
+  /// All of them or none.
+  void AddLooks(const std::vector<SequentialLook>& looks);
+  /// Every look ever taken, oldest first.
+  std::vector<SequentialLook> Looks() const;
 
   /// Adds to the run's counters.
   void Count(const std::string& policy, const Counters& counters);

@@ -45,4 +45,10 @@ std::vector<Verdict> SelectVerdicts(sqlite::Connection& connection);
 void AddToCounters(sqlite::Connection& connection, const std::string& policy, const Counters& counters);
 std::map<std::string, Counters> SelectCounters(sqlite::Connection& connection);
 
+/// Empty where the run is of a schema from before there were any.
+void InsertRealTrial(sqlite::Connection& connection, const RealTrial& trial);
+std::vector<RealTrial> SelectRealTrials(sqlite::Connection& connection);
+void InsertLook(sqlite::Connection& connection, const SequentialLook& look);
+std::vector<SequentialLook> SelectLooks(sqlite::Connection& connection);
+
 }  // namespace evac::rows

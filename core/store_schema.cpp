@@ -82,7 +82,32 @@ WHEN NOT EXISTS (SELECT 1 FROM removals WHERE episode = OLD.episode)
 BEGIN SELECT RAISE(ABORT, 'verdicts are append-only'); END;
 )sql";
 
-constexpr const char* kSteps[] = {kVersion1};
+/// Trials on a real robot, typed in or imported, and what sequential comparisons have bet so far.
+constexpr const char* kVersion2 = R"sql(
+CREATE TABLE real_trials (
+  id INTEGER PRIMARY KEY AUTOINCREMENT,
+  task TEXT NOT NULL REFERENCES tasks (id), initial_state TEXT NOT NULL, policy TEXT NOT NULL, checkpoint TEXT NOT NULL,
+  trial INTEGER NOT NULL,
+  outcome TEXT NOT NULL CHECK (outcome IN ('success', 'failure', 'cannot_tell', 'invalid')),
+  video TEXT, source TEXT NOT NULL,
+  UNIQUE (task, initial_state, policy, checkpoint, trial));
+
+CREATE TABLE sequential_looks (
+  id INTEGER PRIMARY KEY AUTOINCREMENT,
+  comparison TEXT NOT NULL, task TEXT NOT NULL,
+  pairs INTEGER NOT NULL, only_first INTEGER NOT NULL, only_second INTEGER NOT NULL, e_value REAL NOT NULL);
+
+CREATE TRIGGER real_trials_stay_as_they_are BEFORE UPDATE ON real_trials
+BEGIN SELECT RAISE(ABORT, 'real trials are never changed'); END;
+CREATE TRIGGER real_trials_stay BEFORE DELETE ON real_trials
+BEGIN SELECT RAISE(ABORT, 'real trials are never deleted'); END;
+CREATE TRIGGER sequential_looks_stay_as_they_are BEFORE UPDATE ON sequential_looks
+BEGIN SELECT RAISE(ABORT, 'looks are append-only'); END;
+CREATE TRIGGER sequential_looks_stay BEFORE DELETE ON sequential_looks
+BEGIN SELECT RAISE(ABORT, 'looks are append-only'); END;
+)sql";
+
+constexpr const char* kSteps[] = {kVersion1, kVersion2};
 
 std::int64_t Pragma(sqlite::Connection& connection, const char* sql) {
   sqlite::Statement statement = connection.Query(sql);
