@@ -26,22 +26,42 @@ std::vector<std::string> Matches(const std::string& text, const std::string& pat
   return found;
 }
 
+/// The page without its <name>…</name> sections: what is in them is no HTML.
+std::string Without(std::string page, const std::string& name) {
+  const std::string open = "<" + name + ">", close = "</" + name + ">";
+  for (std::size_t begin = page.find(open); begin != std::string::npos; begin = page.find(open))
+    page.erase(begin, page.find(close, begin) + close.size() - begin);
+  return page;
+}
+
+/// "div" or "/div" of each tag, in order. No regular expression: std::regex needs stack for every letter it passes.
+std::vector<std::string> TagNames(const std::string& page) {
+  std::vector<std::string> names;
+  for (std::size_t at = page.find('<'); at != std::string::npos; at = page.find('<', at)) {
+    const std::size_t end_of_name = page.find_first_not_of("abcdefghijklmnopqrstuvwxyz0123456789/", ++at);
+    if (end_of_name == at) continue;  // <!doctype …
+    names.push_back(page.substr(at, end_of_name - at));
+    bool is_quoted = false;
+    for (at = end_of_name; at < page.size() && (is_quoted || page[at] != '>'); ++at) is_quoted ^= page[at] == '"';
+  }
+  return names;
+}
+
 /// The tags left open, or closed without having been opened.
-std::vector<std::string> UnbalancedTags(std::string page) {
+std::vector<std::string> UnbalancedTags(const std::string& page) {
   static const std::set<std::string> kVoid = {"meta",  "wbr",  "img",  "link", "br",
                                               "input", "path", "line", "rect", "circle"};
-  page = std::regex_replace(page, std::regex("<(style|script)>[^]*?</\\1>"), "");
   std::vector<std::string> open;
-  const std::regex tag("<(/?)([a-z0-9]+)((?:[^>\"]|\"[^\"]*\")*)>");
-  for (auto it = std::sregex_iterator(page.begin(), page.end(), tag); it != std::sregex_iterator(); ++it) {
-    const std::string name = (*it)[2];
-    if (kVoid.count(name) > 0) continue;
-    if ((*it)[1] == "") {
+  for (std::string name : TagNames(Without(Without(page, "style"), "script"))) {
+    const bool is_end = name.front() == '/';
+    while (!is_end && name.back() == '/') name.pop_back();  // <br/>
+    if (kVoid.count(is_end ? name.substr(1) : name) > 0) continue;
+    if (!is_end) {
       open.push_back(name);
-    } else if (!open.empty() && open.back() == name) {
+    } else if (!open.empty() && open.back() == name.substr(1)) {
       open.pop_back();
     } else {
-      open.push_back("/" + name);
+      open.push_back(name);
       return open;
     }
   }
