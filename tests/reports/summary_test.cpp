@@ -33,7 +33,8 @@ TEST(Summary, OnlySuccessesAndFailuresAreInARate) {
 
 TEST(Summary, ARateWithoutVerdictsIsUndefinedAndNotZero) {
   SampleRun run({{"take_bottle", "pick", "good", "uue", "sf"}});
-  const RateCell& real = CellOf(run.Summary(), "pick@good", "real");
+  const RunSummary summary = run.Summary();
+  const RateCell& real = CellOf(summary, "pick@good", "real");
   EXPECT_FALSE(real.rate.value);
   EXPECT_FALSE(real.rate.value.reason().empty());
 }
@@ -108,7 +109,7 @@ TEST(Comparison, TheReportSaysWhatCorrelateSays) {
 
 TEST(Comparison, ThePointsRatesAreThoseOfTheirPairs) {
   SampleRun run({{"take_bottle", "pick", "good", "sse", "sfs"}});
-  const ComparedPoint& point = run.Summary().comparisons.at(0).points.at(0);
+  const ComparedPoint point = run.Summary().comparisons.at(0).points.at(0);
   EXPECT_EQ(point.real.n, 2);
   EXPECT_EQ(*point.real.value, 1.0);
   EXPECT_EQ(*point.other.value, 0.5);
