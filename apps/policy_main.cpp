@@ -92,7 +92,6 @@ void AddVisualPick(CLI::App& app, int& exit_code) {
     options->bias_m = {bias_m->at(0), bias_m->at(1)};
     VisualPick policy(*options);
     PolicySpec spec = common->Spec("visual_pick");
-    spec.arms = {"right"};
     spec.cameras = {{"head", 0, 0}, {"hand_right", 0, 0}};
     spec.needs = {"images", "arms", "whole_chunks"};
     exit_code = ServePolicy(policy, spec, common->address);

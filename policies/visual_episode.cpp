@@ -49,6 +49,12 @@ bool HasHeadCamera(const Task& task) {
   return false;
 }
 
+/// An arm that stays where it is; a hand that is closed around something keeps pressing.
+ArmState Held(ArmState arm) {
+  arm.closure = arm.closure > 0.5 ? 1.0 : 0.0;
+  return arm;
+}
+
 Eigen::Vector2d Noise(SplitMix64& random, double sd_m) {
   const double x = random.Normal(), y = random.Normal();
   return sd_m * Eigen::Vector2d(x, y);
@@ -58,8 +64,6 @@ Eigen::Vector2d Noise(SplitMix64& random, double sd_m) {
 
 VisualEpisode::VisualEpisode(const Task& task, const VisualPickOptions& options, std::uint64_t seed)
     : task_(task), options_(options), knowledge_(KnowledgeOf(task.id)), seed_(seed), retries_left_(options.retries) {
-  if (task.arms.size() != 1)
-    throw InvalidInput("visual_pick: task {} has {} arms, wanted 1", task.id, task.arms.size());
   if (!HasHeadCamera(task)) throw InvalidInput("visual_pick: task {} has no camera named head, wanted one", task.id);
   limits_.translation_mps *= options.speed;
   limits_.rotation_radps *= options.speed;
@@ -75,6 +79,7 @@ ActionChunk VisualEpisode::Answer(const Observation& observation) {
   if (!plan_) {
     last_ = observation.arms.back();
     home_ = last_.base_from_gripper;
+    if (observation.arms.size() == 2) left_ = Held(observation.arms.front());
     Look(glance);
     plan_ = Approach();
   } else if (ArrivedAbove(glance)) {
@@ -88,7 +93,7 @@ ActionChunk VisualEpisode::Answer(const Observation& observation) {
   for (int k = 0; k < options_.chunk_size; ++k) {
     ++told_;
     last_ = {Inside(plan_->path.At(Clock()), task_.workspace_m), plan_->hand.At(Clock())};
-    chunk.targets.push_back({last_});
+    chunk.targets.push_back(left_ ? Arms{*left_, last_} : Arms{last_});
   }
   return chunk;
 }

@@ -15,7 +15,7 @@ namespace evac {
 /// The looks and the check of the hand happen when a request comes; between them its chunks follow a Timeline.
 class VisualEpisode {
  public:
-  /// @throws InvalidInput for a task it does not know, more than one arm, or no camera named "head".
+  /// @throws InvalidInput for a task it does not know or without a camera named "head".
   VisualEpisode(const Task& task, const VisualPickOptions& options, std::uint64_t seed);
 
   /// The next `chunk_size` targets. The harness executes all of them before it asks again.
@@ -60,6 +60,7 @@ class VisualEpisode {
   int retries_left_;
   Eigen::Isometry3d home_ = Eigen::Isometry3d::Identity();  ///< where the gripper was at first, and rests at last
   ArmState last_;                                           ///< the last target; at first the observed arm
+  std::optional<ArmState> left_;                            ///< where a left arm was at first, and what it holds on to
   Placement thing_, target_;                                ///< where they are taken to be
   std::optional<Plan> plan_;                                ///< none before the first look
 };

@@ -21,7 +21,8 @@ class VisualPick : public Policy {
 
   std::string Name() const override { return "visual_pick"; }
 
-  /// @throws InvalidInput for a task it does not know, more than one arm, or no camera named "head".
+  /// The right arm works; a left one stays where it is and goes on holding what it holds.
+  /// @throws InvalidInput for a task it does not know or without a camera named "head".
   void Reset(SceneId scene, const Task& task, std::uint64_t seed) override;
 
   std::vector<Acted> Act(std::span<const SceneObservation> batch) override;

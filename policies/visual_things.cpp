@@ -73,6 +73,14 @@ PickKnowledge TakeBottle() {
   return knowledge;
 }
 
+/// The box is further to the left, where the left hand holds it, and the bottle goes to the right of it.
+PickKnowledge TakeBottleTwoArms() {
+  PickKnowledge knowledge = TakeBottle();
+  knowledge.usual = {{{0.44, 0.03}, 0}, 0.10};
+  knowledge.usual_target = {{{0.44, -0.16}, 0}, 0};
+  return knowledge;
+}
+
 Thing Toast() {
   Thing toast;
   toast.colour = {.hue_deg = 31, .hue_tolerance_deg = 22, .min_saturation = 0.4, .min_value = 0.15};
@@ -112,7 +120,7 @@ PickKnowledge TakeToast() {
 Thing Ham() {
   Thing ham;
   ham.colour = {.hue_deg = 1, .hue_tolerance_deg = 20, .min_saturation = 0.25, .min_value = 0.1};
-  ham.shape = {Cuboid({-0.029, -0.046, 0}, {0.029, 0.046, 0.004}), Cuboid({-0.027, -0.003, 0}, {0.027, 0.003, 0.031})};
+  ham.shape = {Cuboid({-0.029, -0.046, 0}, {0.029, 0.046, 0.004}), Cuboid({-0.019, -0.003, 0}, {0.019, 0.003, 0.031})};
   ham.height_m = 0.008;
   ham.yaw_reach_rad = 11 * kRadians;
   return ham;
@@ -130,7 +138,7 @@ Thing Bread() {
 PickKnowledge TakeHam() {
   PickKnowledge knowledge;
   knowledge.thing = Ham();
-  knowledge.held = {Cuboid({0.012, -0.008, -0.020}, {0.028, 0.008, 0.030})};
+  knowledge.held = {Cuboid({0.012, -0.008, -0.025}, {0.028, 0.008, 0.010})};
   knowledge.usual = {{{0.44, -0.14}, 0}, 0.12};
   knowledge.grasp_m = 0.035;
   knowledge.hover_m = 0.165;
@@ -195,10 +203,11 @@ double VisibleShare(const View& view, const Thing& thing, const Eigen::Isometry3
 
 PickKnowledge KnowledgeOf(const std::string& task_id) {
   if (task_id == "take_bottle") return TakeBottle();
+  if (task_id == "take_bottle_two_arms") return TakeBottleTwoArms();
   if (task_id == "take_toast") return TakeToast();
   if (task_id == "take_ham") return TakeHam();
   if (task_id == "take_lettuce") return TakeLettuce();
-  throw InvalidInput("visual_pick: found task {}, wanted take_bottle, take_toast, take_ham or take_lettuce", task_id);
+  throw InvalidInput("visual_pick: found task {}, wanted take_bottle, take_bottle_two_arms, take_toast, take_ham or take_lettuce", task_id);
 }
 
 }  // namespace evac

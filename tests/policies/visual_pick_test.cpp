@@ -34,18 +34,29 @@ double WorstHeadError(sim::MujocoWorld& world, const Task& task, const Sought& s
   return worst_m;
 }
 
+/// What the policy knows, by the names that the scenes have for it.
+struct KnownTask {
+  const char *id, *thing, *target;
+};
+constexpr KnownTask kKnownTasks[] = {{"take_bottle", "bottle", ""},
+                                     {"take_bottle_two_arms", "bottle", ""},
+                                     {"take_toast", "toast", "plate"},
+                                     {"take_ham", "ham", "bread"},
+                                     {"take_lettuce", "leaf", "bowl"}};
+
 class HeadCamera : public testing::TestWithParam<int> {};
 
 TEST_P(HeadCamera, FindsWhatItIsToTakeAndWhereToPutItInTwentyStates) {
   const int width_px = GetParam();
   sim::MujocoWorld world = SimWorld("real");
-  for (const char* id : {"take_bottle", "take_toast"}) {
+  for (const KnownTask& known : kKnownTasks) {
+    const char* id = known.id;
     Task task = SimTask(id);
     for (Camera& camera : task.cameras) camera = Resized(camera, width_px, width_px * 2 / 3);
     const PickKnowledge knowledge = KnowledgeOf(id);
-    EXPECT_LT(WorstHeadError(world, task, {knowledge.thing, knowledge.usual, std::string(id).substr(5)}), 0.012) << id;
+    EXPECT_LT(WorstHeadError(world, task, {knowledge.thing, knowledge.usual, known.thing}), 0.015) << id;
     if (knowledge.target) {
-      EXPECT_LT(WorstHeadError(world, task, {*knowledge.target, knowledge.usual_target, "plate"}), 0.012) << id;
+      EXPECT_LT(WorstHeadError(world, task, {*knowledge.target, knowledge.usual_target, known.target}), 0.015) << id;
     }
   }
 }
@@ -53,8 +64,10 @@ INSTANTIATE_TEST_SUITE_P(Widths, HeadCamera, testing::Values(96, 192));
 
 TEST(VisualPick, TheWristCameraFindsTheThingWithinTenMillimetres) {
   sim::MujocoWorld world = SimWorld("real");
-  for (const char* id : {"take_bottle", "take_toast"}) {
+  for (const KnownTask& known : kKnownTasks) {
+    const char* id = known.id;
     const Task task = SimTask(id);
+    const int wrist = static_cast<int>(task.cameras.size()) - 1;
     VisualPick policy({.chunk_size = 20});
     for (int state = 0; state < 4; ++state) {
       const WorldStep first = world.Reset(0, task, SimState(state), 1);
@@ -63,8 +76,8 @@ TEST(VisualPick, TheWristCameraFindsTheThingWithinTenMillimetres) {
       const Acted approach = policy.Act({&asked, 1}).front();
       const SceneChunk chunk{0, &std::get<ActionChunk>(approach)};
       const WorldStep above = std::get<std::vector<WorldStep>>(world.Advance({&chunk, 1}).front()).back();
-      const Eigen::Vector2d truth_m = PoseIn(above.privileged, std::string(id).substr(5)).translation().head<2>();
-      const auto fit = Locate(ViewOf(task, above.observation, 1), KnowledgeOf(id).thing,
+      const Eigen::Vector2d truth_m = PoseIn(above.privileged, known.thing).translation().head<2>();
+      const auto fit = Locate(ViewOf(task, above.observation, wrist), KnowledgeOf(id).thing,
                               {{truth_m + Eigen::Vector2d(0.01, 0.01), 0}, 0.05});
       ASSERT_TRUE(fit) << id << " " << state;
       EXPECT_LT((fit->placement.xy_m - truth_m).norm(), 0.010) << id << " " << state;
@@ -72,9 +85,9 @@ TEST(VisualPick, TheWristCameraFindsTheThingWithinTenMillimetres) {
   }
 }
 
-TEST(VisualPick, MastersBothTasksAndADegradedOneIsWorse) {
+TEST(VisualPick, MastersItsTasksAndADegradedOneIsWorse) {
   sim::MujocoWorld world = SimWorld("real");
-  for (const char* id : {"take_bottle", "take_toast"}) {
+  for (const auto& [id, thing, target] : kKnownTasks) {
     VisualPick clean({}), degraded({.bias_m = {0.05, 0.03}});
     const int successes = Successes(world, clean, SimTask(id), 2, 10);
     EXPECT_EQ(successes, 2) << id;

@@ -30,10 +30,12 @@ Vector6d Difference(const Eigen::Isometry3d& to, const Eigen::Isometry3d& from) 
 
 }  // namespace
 
-ArmControl::ArmControl(const mjModel& model, const Profile::Actuators& actuators, const Joints& joint_offset)
+ArmControl::ArmControl(const mjModel& model, const std::string& arm, const Profile::Actuators& actuators,
+                       const Joints& joint_offset)
     : model_(&model), scratch_(MakeData(model)), actuators_(actuators), joint_offset_(joint_offset) {
+  const std::string prefix = NamePrefix(arm);
   for (int i = 0; i < kJoints; ++i) {
-    const std::string name = fmt::format("j{}", i + 1);
+    const std::string name = fmt::format("{}j{}", prefix, i + 1);
     const int joint = IdOf(model, mjOBJ_JOINT, name);
     qpos_[i] = model.jnt_qposadr[joint];
     dof_[i] = model.jnt_dofadr[joint];
@@ -43,12 +45,12 @@ ArmControl::ArmControl(const mjModel& model, const Profile::Actuators& actuators
   }
   const char* fingers[] = {"finger_left", "finger_right"};
   for (int i = 0; i < 2; ++i) {
-    const int joint = IdOf(model, mjOBJ_JOINT, fingers[i]);
+    const int joint = IdOf(model, mjOBJ_JOINT, prefix + fingers[i]);
     finger_qpos_[i] = model.jnt_qposadr[joint];
     finger_dof_[i] = model.jnt_dofadr[joint];
   }
-  grip_ = IdOf(model, mjOBJ_ACTUATOR, "grip");
-  site_ = IdOf(model, mjOBJ_SITE, "gripper");
+  grip_ = IdOf(model, mjOBJ_ACTUATOR, prefix + "grip");
+  site_ = IdOf(model, mjOBJ_SITE, prefix + "gripper");
 }
 
 void ArmControl::StartAt(mjData& data, const ArmState& home) {
@@ -88,6 +90,10 @@ void ArmControl::Actuate(mjData& data) {
   }
   for (const int dof : finger_dof_) data.qfrc_applied[dof] = data.qfrc_bias[dof];
   data.ctrl[grip_] = kFingerTravelM * (1 - closure_);
+}
+
+Eigen::Isometry3d ArmControl::TrueGripper(const mjData& data) const {
+  return PoseOf(data.site_xpos + 3 * site_, data.site_xmat + 9 * site_);
 }
 
 ArmState ArmControl::Measured(const mjData& data) {

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <Eigen/Dense>
+#include <string>
 
 #include "core/types.h"
 #include "worldmodel/sim/mujoco_handles.h"
@@ -11,15 +12,17 @@ namespace evac::sim {
 constexpr int kJoints = 6;
 using Joints = Eigen::Matrix<double, kJoints, 1>;  ///< radians, base to wrist
 
-/// Drives the scene's one arm (joints j1 … j6, site `gripper`, fingers) from gripper targets: damped least squares
+/// Drives one arm of the scene (joints j1 … j6, site `gripper`, fingers) from gripper targets: damped least squares
 /// inverse kinematics (Wampler 1986), a straight line in joint angles through each period, gravity compensation, a lag.
 ///
 /// The controller believes in the nominal kinematics; the true joints are off by `joint_offset` (encoder zeros), so
 /// both where it goes and where it says it is are off together, as on a real robot.
 class ArmControl {
  public:
+  /// @param arm           "right" or "left": the left arm's names in the scene begin with `left_`.
   /// @param joint_offset  believed minus true angle, per joint.
-  ArmControl(const mjModel& model, const Profile::Actuators& actuators, const Joints& joint_offset);
+  ArmControl(const mjModel& model, const std::string& arm, const Profile::Actuators& actuators,
+             const Joints& joint_offset);
 
   /// Puts the arm's joints into `data` so that it believes to be at `home`, fingers there too, and holds it.
   /// @throws InvalidInput if the pose cannot be reached.
@@ -31,6 +34,9 @@ class ArmControl {
 
   /// One physics step's controls. Call between mj_step1 and mj_step2.
   void Actuate(mjData& data);
+
+  /// Where the gripper truly is, once the kinematics of `data` are computed.
+  Eigen::Isometry3d TrueGripper(const mjData& data) const;
 
   /// Where the arm believes to be: forward kinematics of its encoders.
   ArmState Measured(const mjData& data);

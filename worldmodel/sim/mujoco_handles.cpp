@@ -39,6 +39,12 @@ std::string NameOf(const mjModel& model, mjtObj kind, int id) {
   return name ? name : "";
 }
 
+std::string NamePrefix(const std::string& arm) { return arm == "left" ? "left_" : ""; }
+
+bool HasArm(const mjModel& model, const std::string& arm) {
+  return mj_name2id(&model, mjOBJ_SITE, (NamePrefix(arm) + "gripper").c_str()) >= 0;
+}
+
 bool IsFree(const mjModel& model, int body) {
   return model.body_jntnum[body] == 1 && model.jnt_type[model.body_jntadr[body]] == mjJNT_FREE;
 }

@@ -28,6 +28,11 @@ DataPtr MakeData(const mjModel& model);
 int IdOf(const mjModel& model, mjtObj kind, const std::string& name);
 std::string NameOf(const mjModel& model, mjtObj kind, int id);
 
+/// What the names of an arm's parts begin with: nothing for "right", `left_` for "left".
+std::string NamePrefix(const std::string& arm);
+/// Whether the scene has that arm: a site `gripper` (`left_gripper`).
+bool HasArm(const mjModel& model, const std::string& arm);
+
 /// Whether a body has a free joint, and so can be placed and carried.
 bool IsFree(const mjModel& model, int body);
 /// Whether a body is a thing or part of one: it is free, or linked by joints to a free body (a leaf's wings to its rib).

@@ -21,8 +21,8 @@ struct MujocoWorldOptions {
   int threads = 2;                ///< scenes that advance at the same time; no part of any result
 };
 
-/// The stand-in for the real robot: rigid bodies, contact and friction in MuJoCo (Todorov et al. 2012), two rendered
-/// cameras, one arm. Tasks are pages with a `mujoco:` section (docs/add_a_task.md), numbers and axes in
+/// The stand-in for the real robot: rigid bodies, contact and friction in MuJoCo (Todorov et al. 2012), rendered
+/// cameras, one arm or two. Tasks are pages with a `mujoco:` section (docs/add_a_task.md), numbers and axes in
 /// docs/mujoco_world.md.
 ///
 /// Pose, colour, light and clutter come from InitialState::seed alone; what a scene answers is a function of the
@@ -36,7 +36,7 @@ class MujocoWorld : public World {
   ~MujocoWorld() override;
 
   std::string Name() const override { return options_.name; }
-  /// @throws InvalidInput if the task has no `mujoco:` section, other arms than {right}, or a camera MuJoCo cannot
+  /// @throws InvalidInput if the task has no `mujoco:` section, other arms than its scene, or a camera MuJoCo cannot
   /// draw.
   WorldStep Reset(SceneId scene, const Task& task, const InitialState& initial, std::uint64_t seed) override;
   std::vector<Advanced> Advance(std::span<const SceneChunk> batch) override;

@@ -9,7 +9,7 @@ namespace {
 
 bool IsReported(const mjModel& model, int body) {
   const std::string name = NameOf(model, mjOBJ_BODY, body);
-  return IsOfThing(model, body) || name == "table" || name == "finger_left" || name == "finger_right";
+  return IsOfThing(model, body) || name == "table" || name.ends_with("finger_left") || name.ends_with("finger_right");
 }
 
 /// What a geom belongs to, as forces are summed: a thing of several linked bodies is one.
@@ -36,8 +36,12 @@ std::map<std::pair<std::string, std::string>, double> NormalForces(const mjModel
 
 PrivilegedFrame ReadPrivileged(const mjModel& model, const mjData& data) {
   PrivilegedFrame frame;
-  const int gripper = IdOf(model, mjOBJ_SITE, "gripper");
-  frame.bodies.push_back({"gripper", PoseOf(data.site_xpos + 3 * gripper, data.site_xmat + 9 * gripper)});
+  for (const char* arm : {"left", "right"}) {
+    if (!HasArm(model, arm)) continue;
+    const std::string name = NamePrefix(arm) + "gripper";
+    const int site = IdOf(model, mjOBJ_SITE, name);
+    frame.bodies.push_back({name, PoseOf(data.site_xpos + 3 * site, data.site_xmat + 9 * site)});
+  }
   for (int body = 1; body < model.nbody; ++body) {
     if (!IsReported(model, body)) continue;
     frame.bodies.push_back({NameOf(model, mjOBJ_BODY, body), PoseOf(data.xpos + 3 * body, data.xmat + 9 * body)});

@@ -1,6 +1,5 @@
 #include "worldmodel/sim/scene.h"
 
-#include <algorithm>
 #include <cmath>
 #include <utility>
 
@@ -41,30 +40,40 @@ std::uint64_t NoiseSeed(const Scene::Setup& setup) {
 
 Scene::Scene(Setup setup)
     : setup_(std::move(setup)),
-      errors_(DrawHiddenErrors(*setup_.profile, setup_.task.cameras)),
+      errors_(DrawHiddenErrors(*setup_.profile, setup_.task)),
       model_(VariedModel(setup_)),
       data_(MakeData(*model_)),
-      control_(*model_, setup_.profile->actuators, errors_.joint_offset),
       steps_per_period_(StepsPerPeriod(setup_.task, *model_)),
       noise_seed_(NoiseSeed(setup_)) {
-  if (setup_.task.arms != std::vector<std::string>{"right"}) {
-    throw InvalidInput("{}: found {} arms, wanted [right]: the scene has one", setup_.task.page_path,
-                       setup_.task.arms.size());
-  }
   for (const Camera& camera : setup_.task.cameras) RefuseUndrawable(camera);
-  control_.StartAt(*data_, {setup_.page->base_from_home, 0.0});
+  StartArms();
   const int settle_steps = static_cast<int>(kSettleS / model_->opt.timestep);
   for (int i = 0; i < settle_steps; ++i) StepPhysics();
 }
 
+void Scene::StartArms() {
+  const Task& task = setup_.task;
+  if (HasArm(*model_, "left") != (task.arms.size() == 2)) {
+    throw InvalidInput("{}: found {} arms, wanted {}: those of the scene", task.page_path, task.arms.size(),
+                       HasArm(*model_, "left") ? "[left, right]" : "[right]");
+  }
+  for (std::size_t i = 0; i < task.arms.size(); ++i) {
+    const Home& home = setup_.page->homes.at(i);
+    const Eigen::Isometry3d base_from_around =
+        home.inside.empty() ? Eigen::Isometry3d::Identity() : InitialPose(*model_, home.inside);
+    controls_.emplace_back(*model_, task.arms[i], setup_.profile->actuators, errors_.joint_offset[i]);
+    controls_.back().StartAt(*data_, {base_from_around * home.around_from_gripper, home.closure});
+  }
+}
+
 void Scene::Drive(const Arms& target) {
-  control_.Aim(target.front(), steps_per_period_);
+  for (std::size_t i = 0; i < controls_.size(); ++i) controls_[i].Aim(target[i], steps_per_period_);
   for (int i = 0; i < steps_per_period_; ++i) StepPhysics();
 }
 
 void Scene::StepPhysics() {
   mj_step1(model_.get(), data_.get());
-  control_.Actuate(*data_);
+  for (ArmControl& control : controls_) control.Actuate(*data_);
   mj_step2(model_.get(), data_.get());
 }
 
@@ -72,22 +81,28 @@ WorldStep Scene::Observe(Renderer& renderer) {
   mj_forward(model_.get(), data_.get());  // poses and contacts of the state just reached
   WorldStep step;
   step.privileged = ReadPrivileged(*model_, *data_);
-  const Eigen::Isometry3d& base_from_gripper =
-      std::find_if(step.privileged.bodies.begin(), step.privileged.bodies.end(), [](const auto& body) {
-        return body.name == "gripper";
-      })->base_from_body;
+  const Arms arms = TrueArms();
   const std::uint64_t frame_seed = SeedFor(noise_seed_, frame_++);
   for (std::size_t i = 0; i < setup_.task.cameras.size(); ++i) {
     const Camera& camera = setup_.task.cameras[i];
     const Eigen::Isometry3d base_from_camera =
-        BaseFromCamera(camera, {{base_from_gripper, 0.0}}) * errors_.camera_from_true_camera[i];
+        BaseFromCamera(camera, arms) * errors_.camera_from_true_camera[i];
     step.observation.images.push_back(renderer.Draw(*setup_.base, *model_, *data_, camera, base_from_camera));
     AddNoise(step.observation.images.back(), setup_.profile->sensors.image_noise,
              SeedFor(frame_seed, "image " + camera.name));
   }
-  step.observation.arms = {control_.Measured(*data_)};
-  AddNoise(step.observation.arms.front(), setup_.profile->sensors, SeedFor(frame_seed, "arm"));
+  for (std::size_t i = 0; i < controls_.size(); ++i) {
+    ArmState& arm = step.observation.arms.emplace_back(controls_[i].Measured(*data_));
+    const bool is_left = setup_.task.arms[i] == "left";
+    AddNoise(arm, setup_.profile->sensors, SeedFor(frame_seed, is_left ? "left arm" : "arm"));
+  }
   return step;
+}
+
+Arms Scene::TrueArms() const {
+  Arms arms;
+  for (const ArmControl& control : controls_) arms.push_back({control.TrueGripper(*data_), 0.0});
+  return arms;
 }
 
 std::optional<std::string> Scene::WhyDiverged() const {

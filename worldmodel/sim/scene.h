@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "core/world.h"
 #include "worldmodel/sim/arm_control.h"
@@ -40,13 +41,15 @@ class Scene {
   std::optional<std::string> WhyDiverged() const;
 
  private:
+  void StartArms();
   void StepPhysics();
+  Arms TrueArms() const;
 
   Setup setup_;
   HiddenErrors errors_;
   ModelPtr model_;
   DataPtr data_;
-  ArmControl control_;
+  std::vector<ArmControl> controls_;  ///< per arm of the task
   int steps_per_period_ = 0;
   std::uint64_t noise_seed_ = 0;
   std::uint64_t frame_ = 0;

@@ -22,11 +22,26 @@ Range ReadRange(const Config& page, const std::string& key) {
   return {ends[0], ends[1]};
 }
 
-Eigen::Isometry3d ReadHome(const Config& page) {
-  page.AllowOnly({"position_m", "quat_xyzw"});
+Home ReadHome(const Config& page) {
+  page.AllowOnly({"inside", "position_m", "quat_xyzw", "closure"});
   const auto xyz = ReadNumbers(page, "position_m", 3);
   const auto quat = ReadNumbers(page, "quat_xyzw", 4);
-  return FromXyzQuat({xyz[0], xyz[1], xyz[2]}, {quat[0], quat[1], quat[2], quat[3]});
+  Home home{page.Get<std::string>("inside", ""),
+            FromXyzQuat({xyz[0], xyz[1], xyz[2]}, {quat[0], quat[1], quat[2], quat[3]}),
+            page.Get<double>("closure", 0.0)};
+  page.Require(home.closure >= 0 && home.closure <= 1, "closure", "0 open … 1 closed");
+  return home;
+}
+
+/// One arm's home stands in the section itself, two arms' under their names.
+std::vector<Home> ReadHomes(const Config& page, const Task& task) {
+  if (task.arms.size() == 1) return {ReadHome(page)};
+  if (page.Has("position_m"))
+    throw InvalidInput("{}: found {} arms, wanted [right]: the home here is one arm's", page.Where(), task.arms.size());
+  page.AllowOnly({"left", "right"});
+  std::vector<Home> homes;
+  for (const std::string& arm : task.arms) homes.push_back(ReadHome(page.Section(arm)));
+  return homes;
 }
 
 Placement ReadPlacement(const Config& page) {
@@ -69,8 +84,7 @@ Clutter ReadClutter(const Config& page) {
 }
 
 /// A suite's hash covers the files that a page names; so a page must name all that its scene is made of.
-void RequireIncludesNamed(const Config& page, const std::filesystem::path& scene) {
-  const auto named = page.Get<std::vector<std::string>>("includes", std::vector<std::string>{});
+void RequireIncludesNamed(const Config& page, const std::vector<std::string>& named, const std::filesystem::path& scene) {
   const std::string text = ReadFile(scene);
   const std::regex include(R"re(<include\s+file\s*=\s*"([^"]*)")re");
   for (std::sregex_iterator match(text.begin(), text.end(), include), end; match != end; ++match) {
@@ -91,8 +105,10 @@ ScenePage ReadScenePage(const Task& task) {
   page.AllowOnly({"scene", "includes", "home", "objects", "colours", "light", "clutter"});
   ScenePage scene;
   scene.scene = page.Path("scene");
-  RequireIncludesNamed(page, scene.scene);
-  scene.base_from_home = ReadHome(page.Section("home"));
+  const auto named = page.Get<std::vector<std::string>>("includes", std::vector<std::string>{});
+  RequireIncludesNamed(page, named, scene.scene);
+  for (const std::string& file : named) RequireIncludesNamed(page, named, scene.scene.parent_path() / file);
+  scene.homes = ReadHomes(page.Section("home"), task);
   for (const Config& item : page.List("objects")) scene.placements.push_back(ReadPlacement(item));
   for (const Config& item : page.List("colours")) scene.colours.push_back(ReadColour(item));
   scene.light = ReadLight(page.Section("light"));

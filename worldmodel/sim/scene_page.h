@@ -42,10 +42,17 @@ struct Clutter {
   double spread_m = 0;  ///< uniform, either way, per axis
 };
 
+/// Where one gripper is in the first frame: in the base frame or in that of the free body it is `inside` of.
+struct Home {
+  std::string inside;  ///< empty: base frame
+  Eigen::Isometry3d around_from_gripper = Eigen::Isometry3d::Identity();
+  double closure = 0;
+};
+
 /// The `mujoco:` section of a task page: what only this world needs to know about a task.
 struct ScenePage {
-  std::filesystem::path scene;                                       ///< MJCF
-  Eigen::Isometry3d base_from_home = Eigen::Isometry3d::Identity();  ///< the gripper in the first frame
+  std::filesystem::path scene;  ///< MJCF
+  std::vector<Home> homes;      ///< in the order of Task::arms
   std::vector<Placement> placements;
   std::vector<ColourVariation> colours;
   LightVariation light;

@@ -25,13 +25,16 @@ Eigen::Matrix3d SmallRotation(const Eigen::Vector3d& rotation_vector) {
 
 }  // namespace
 
-HiddenErrors DrawHiddenErrors(const Profile& profile, const std::vector<Camera>& cameras) {
+HiddenErrors DrawHiddenErrors(const Profile& profile, const Task& task) {
   const Profile::Calibration& calibration = profile.calibration;
   const std::uint64_t seed = SeedFor(static_cast<std::uint64_t>(calibration.seed), "calibration of " + profile.name);
   HiddenErrors errors;
-  SplitMix64 random(SeedFor(seed, "joints"));
-  for (double& offset : errors.joint_offset) offset = calibration.joint_offset_deg * kDegree * random.Normal();
-  for (const Camera& camera : cameras) {
+  for (const std::string& arm : task.arms) {
+    SplitMix64 random(SeedFor(seed, arm == "left" ? "joints of the left arm" : "joints"));
+    Joints& offsets = errors.joint_offset.emplace_back();
+    for (double& offset : offsets) offset = calibration.joint_offset_deg * kDegree * random.Normal();
+  }
+  for (const Camera& camera : task.cameras) {
     SplitMix64 of_camera(SeedFor(seed, "camera " + camera.name));
     Eigen::Isometry3d error = Eigen::Isometry3d::Identity();
     error.translation() = NormalVector(of_camera, calibration.camera_position_m);

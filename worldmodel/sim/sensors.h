@@ -12,11 +12,11 @@ namespace evac::sim {
 
 /// What the calibration of one profile's rig does not know. A function of the profile alone.
 struct HiddenErrors {
-  Joints joint_offset = Joints::Zero();  ///< radians, believed minus true
+  std::vector<Joints> joint_offset;  ///< per arm of the task; radians, believed minus true
   std::vector<Eigen::Isometry3d>
       camera_from_true_camera;  ///< mount_from_true_camera = mount_from_camera * this, per camera
 };
-HiddenErrors DrawHiddenErrors(const Profile& profile, const std::vector<Camera>& cameras);
+HiddenErrors DrawHiddenErrors(const Profile& profile, const Task& task);
 
 /// Adds noise to `image` in place: about normal, in steps of a quarter of its deviation, independent per pixel and
 /// channel.

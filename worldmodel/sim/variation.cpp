@@ -119,22 +119,23 @@ void ScaleMass(mjModel& model, double factor) {
 
 void SetFriction(mjModel& model, const Profile::Physics& physics) {
   for (int geom = 0; geom < model.ngeom; ++geom) {
-    const bool is_pad = NameOf(model, mjOBJ_GEOM, geom).starts_with("pad_");
+    const bool is_pad = NameOf(model, mjOBJ_GEOM, geom).find("pad_") != std::string::npos;
     mjtNum& sliding = model.geom_friction[3 * geom];
     sliding = is_pad ? physics.pad_friction : sliding * physics.object_friction;
   }
 }
 
 void SetActuators(mjModel& model, const Profile::Actuators& actuators) {
-  const int grip = IdOf(model, mjOBJ_ACTUATOR, "grip");
   for (int i = 0; i < model.nu; ++i) {
-    if (i == grip) continue;
-    model.actuator_gainprm[mjNGAIN * i] *= actuators.gain;
-    model.actuator_biasprm[mjNBIAS * i + 1] *= actuators.gain;
+    if (NameOf(model, mjOBJ_ACTUATOR, i).ends_with("grip")) {
+      // The tendon is the mean of both fingers' travel: each finger gets half of the actuator's force.
+      model.actuator_forcerange[2 * i] = -2 * actuators.grip_force_n;
+      model.actuator_forcerange[2 * i + 1] = 2 * actuators.grip_force_n;
+    } else {
+      model.actuator_gainprm[mjNGAIN * i] *= actuators.gain;
+      model.actuator_biasprm[mjNBIAS * i + 1] *= actuators.gain;
+    }
   }
-  // The tendon is the mean of both fingers' travel: each finger gets half of the actuator's force.
-  model.actuator_forcerange[2 * grip] = -2 * actuators.grip_force_n;
-  model.actuator_forcerange[2 * grip + 1] = 2 * actuators.grip_force_n;
 }
 
 }  // namespace
@@ -144,6 +145,16 @@ void ApplyInitialState(mjModel& model, const ScenePage& page, std::uint64_t seed
   Colour(model, page.colours, SplitMix64(SeedFor(seed, "colours")));
   VaryLight(model, page.light, SplitMix64(SeedFor(seed, "light")));
   Scatter(model, page.clutter, SplitMix64(SeedFor(seed, "clutter")));
+}
+
+Eigen::Isometry3d InitialPose(const mjModel& model, const std::string& name) {
+  const int body = IdOf(model, mjOBJ_BODY, name);
+  if (!IsFree(model, body)) throw InvalidInput("scene {}: '{}' has no free joint, wanted one", model.names, name);
+  const mjtNum* qpos = model.qpos0 + model.jnt_qposadr[model.body_jntadr[body]];
+  Eigen::Isometry3d base_from_body = Eigen::Isometry3d::Identity();
+  base_from_body.translation() = Eigen::Map<const Vector3d>(qpos);
+  base_from_body.linear() = Eigen::Quaterniond(qpos[3], qpos[4], qpos[5], qpos[6]).toRotationMatrix();
+  return base_from_body;
 }
 
 void ApplyProfile(mjModel& model, const Profile& profile) {

@@ -29,7 +29,7 @@ ModelPtr BottleModel() {
 
 TEST(ArmControl, ReachesTheWholeDocumentedWorkspacePointingDown) {
   const ModelPtr model = BottleModel();
-  ArmControl control(*model, {}, Joints::Zero());
+  ArmControl control(*model, "right", {}, Joints::Zero());
   const DataPtr data = MakeData(*model);
   for (double x = 0.20; x <= 0.66; x += 0.06) {
     for (double y = -0.40; y <= 0.40; y += 0.08) {
@@ -46,7 +46,7 @@ TEST(ArmControl, ReachesTheWholeDocumentedWorkspacePointingDown) {
 TEST(ArmControl, MeasuresWhereItBelievesToBe) {
   const ModelPtr model = BottleModel();
   const Joints offset = Joints::Constant(0.01);
-  ArmControl control(*model, {}, offset);
+  ArmControl control(*model, "right", {}, offset);
   const DataPtr data = MakeData(*model);
   const ArmState home = At({0.4, 0.1, 0.3}, Downward({0, -1, 0}), 0.25);
   control.StartAt(*data, home);
@@ -61,7 +61,7 @@ TEST(ArmControl, MeasuresWhereItBelievesToBe) {
 
 TEST(ArmControl, AHomeOutOfReachIsRefused) {
   const ModelPtr model = BottleModel();
-  ArmControl control(*model, {}, Joints::Zero());
+  ArmControl control(*model, "right", {}, Joints::Zero());
   const DataPtr data = MakeData(*model);
   EXPECT_THROW(control.StartAt(*data, At({1.5, 0, 0.3}, Downward({0, -1, 0}), 0)), Error);
 }
@@ -95,16 +95,25 @@ TEST(Profile, AnImpossibleValueIsRefusedWithItsField) {
 }
 
 TEST(HiddenErrors, AreOneRigsAndShareNoStreamWithAnotherProfiles) {
-  const std::vector<Camera> cameras = ReadTask("take_bottle").cameras;
+  const Task task = ReadTask("take_bottle");
   Profile profile = ReadProfile(ProfilePage("real"));
-  const HiddenErrors first = DrawHiddenErrors(profile, cameras), again = DrawHiddenErrors(profile, cameras);
+  const HiddenErrors first = DrawHiddenErrors(profile, task), again = DrawHiddenErrors(profile, task);
   EXPECT_EQ(first.joint_offset, again.joint_offset);
   EXPECT_TRUE(first.camera_from_true_camera[0].isApprox(again.camera_from_true_camera[0], 0));
   profile.name = "other";
-  const HiddenErrors other = DrawHiddenErrors(profile, cameras);
+  const HiddenErrors other = DrawHiddenErrors(profile, task);
   EXPECT_NE(first.joint_offset, other.joint_offset);
-  const HiddenErrors none = DrawHiddenErrors(ReadProfile(ProfilePage("sim")), cameras);
+  const HiddenErrors none = DrawHiddenErrors(ReadProfile(ProfilePage("sim")), task);
   EXPECT_TRUE(none.camera_from_true_camera[1].isApprox(Eigen::Isometry3d::Identity(), 0));
+}
+
+TEST(HiddenErrors, OfASecondArmAreItsOwnAndChangeNothingOfTheFirst) {
+  Task two = ReadTask("take_bottle_two_arms");
+  const Profile profile = ReadProfile(ProfilePage("real"));
+  const HiddenErrors of_one = DrawHiddenErrors(profile, ReadTask("take_bottle")), of_two = DrawHiddenErrors(profile, two);
+  ASSERT_EQ(of_two.joint_offset.size(), 2U);
+  EXPECT_EQ(of_two.joint_offset[1], of_one.joint_offset[0]);
+  EXPECT_NE(of_two.joint_offset[0], of_two.joint_offset[1]);
 }
 
 TEST(Sensors, ImageNoiseHasItsDeviationAndNoMean) {
