@@ -30,6 +30,11 @@ struct Listed {
   Labels labels;
 };
 
+struct Listing {
+  std::vector<Listed> episodes;
+  std::map<std::string, Counters> wire;  ///< by policy: how it misbehaved
+};
+
 bool IsWanted(const Episode& episode, const LsArguments& arguments) {
   const auto fits = [](const std::string& wanted, const std::string& found) {
     return wanted.empty() || wanted == found;
@@ -54,15 +59,15 @@ void Check(const LsArguments& arguments, const Store& store) {
   DemandKnown("--policy", arguments.policy, policies);
 }
 
-std::vector<Listed> List(const LsArguments& arguments) {
+Listing List(const LsArguments& arguments) {
   const Store store = Store::Open(arguments.run, Store::Mode::kReadOnly);
   Check(arguments, store);
   const std::vector<Episode> episodes = store.Episodes();  // before the verdicts: each verdict read has its episode
   const auto verdicts = store.CurrentVerdicts();
-  std::vector<Listed> list;
+  Listing list{{}, store.CountersByPolicy()};
   for (const Episode& episode : episodes) {
     if (!IsWanted(episode, arguments)) continue;
-    Listed& listed = list.emplace_back(Listed{episode, {}});
+    Listed& listed = list.episodes.emplace_back(Listed{episode, {}});
     const auto found = verdicts.find(episode.key.Id());
     if (found == verdicts.end()) continue;
     for (const auto& [judge, verdict] : found->second) listed.labels[judge] = verdict.label;
@@ -131,6 +136,17 @@ void PrintAligned(const std::vector<Row>& rows) {
   }
 }
 
+/// What came over the wire that was no plain answer, or not at once: effort, no part of a result.
+void PrintWire(const std::map<std::string, Counters>& wire) {
+  for (const auto& [policy, counters] : wire) {
+    std::vector<std::string> counted;
+    for (const auto& [name, count] : counters) {
+      if (count > 0) counted.push_back(fmt::format("{} {}", count, name));
+    }
+    if (!counted.empty()) fmt::print("wire: {}: {}\n", policy, fmt::join(counted, ", "));
+  }
+}
+
 void PrintTable(const std::vector<Listed>& list) {
   PrintAligned(Rows(list));
   std::set<std::string> tasks, policies, worlds;
@@ -169,8 +185,13 @@ void AddLs(CLI::App& app, ExitCode& exit_code) {
       "  evac ls out/demo --failed\n"
       "  evac ls out/demo --json | jq '.[] | select(.verdicts.oracle == \"success\") | .video'");
   command->callback([arguments, &exit_code] {
-    const std::vector<Listed> list = List(*arguments);
-    arguments->json ? PrintJson(list) : PrintTable(list);
+    const Listing list = List(*arguments);
+    if (arguments->json) {
+      PrintJson(list.episodes);
+    } else {
+      PrintTable(list.episodes);
+      PrintWire(list.wire);
+    }
     exit_code = ExitCode::kOk;
   });
 }

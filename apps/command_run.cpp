@@ -1,5 +1,6 @@
 #include <fmt/format.h>
 
+#include <cstdio>
 #include <memory>
 
 #include "apps/commands.h"
@@ -19,19 +20,31 @@ RunInfo InfoOf(const Suite& suite) {
 struct RunArguments {
   std::string suite, out;
   std::vector<std::string> assignments;
+  std::string shard = "1/1";
 };
 
 struct ResumeArguments {
   std::string run;
   bool retry_failed = false;
   int lanes = 0;
+  std::string shard = "1/1";
 };
+
+/// "2/4": the second of four.
+Shard ShardNamed(const std::string& text) {
+  Shard shard;
+  int read = 0;
+  const bool is_read = std::sscanf(text.c_str(), "%d/%d%n", &shard.number, &shard.of, &read) == 2 && read == static_cast<int>(text.size());
+  if (is_read && shard.number >= 1 && shard.number <= shard.of) return shard;
+  throw InvalidInput("--shard: found '{}', wanted which of how many, such as 2/4", text);
+}
 
 ExitCode Run(const RunArguments& arguments) {
   Suite suite = ReadSuite(arguments.suite, arguments.assignments);
+  const Shard shard = ShardNamed(arguments.shard);
   Store store = Store::CreateOrContinue(arguments.out, InfoOf(suite));
   FillInRecordedTask(suite);
-  return Evaluate(suite, store, {});
+  return Evaluate(suite, store, {.shard = shard});
 }
 
 ExitCode Resume(const ResumeArguments& arguments) {
@@ -44,7 +57,7 @@ ExitCode Resume(const ResumeArguments& arguments) {
   if (arguments.lanes > 0) suite.lanes = arguments.lanes;
   Store store = Store::CreateOrContinue(arguments.run, info);
   FillInRecordedTask(suite);
-  return Evaluate(suite, store, {.retry_failed = arguments.retry_failed});
+  return Evaluate(suite, store, {.shard = ShardNamed(arguments.shard), .retry_failed = arguments.retry_failed});
 }
 
 }  // namespace
@@ -55,6 +68,7 @@ void AddRun(CLI::App& app, ExitCode& exit_code) {
   command->add_option("suite", arguments->suite, "the suite's YAML file (docs/suite.md)")->required();
   command->add_option("-o,--out", arguments->out, "the run's folder; one that is there is continued")->required();
   command->add_option("--set", arguments->assignments, "override a field: path.to.field=VALUE (repeatable)")->expected(1)->take_all();
+  command->add_option("--shard", arguments->shard, "run only part I of N of the episodes: I/N (join the parts with evac merge)");
   command->footer("Examples:\n"
                   "  evac run apps/configs/demo.yaml --out out/demo\n"
                   "  evac run apps/configs/demo.yaml --out out/unseen --set initial_states.seed=9 --set initial_states.count=40\n"
@@ -69,6 +83,7 @@ void AddResume(CLI::App& app, ExitCode& exit_code) {
   command->add_option("run", arguments->run, "the run's folder")->required();
   command->add_flag("--retry-failed", arguments->retry_failed, "run the failed episodes again");
   command->add_option("--lanes", arguments->lanes, "episodes that advance together (changes no result)")->check(CLI::Range(1, 256));
+  command->add_option("--shard", arguments->shard, "run only part I of N of the episodes: I/N (join the parts with evac merge)");
   command->footer("Example:\n  evac resume out/demo --retry-failed");
   command->callback([arguments, &exit_code] { exit_code = Resume(*arguments); });
 }

@@ -10,6 +10,7 @@ namespace evac {
 /// Callbacks may throw Error; `main` prints it and ends with its exit code. One file each: command_run.cpp, …
 void AddRun(CLI::App& app, ExitCode& exit_code);
 void AddResume(CLI::App& app, ExitCode& exit_code);
+void AddMerge(CLI::App& app, ExitCode& exit_code);
 void AddJudge(CLI::App& app, ExitCode& exit_code);
 void AddCorrelate(CLI::App& app, ExitCode& exit_code);
 void AddReport(CLI::App& app, ExitCode& exit_code);

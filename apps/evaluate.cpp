@@ -3,12 +3,16 @@
 #include <fmt/format.h>
 
 #include <csignal>
+#include <cstdio>
 #include <memory>
+#include <set>
 
 #include "apps/factory.h"
 #include "apps/progress_display.h"
+#include "core/seed.h"
 #include "harness/rollout.h"
 #include "harness/scheduler.h"
+#include "harness/start_probe.h"
 #include "judges/judge_episodes.h"
 #include "judges/oracle_judge.h"
 
@@ -17,22 +21,42 @@ namespace {
 
 volatile std::sig_atomic_t g_interrupted = 0;
 
-/// While it lives, the first Ctrl-C ends the run in order, the second at once.
+constexpr int kInterrupts[] = {SIGINT, SIGTERM, SIGHUP};  ///< Ctrl-C, kill, the terminal is closed
+
+/// While it lives, the first Ctrl-C ends the run in order, the second at once. A closed terminal says so more than once
+/// (the kernel and the shell): that stays one.
 class CatchInterrupts {
  public:
   CatchInterrupts() {
     g_interrupted = 0;
-    for (const int signal : {SIGINT, SIGTERM}) {
+    for (const int signal : kInterrupts) {
       std::signal(signal, [](int caught) {
         g_interrupted = 1;
-        std::signal(caught, SIG_DFL);
+        if (caught != SIGHUP) std::signal(caught, SIG_DFL);
       });
     }
   }
   ~CatchInterrupts() {
-    for (const int signal : {SIGINT, SIGTERM}) std::signal(signal, SIG_DFL);
+    for (const int signal : kInterrupts) std::signal(signal, SIG_DFL);
   }
 };
+
+/// On stderr, which may be a terminal that is closed by now.
+template <typename... Args>
+void Tell(fmt::format_string<Args...> format, Args&&... args) {
+  std::fputs(fmt::format(format, std::forward<Args>(args)...).c_str(), stderr);
+}
+
+bool IsInterrupted() { return g_interrupted != 0; }
+
+/// "12 repeats, 3 late_replies", or nothing where the wire was quiet.
+std::string Sentence(const Counters& counters) {
+  std::string text;
+  for (const auto& [name, count] : counters) {
+    if (count > 0) text += fmt::format("{}{} {}", text.empty() ? "" : ", ", count, name);
+  }
+  return text;
+}
 
 /// What is still to do, over all pairings of a world with a policy.
 struct Plan {
@@ -42,11 +66,17 @@ struct Plan {
   int allowed = 0;      ///< how many may fail before the run gives up
 };
 
-Plan MakePlan(const Suite& suite, const Store& store) {
+std::vector<Job> JobsOf(const Suite& suite, const Shard& shard, const SuiteWorld& world, const SuitePolicy& policy) {
+  std::vector<Job> jobs = AllJobs(suite, world, policy);
+  std::erase_if(jobs, [&](const Job& job) { return !shard.Holds(job.key.pair); });
+  return jobs;
+}
+
+Plan MakePlan(const Suite& suite, const Shard& shard, const Store& store) {
   Plan plan;
   for (const SuiteWorld& world : suite.worlds) {
     for (const SuitePolicy& policy : suite.policies) {
-      const std::vector<Job> jobs = AllJobs(suite, world, policy);
+      const std::vector<Job> jobs = JobsOf(suite, shard, world, policy);
       plan.total += static_cast<int>(jobs.size());
       plan.missing += static_cast<int>(MissingJobs(jobs, store).size());
     }
@@ -65,21 +95,24 @@ void RetryFailed(Store& store) {
 /// One run's state while it goes from pairing to pairing.
 class Evaluation {
  public:
-  Evaluation(const Suite& suite, Store& store)
-      : suite_(suite), store_(store), plan_(MakePlan(suite, store)), display_(plan_.total, plan_.total - plan_.missing, stderr) {}
+  Evaluation(const Suite& suite, const Shard& shard, Store& store)
+      : suite_(suite), shard_(shard), store_(store), plan_(MakePlan(suite, shard, store)), display_(plan_.total, plan_.total - plan_.missing, stderr) {}
 
   /// One world under every policy. @returns false if the run must end.
   bool RunWorld(const SuiteWorld& suite_world) {
     std::unique_ptr<World> world;
     for (const SuitePolicy& suite_policy : suite_.policies) {
-      JobQueue jobs(MissingJobs(AllJobs(suite_, suite_world, suite_policy), store_));
+      JobQueue jobs(MissingJobs(JobsOf(suite_, shard_, suite_world, suite_policy), store_));
       if (jobs.size() == 0) continue;
       if (!world) world = MakeCheckedWorld(suite_world);
       display_.Begin(fmt::format("{} · {}@{}", suite_world.name, suite_policy.name, suite_policy.checkpoint));
-      RunningPolicy policy(suite_policy, suite_, store_.folder());
+      RunningPolicy policy(suite_policy, suite_, store_.folder(), IsInterrupted);
       store_.AddPolicy({suite_policy.name, suite_policy.checkpoint, policy.declaration()});
+      Probe(policy, *world, suite_world, suite_policy);
       const Summary summary = RunEpisodes(policy.policy(), *world, jobs, store_, Options(suite_world, policy));
       store_.Count(suite_policy.name + "@" + suite_policy.checkpoint, policy.counters());
+      const std::string wire = Sentence(policy.counters());
+      if (!wire.empty()) display_.Say(fmt::format("{}@{}: {}", suite_policy.name, suite_policy.checkpoint, wire));
       plan_.failed += summary.failed;
       if (summary.failed > 0) display_.Say(fmt::format("{} episodes failed; the last: {}", summary.failed, summary.last_failure));
       if (summary.interrupted || summary.budget_spent) return End(summary);
@@ -98,16 +131,35 @@ class Evaluation {
     return world;
   }
 
+  /// A policy that keeps to other conventions than it declared ends the run here, not in a hundred odd episodes.
+  void Probe(RunningPolicy& policy, World& world, const SuiteWorld& suite_world, const SuitePolicy& suite_policy) {
+    if (suite_.start_probe == StartProbe::kOff) return;
+    std::set<std::string> seen;
+    for (const Job& job : MissingJobs(JobsOf(suite_, shard_, suite_world, suite_policy), store_)) {
+      if (!seen.insert(job.key.pair.task).second) continue;
+      std::string certain;
+      for (const Suspicion& suspicion : ProbeStart(policy.policy(), world, job)) {
+        const std::string sentence = fmt::format("policy {}@{}, task {}, first chunk: {}", suite_policy.name, suite_policy.checkpoint,
+                                                 job.key.pair.task, suspicion.sentence);
+        const bool ends = suspicion.is_certain && suite_.start_probe == StartProbe::kRefuse;
+        if (ends) certain += (certain.empty() ? "" : "\n      ") + sentence;
+        if (!ends) display_.Say("warning: " + sentence);
+      }
+      if (!certain.empty()) throw InvalidInput("{}\n      See docs/conventions.md; if it is meant so, set policy.start_probe to warn", certain);
+    }
+  }
+
   RolloutOptions Options(const SuiteWorld& world, const RunningPolicy& policy) {
     RolloutOptions options;
     options.lanes = suite_.lanes;
     options.lane = {.chunk_size = suite_.chunk_size,
                     .policy_chunk_size = policy.chunk_size(),
+                    .latency = suite_.latency,
                     .video = suite_.video,
                     .keep_initial_scene = world.is_real};
     options.failures_left = plan_.allowed - plan_.failed;
     options.on_progress = [this](const Progress& progress) { display_.Show(progress, ProgressDisplay::Clock::now()); };
-    options.interrupted = [] { return g_interrupted != 0; };
+    options.interrupted = IsInterrupted;
     return options;
   }
 
@@ -120,6 +172,7 @@ class Evaluation {
   }
 
   const Suite& suite_;
+  Shard shard_;
   Store& store_;
   Plan plan_;
   ProgressDisplay display_;
@@ -134,29 +187,40 @@ void RunJudges(const Suite& suite, Store& store) {
   }
 }
 
+/// @returns why it ended before its last episode, or nothing.
+std::string RunWorlds(const Suite& suite, const Shard& shard, Store& store) try {
+  Evaluation evaluation(suite, shard, store);
+  for (const SuiteWorld& world : RealFirst(suite.worlds)) {
+    if (!evaluation.RunWorld(world)) break;
+  }
+  return evaluation.why_ended();
+} catch (const Error& error) {
+  if (IsInterrupted()) return "interrupted";
+  if (error.exit_code() != ExitCode::kInternal) throw;
+  throw InternalError("{}\n      what was stored is intact; once that is mended, go on with: evac resume {}", error.what(), store.folder().string());
+}
+
 }  // namespace
+
+bool Shard::Holds(const PairKey& pair) const {
+  const std::string name = fmt::format("{} {} {} {} {}", pair.task, pair.initial_state, pair.policy, pair.checkpoint, pair.seed);
+  return SeedFor(0, name) % static_cast<std::uint64_t>(of) == static_cast<std::uint64_t>(number - 1);
+}
 
 ExitCode Evaluate(const Suite& suite, Store& store, const EvaluateOptions& options) {
   const CatchInterrupts catch_interrupts;
   if (options.retry_failed) RetryFailed(store);
   store.RemoveOrphans();
   Declare(suite, store);
-  std::string why_ended;
-  {
-    Evaluation evaluation(suite, store);
-    for (const SuiteWorld& world : RealFirst(suite.worlds)) {
-      if (!evaluation.RunWorld(world)) break;
-    }
-    why_ended = evaluation.why_ended();
-  }
-  RunJudges(suite, store);
-  const Plan now = MakePlan(suite, store);
-  fmt::print(stderr, "{} of {} episodes stored in {}, {} failed\n", now.total - now.missing, now.total, store.folder().string(), now.failed);
+  std::string why_ended = RunWorlds(suite, options.shard, store);
+  if (!IsInterrupted()) RunJudges(suite, store);
+  const Plan now = MakePlan(suite, options.shard, store);
+  Tell("{} of {} episodes stored in {}, {} failed\n", now.total - now.missing, now.total, store.folder().string(), now.failed);
   if (why_ended.empty() && now.failed > now.allowed) {
     why_ended = fmt::format("{} episodes failed, {} of {} may (error_budget {})", now.failed, now.allowed, now.total, suite.error_budget);
   }
   if (why_ended.empty()) return ExitCode::kOk;
-  fmt::print(stderr, "evac: {}\n      go on with: evac resume {}{}\n", why_ended, store.folder().string(), now.failed > 0 ? " --retry-failed" : "");
+  Tell("evac: {}\n      go on with: evac resume {}{}\n", why_ended, store.folder().string(), now.failed > 0 ? " --retry-failed" : "");
   return ExitCode::kInternal;
 }
 

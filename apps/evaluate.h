@@ -9,7 +9,15 @@
 
 namespace evac {
 
+/// One part of a run's episodes. Which part an episode is in depends on its pair key alone, so that pairs stay together, and on
+/// nothing that could go with its difficulty.
+struct Shard {
+  int number = 1, of = 1;
+  bool Holds(const PairKey& pair) const;
+};
+
 struct EvaluateOptions {
+  Shard shard;
   bool retry_failed = false;  ///< failed episodes are removed first, and so run again
 };
 

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cstdlib>
+#include <random>
 #include <sstream>
 #include <thread>
 
@@ -56,6 +57,13 @@ PolicyProcessOptions ProcessOptions(const SuitePolicy& policy, const Suite& suit
           .log = log};
 }
 
+/// One that nobody has ever used, so that no policy left over from yesterday listens there: in a container even process
+/// numbers come again.
+LcmAddress NewAddress(const std::string& name) {
+  std::random_device random;
+  return LcmAddress::For(fmt::format("{} {} {:08x}{:08x}", name, ::getpid(), random(), random()));
+}
+
 /// Every task of the suite must fit, not only the one that was greeted with.
 void CheckAllTasks(const Suite& suite, const PolicySpec& declared) {
   for (const Task& task : suite.tasks) {
@@ -100,17 +108,21 @@ std::vector<std::string> CommandLine(const SuitePolicy& policy, const Suite& sui
   return words;
 }
 
-RunningPolicy::RunningPolicy(const SuitePolicy& policy, const Suite& suite, const fs::path& run_folder) {
+RunningPolicy::RunningPolicy(const SuitePolicy& policy, const Suite& suite, const fs::path& run_folder, std::function<bool()> interrupted) {
   LcmPolicyOptions options;
+  options.interrupted = std::move(interrupted);
   options.deadline_s = suite.transport.deadline_s;
   options.repeat_after_s = suite.transport.repeat_after_s;
+  options.keep_longer_chunks = suite.latency.kind != PolicyLatency::Kind::kOff;
   options.raw_images = suite.transport.images == "raw";
   if (policy.command.empty()) {
     options.address = {policy.join_url, policy.join_token};
   } else {
-    options.address = LcmAddress::For(fmt::format("{} {} {}@{}", fs::absolute(run_folder).string(), ::getpid(), policy.name, policy.checkpoint));
+    options.start_s = suite.transport.start_s;
+    options.address = NewAddress(fmt::format("{} {}@{}", fs::absolute(run_folder).string(), policy.name, policy.checkpoint));
     process_.emplace(ProcessOptions(policy, suite, run_folder, options.address));
     options.why_gone = [this] { return process_->WhyGone(); };
+    options.restart = [this] { process_->Restart(); };
   }
   link_.emplace(std::move(options));
   spec_ = link_->Handshake(HarnessSpec(suite.tasks.front(), suite.chunk_size), suite.transport.start_s);

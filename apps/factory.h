@@ -1,6 +1,7 @@
 #pragma once
 
 #include <filesystem>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <string>
@@ -34,8 +35,10 @@ std::vector<std::string> CommandLine(const SuitePolicy& policy, const Suite& sui
 /// A policy's process, if it is ours to start, and the link to it; both gone with this.
 class RunningPolicy {
  public:
-  /// Starts and greets it. @throws InvalidInput with both declarations if it does not fit the suite's tasks.
-  RunningPolicy(const SuitePolicy& policy, const Suite& suite, const std::filesystem::path& run_folder);
+  /// Starts and greets it. @param interrupted  asked while waiting for it.
+  /// @throws InvalidInput with both declarations if it does not fit the suite's tasks.
+  RunningPolicy(const SuitePolicy& policy, const Suite& suite, const std::filesystem::path& run_folder,
+                std::function<bool()> interrupted);
 
   Policy& policy() { return *link_; }
   int chunk_size() const { return spec_.chunk_size; }

@@ -15,6 +15,7 @@ int main(int argc, char** argv) {
   try {
     evac::AddRun(app, exit_code);
     evac::AddResume(app, exit_code);
+    evac::AddMerge(app, exit_code);
     evac::AddJudge(app, exit_code);
     evac::AddCorrelate(app, exit_code);
     evac::AddReport(app, exit_code);
@@ -25,10 +26,10 @@ int main(int argc, char** argv) {
   } catch (const CLI::ParseError& error) {
     return app.exit(error) == 0 ? 0 : static_cast<int>(evac::ExitCode::kInvalidInput);
   } catch (const evac::Error& error) {
-    fmt::print(stderr, "evac: {}\n", error.what());
+    std::fputs(fmt::format("evac: {}\n", error.what()).c_str(), stderr);
     return static_cast<int>(error.exit_code());
   } catch (const std::exception& error) {
-    fmt::print(stderr, "evac: internal error: {}\n", error.what());
+    std::fputs(fmt::format("evac: internal error: {}\n", error.what()).c_str(), stderr);
     return static_cast<int>(evac::ExitCode::kInternal);
   }
   return static_cast<int>(exit_code);

@@ -12,6 +12,12 @@ namespace {
 constexpr auto kBetweenLines = std::chrono::seconds(10);
 constexpr auto kBetweenDraws = std::chrono::milliseconds(100);
 
+/// The terminal may be closed by now: nobody is there to be told.
+void Print(std::FILE* out, const std::string& text) {
+  std::fwrite(text.data(), 1, text.size(), out);
+  std::fflush(out);
+}
+
 std::string Bar(double share, int width) {
   const int full = std::clamp(static_cast<int>(std::lround(share * width)), 0, width);
   std::string bar;
@@ -64,19 +70,17 @@ void ProgressDisplay::Show(const Progress& progress, Clock::time_point now) {
 
 void ProgressDisplay::Say(const std::string& sentence) {
   Erase();
-  fmt::print(out_, "{}\n", sentence);
-  std::fflush(out_);
+  Print(out_, sentence + "\n");
 }
 
 void ProgressDisplay::Draw(const std::string& text, int lines) {
   Erase();
-  fmt::print(out_, "{}", text);
-  std::fflush(out_);
+  Print(out_, text);
   drawn_lines_ = lines;
 }
 
 void ProgressDisplay::Erase() {
-  if (drawn_lines_ > 0) fmt::print(out_, "\033[{}F\033[J", drawn_lines_);
+  if (drawn_lines_ > 0) Print(out_, fmt::format("\033[{}F\033[J", drawn_lines_));
   drawn_lines_ = 0;
 }
 

@@ -99,6 +99,8 @@ Store Store::InMemory(const fs::path& folder, const RunInfo& run) {
   return Store(std::move(database));
 }
 
+std::string Store::Engine() { return std::string("SQLite ") + sqlite3_libversion(); }
+
 const fs::path& Store::folder() const { return database_->folder; }
 
 RunInfo Store::run() const {
@@ -177,6 +179,8 @@ void Store::AddInitialScene(const PairKey& pair, const InitialScene& scene) {
 std::optional<InitialScene> Store::LoadInitialScene(const std::string& task, const std::string& initial_state) const {
   return database_->Read([&](auto& connection) { return rows::SelectInitialScene(connection, task, initial_state); });
 }
+
+std::vector<PairKey> Store::InitialScenes() const { return database_->Read(rows::SelectInitialScenePairs); }
 
 void Store::AddVerdict(const Verdict& verdict) {
   database_->Write([&](auto& connection) { rows::InsertVerdict(connection, verdict); });

@@ -81,6 +81,9 @@ class Store {
   Store& operator=(Store&&) noexcept;
   ~Store();
 
+  /// "SQLite 3.40.1", for `evac doctor`.
+  static std::string Engine();
+
   const std::filesystem::path& folder() const;
   RunInfo run() const;
 
@@ -111,6 +114,9 @@ class Store {
   /// Kept for the lowest seed per (task, initial state), so that the order of finishing does not matter. Lossless.
   void AddInitialScene(const PairKey& pair, const InitialScene& scene);
   std::optional<InitialScene> LoadInitialScene(const std::string& task, const std::string& initial_state) const;
+
+  /// Of which episodes: their pair keys.
+  std::vector<PairKey> InitialScenes() const;
 
   void AddVerdict(const Verdict& verdict);
   /// Every verdict ever given, oldest first.

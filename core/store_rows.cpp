@@ -52,6 +52,15 @@ std::optional<InitialScene> SelectInitialScene(sqlite::Connection& connection, c
   return scene;
 }
 
+std::vector<PairKey> SelectInitialScenePairs(sqlite::Connection& connection) {
+  std::vector<PairKey> pairs;
+  auto row = connection.Query(
+      "SELECT task, initial_state, policy, checkpoint, seed FROM initial_scenes ORDER BY task, initial_state");
+  while (row.Step())
+    pairs.push_back({row.Text(0), row.Text(1), row.Text(2), row.Text(3), static_cast<std::uint64_t>(row.Integer(4))});
+  return pairs;
+}
+
 void InsertVerdict(sqlite::Connection& connection, const Verdict& verdict) {
   if (!SelectEpisode(connection, verdict.episode_id)) {
     throw InvalidInput("a verdict of {} on episode '{}', which is not in the store", verdict.judge, verdict.episode_id);

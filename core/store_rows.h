@@ -39,6 +39,8 @@ void UpsertInitialScene(sqlite::Connection& connection, const PairKey& pair, con
 std::optional<InitialScene> SelectInitialScene(sqlite::Connection& connection, const std::string& task,
                                                const std::string& initial_state);
 
+std::vector<PairKey> SelectInitialScenePairs(sqlite::Connection& connection);
+
 void InsertVerdict(sqlite::Connection& connection, const Verdict& verdict);
 std::vector<Verdict> SelectVerdicts(sqlite::Connection& connection);
 

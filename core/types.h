@@ -26,6 +26,7 @@ using Arms = std::vector<ArmState>;
 struct ActionChunk {
   std::vector<Arms> targets;   ///< targets[k] is due (k + 1) periods after the observation it answers
   bool ends_recording = false; ///< a replayed recording has nothing after these: the episode ends with them
+  double thinking_s = 0;       ///< how long the answer took, by the wall clock; 0 where nobody measured it
 };
 
 enum class Mount { kBase, kLeftGripper, kRightGripper };

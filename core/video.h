@@ -8,10 +8,14 @@
 
 namespace evac {
 
+/// libx264's, from fastest to smallest.
+inline constexpr const char* kVideoPresets[] = {"ultrafast", "superfast", "veryfast", "faster", "fast",
+                                                "medium",    "slow",      "slower",   "veryslow"};
+
 struct VideoOptions {
   double period_s = 0.1;  ///< presentation time of frame k is k * period_s exactly (time base 1/1000 s or finer)
   int crf = 20;           ///< H.264 quality, 0 lossless … 51
-  std::string preset = "veryfast";
+  std::string preset = "veryfast";  ///< one of kVideoPresets
   int scale = 1;  ///< each pixel becomes scale x scale (nearest), so that small frames are legible in a player
 };
 
@@ -64,6 +68,9 @@ class VideoReader {
   struct Decoder;
   std::unique_ptr<Decoder> decoder_;
 };
+
+/// "libavcodec 59.37.100", for `evac doctor`.
+std::string VideoLibrary();
 
 /// Every frame of a short video.
 std::vector<cv::Mat> ReadAllFrames(const std::filesystem::path& path);

@@ -173,4 +173,9 @@ double VideoReader::time_s() const { return decoder_->time_s_; }
 int VideoReader::width_px() const { return decoder_->rgb_ ? decoder_->rgb_->width : decoder_->codec_->width; }
 int VideoReader::height_px() const { return decoder_->rgb_ ? decoder_->rgb_->height : decoder_->codec_->height; }
 
+std::string VideoLibrary() {
+  const unsigned version = avcodec_version();
+  return fmt::format("libavcodec {}.{}.{}", AV_VERSION_MAJOR(version), AV_VERSION_MINOR(version), AV_VERSION_MICRO(version));
+}
+
 }  // namespace evac

@@ -29,41 +29,50 @@ cv::Mat Enlarged(const cv::Mat& image, int scale) {
 }  // namespace
 
 Lane::Lane(SceneId scene, Job job, const LaneOptions& options, Store& store)
-    : scene_(scene), job_(std::move(job)), options_(options), store_(store), still_(job_.task->still) {
+    : scene_(scene), job_(std::move(job)), options_(options), store_(store), plan_(options.latency, options.chunk_size), still_(job_.task->still) {
   episode_.key = job_.key;
 }
 
 void Lane::Begin(Policy& policy, World& world) {
-  StopReason blame = StopReason::kWorldError;
+  const std::optional<WorldStep> first = ResetWorld(world);
+  if (!first) return;
+  Keep(*first);
   try {
-    const WorldStep first = world.Reset(scene_, *job_.task, job_.initial, job_.WorldSeed());
-    if (const auto wrong = WhatIsWrong(first.observation, *job_.task)) throw InternalError("{}", *wrong);
-    VideoOptions video = options_.video;
-    video.period_s = job_.task->period_s;
-    video_.emplace(store_.VideoPath(job_.key), video);
-    Append(first);
-    if (options_.keep_initial_scene) {
-      store_.AddInitialScene(job_.key.pair, {first.observation.images, first.observation.arms, job_.task->cameras});
-    }
-    blame = StopReason::kPolicyError;
     policy.Reset(scene_, *job_.task, job_.PolicySeed());
   } catch (const std::exception& error) {
-    Fail({blame, error.what()});
+    Fail({StopReason::kPolicyError, error.what()});
   }
+}
+
+std::optional<WorldStep> Lane::ResetWorld(World& world) try {
+  WorldStep first = world.Reset(scene_, *job_.task, job_.initial, job_.WorldSeed());
+  if (const auto wrong = WhatIsWrong(first.observation, *job_.task)) throw InternalError("{}", *wrong);
+  return first;
+} catch (const std::exception& error) {
+  Fail({StopReason::kWorldError, error.what()});
+  return std::nullopt;
+}
+
+/// The first frames: of the video, and of the scene where imagined episodes start.
+void Lane::Keep(const WorldStep& first) {
+  VideoOptions video = options_.video;
+  video.period_s = job_.task->period_s;
+  video_.emplace(store_.VideoPath(job_.key), video);
+  Append(first);
+  if (!options_.keep_initial_scene) return;
+  store_.AddInitialScene(job_.key.pair, {first.observation.images, first.observation.arms, job_.task->cameras});
 }
 
 void Lane::Command(const Acted& acted) {
   if (const Failure* failure = std::get_if<Failure>(&acted)) return Fail(*failure);
-  chunk_ = std::get<ActionChunk>(acted);
-  if (const auto wrong = WhatIsWrong(chunk_, *job_.task, options_.policy_chunk_size)) {
+  const auto& answered = std::get<ActionChunk>(acted);
+  if (const auto wrong = WhatIsWrong(answered, *job_.task, options_.policy_chunk_size)) {
     return Fail({StopReason::kPolicyError, fmt::format("chunk {}: {}", episode_.chunks + 1, *wrong)});
   }
-  if (static_cast<int>(chunk_.targets.size()) > options_.chunk_size) {
-    chunk_.targets.resize(options_.chunk_size);
-    chunk_.ends_recording = false;
-  }
+  const std::vector<Arms> observed = ObservedSinceLastChunk();
   const Arms& last = episode_.commands.empty() ? observation().arms : episode_.commands.back();
-  if (const auto rest = still_.Rest(last, chunk_.targets, ObservedSinceLastChunk())) Stop(StopReason::kStill, *rest);
+  chunk_ = plan_.Execute(last, answered, job_.task->period_s);
+  if (const auto rest = still_.Rest(last, chunk_.targets, observed)) Stop(StopReason::kStill, *rest);
 }
 
 void Lane::Observe(const Advanced& advanced) {
@@ -110,7 +119,7 @@ void Lane::Append(const WorldStep& step) {
 std::vector<Arms> Lane::ObservedSinceLastChunk() const {
   const auto& observations = episode_.observations;
   if (observations.back().arms_are_commanded) return {};
-  const std::size_t count = std::min<std::size_t>(observations.size(), options_.chunk_size + 1);
+  const std::size_t count = std::min(observations.size(), chunk_.targets.size() + 1);
   std::vector<Arms> observed;
   for (std::size_t i = observations.size() - count; i < observations.size(); ++i) observed.push_back(observations[i].arms);
   return observed;

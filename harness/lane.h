@@ -8,6 +8,7 @@
 #include "core/store.h"
 #include "core/world.h"
 #include "harness/job.h"
+#include "harness/policy_latency.h"
 #include "harness/still.h"
 
 namespace evac {
@@ -16,6 +17,7 @@ namespace evac {
 struct LaneOptions {
   int chunk_size = 8;         ///< targets executed per chunk; a policy's longer chunk is cut to it
   int policy_chunk_size = 8;  ///< targets a policy may answer
+  PolicyLatency latency;      ///< what the world does while the policy thinks
   VideoOptions video;         ///< period_s is the task's
   bool keep_initial_scene = false;  ///< the world is the real one: its first frames start the imagined episodes
 };
@@ -26,11 +28,11 @@ class Lane {
  public:
   Lane(SceneId scene, Job job, const LaneOptions& options, Store& store);
 
-  /// Resets both sides. What either throws is the episode's failure.
+  /// Resets both sides. What either throws is the episode's failure; what the disk refuses is thrown.
   void Begin(Policy& policy, World& world);
   /// Takes the policy's answer: checks it, and asks the stop rule whether the episode has come to rest.
   void Command(const Acted& acted);
-  /// Takes the world's answer to the chunk.
+  /// Takes the world's answer to the chunk. @throws Error if the video cannot be written.
   void Observe(const Advanced& advanced);
   void Fail(const Failure& failure);
   /// The row, with its finished video.
@@ -45,6 +47,8 @@ class Lane {
 
  private:
   void Stop(StopReason stop, const std::string& sentence);
+  std::optional<WorldStep> ResetWorld(World& world);
+  void Keep(const WorldStep& first);
   void Append(const WorldStep& step);
   std::vector<Arms> ObservedSinceLastChunk() const;
 
@@ -56,7 +60,8 @@ class Lane {
   PrivilegedTrack privileged_;
   std::optional<VideoWriter> video_;
   cv::Mat last_frame_;
-  ActionChunk chunk_;
+  ExecutedPlan plan_;
+  ActionChunk chunk_;  ///< what is executed now: the chunk's part of the plan
   StillMeter still_;
   bool over_ = false;
 };

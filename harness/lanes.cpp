@@ -26,30 +26,35 @@ std::vector<Lane*> Lanes::Live() const {
   return live;
 }
 
-std::vector<SceneObservation> Lanes::Observed() const {
-  std::vector<SceneObservation> observed;
-  for (const Lane* lane : Live()) observed.push_back({lane->scene(), &lane->observation()});
-  return observed;
-}
-
-void Lanes::Command(const std::vector<Acted>& answers) {
+void Lanes::Command(Policy& policy) {
   const std::vector<Lane*> live = Live();
-  if (answers.size() != live.size()) throw InternalError("the policy was asked for {} chunks and answered {}", live.size(), answers.size());
+  std::vector<SceneObservation> observed;
+  for (const Lane* lane : live) observed.push_back({lane->scene(), &lane->observation()});
+  std::vector<Acted> answers;
+  try {
+    answers = policy.Act(observed);
+    if (answers.size() != live.size()) throw InternalError("the policy was asked for {} chunks and answered {}", live.size(), answers.size());
+  } catch (const std::exception& error) {
+    return FailAll({StopReason::kPolicyError, error.what()});
+  }
   for (std::size_t i = 0; i < live.size(); ++i) live[i]->Command(answers[i]);
 }
 
-std::vector<SceneChunk> Lanes::Commanded() const {
-  std::vector<SceneChunk> commanded;
-  for (const Lane* lane : Live()) commanded.push_back({lane->scene(), &lane->chunk()});
-  return commanded;
-}
-
-void Lanes::Observe(const std::vector<Advanced>& answers) {
+void Lanes::Observe(World& world) {
   const std::vector<Lane*> live = Live();
-  if (answers.size() != live.size()) throw InternalError("the world was given {} chunks and answered {}", live.size(), answers.size());
+  std::vector<SceneChunk> commanded;
+  for (const Lane* lane : live) commanded.push_back({lane->scene(), &lane->chunk()});
+  std::vector<Advanced> answers;
+  try {
+    answers = world.Advance(commanded);
+    if (answers.size() != live.size()) throw InternalError("the world was given {} chunks and answered {}", live.size(), answers.size());
+  } catch (const std::exception& error) {
+    return FailAll({StopReason::kWorldError, error.what()});
+  }
   for (std::size_t i = 0; i < live.size(); ++i) live[i]->Observe(answers[i]);
 }
 
+/// The policy or the world broke as a whole.
 void Lanes::FailAll(const Failure& failure) {
   for (Lane* lane : Live()) lane->Fail(failure);
 }

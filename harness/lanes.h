@@ -16,16 +16,12 @@ class Lanes {
   /// Free lanes take the next jobs: Reset on both sides. @returns the number of lanes that hold an episode.
   int Refill(JobQueue& jobs, Policy& policy, World& world);
 
-  /// The newest observation of every live lane, in lane order.
-  std::vector<SceneObservation> Observed() const;
-  void Command(const std::vector<Acted>& answers);
+  /// Asks the policy for all of them. What it throws is every live episode's failure.
+  void Command(Policy& policy);
 
-  /// The chunk of every lane that is still live after Command.
-  std::vector<SceneChunk> Commanded() const;
-  void Observe(const std::vector<Advanced>& answers);
-
-  /// Ends every live lane with the same failure: the policy or the world broke as a whole.
-  void FailAll(const Failure& failure);
+  /// Has the world execute the chunks of the lanes that are still live. What it throws is their failure; what the disk
+  /// refuses is thrown here, and ends the run.
+  void Observe(World& world);
 
   /// The episodes that are over, their videos finished; their lanes are free.
   std::vector<EpisodeRecord> TakeFinished();
@@ -34,6 +30,7 @@ class Lanes {
 
  private:
   std::vector<Lane*> Live() const;
+  void FailAll(const Failure& failure);
 
   Store& store_;
   const RolloutOptions& options_;

@@ -98,6 +98,11 @@ void PolicyProcess::Stop() {
   if (supervisor_.joinable()) supervisor_.join();
 }
 
+void PolicyProcess::Restart() {
+  const std::lock_guard lock(mutex_);
+  if (alive_pipe_ >= 0) ::close(std::exchange(alive_pipe_, -1));  // the guardian ends it; Supervise sees a death
+}
+
 std::optional<std::string> PolicyProcess::WhyGone() const {
   const std::lock_guard lock(mutex_);
   return why_gone_;

@@ -21,7 +21,7 @@ struct PolicyProcessOptions {
   int restarts = 5;  ///< more deaths than this within `window_s`: given up; at once after exit
                      ///< code 127 (not found) or 2 (refuses its options)
   double window_s = 60;
-  double grace_s = 3;  ///< between SIGTERM and SIGKILL
+  double grace_s = 1;  ///< between SIGTERM and SIGKILL: short, so that Ctrl-C ends a run within two seconds
 };
 
 /// A policy's process, started, watched, restarted and stopped. Nothing of it outlives the harness:
@@ -43,6 +43,9 @@ class PolicyProcess {
 
   /// SIGTERM to all of it, `grace_s`, SIGKILL; returns when nothing is left. Idempotent.
   void Stop();
+
+  /// Ends it, as Stop does, to be started again after the usual back-off: it hangs. Returns at once. Thread-safe.
+  void Restart();
 
   /// Why it is not coming back: "its process ended 6 times within 60 s, at last with exit code 3: <log's last line>
   /// (policy.log)". Nothing while it runs or is about to be restarted, and after Stop. Thread-safe.

@@ -5,16 +5,6 @@
 namespace evac {
 namespace {
 
-/// What a policy or a world throws for a whole batch is the failure of every live episode, not the end of the run.
-template <typename Step>
-void OrFailAll(Lanes& lanes, StopReason blame, const Step& step) {
-  try {
-    step();
-  } catch (const std::exception& error) {
-    lanes.FailAll({blame, error.what()});
-  }
-}
-
 void Keep(const EpisodeRecord& record, Store& store, Summary& summary) {
   store.Add(record);
   ++summary.done;
@@ -35,12 +25,10 @@ Summary RunEpisodes(Policy& policy, World& world, JobQueue& jobs, Store& store, 
   Summary summary;
   Lanes lanes(store, options);
   while (!MustEnd(options, summary) && lanes.Refill(jobs, policy, world) > 0) {  // new episodes take the free lanes: Reset on both sides
-    OrFailAll(lanes, StopReason::kPolicyError, [&] {
-      lanes.Command(policy.Act(lanes.Observed()));  // one chunk of actions per live lane, or why not; the stop rule reads it
-    });
-    OrFailAll(lanes, StopReason::kWorldError, [&] {
-      lanes.Observe(world.Advance(lanes.Commanded()));  // one call answers all lanes that have not come to rest
-    });
+    lanes.Command(policy);  // one chunk of actions per live lane, or why not; the stop rule reads it
+    if (MustEnd(options, summary)) break;  // whoever waited was sent away: no failure of the policy's
+    lanes.Observe(world);  // one call answers all lanes that have not come to rest
+    if (MustEnd(options, summary)) break;  // Ctrl-C reaches a world's helpers too: no failure of the world's
     for (const EpisodeRecord& record : lanes.TakeFinished()) Keep(record, store, summary);
     if (options.on_progress) options.on_progress({summary.done, summary.failed, lanes.State()});
   }

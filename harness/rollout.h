@@ -29,7 +29,7 @@ struct RolloutOptions {
   LaneOptions lane;
   int failures_left = 1;   ///< stop when more episodes than this have failed
   std::function<void(const Progress&)> on_progress;  ///< after every chunk; may be empty
-  std::function<bool()> interrupted;                 ///< asked after every chunk; may be empty
+  std::function<bool()> interrupted;                 ///< asked after every answer and every chunk; may be empty
 };
 
 struct Summary {
@@ -44,6 +44,7 @@ struct Summary {
 ///
 /// An episode's result is the same, bit for bit, for any number of lanes, any company, order or resume, as long as the
 /// policy and the world keep their contracts. A failed episode is a row with a reason; it ends no other.
+/// @throws Error if nothing can be kept any more: the disk is full or gone. No episode is blamed for that.
 Summary RunEpisodes(Policy& policy, World& world, JobQueue& jobs, Store& store, const RolloutOptions& options);
 
 }  // namespace evac

@@ -1,8 +1,10 @@
 #include "harness/suite.h"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
+#include <cstdlib>
 #include <set>
 
 #include "core/config.h"
@@ -120,6 +122,29 @@ Transport ReadTransport(const Config& suite) {
   return transport;
 }
 
+PolicyLatency ReadLatency(const Config& page) {
+  const std::string text = page.Get<std::string>("latency", "off");
+  if (text == "off") return {};
+  if (text == "measured") return {.kind = PolicyLatency::Kind::kMeasured, .fixed_s = 0};
+  char* end = nullptr;
+  const double seconds = std::strtod(text.c_str(), &end);
+  page.Require(*end == '\0' && seconds > 0 && seconds <= 60, "latency", "measured, off, or seconds, more than 0 … 60");
+  return {.kind = PolicyLatency::Kind::kFixed, .fixed_s = seconds};
+}
+
+/// What holds for all policies of the suite.
+void ReadPolicySection(const Config& suite_page, Suite& suite) {
+  if (!suite_page.Has("policy")) return;
+  const Config page = suite_page.Section("policy");
+  page.AllowOnly({"latency", "start_probe"});
+  suite.latency = ReadLatency(page);
+  const std::string probe = page.Get<std::string>("start_probe", "refuse");
+  page.Require(probe == "refuse" || probe == "warn" || probe == "off", "start_probe", "refuse, warn or off");
+  suite.start_probe = probe == "refuse" ? StartProbe::kRefuse : probe == "warn" ? StartProbe::kWarn : StartProbe::kOff;
+  page.Require(suite.latency.kind != PolicyLatency::Kind::kMeasured || suite.lanes == 1, "latency",
+               "`lanes: 1` with it: else one episode's thinking is another's waiting, and is measured too");
+}
+
 VideoOptions ReadVideo(const Config& suite) {
   VideoOptions video;
   video.scale = 4;
@@ -129,6 +154,8 @@ VideoOptions ReadVideo(const Config& suite) {
   video.crf = page.Get<int>("crf", video.crf);
   video.preset = page.Get<std::string>("preset", video.preset);
   video.scale = page.Get<int>("scale", video.scale);
+  page.Require(std::find(std::begin(kVideoPresets), std::end(kVideoPresets), video.preset) != std::end(kVideoPresets), "preset",
+               fmt::format("one of {}", fmt::join(kVideoPresets, ", ")));
   page.Require(video.crf >= 0 && video.crf <= 51, "crf", "0 (lossless) … 51");
   page.Require(video.scale >= 1 && video.scale <= 16, "scale", "1 … 16");
   return video;
@@ -162,7 +189,7 @@ void CheckWhole(const Suite& suite, const Config& page) {
 
 Suite Build(const Config& page) {
   page.AllowOnly({"suite", "description", "recording", "worlds", "tasks", "policies", "seeds", "initial_states", "chunk_size", "lanes", "threads",
-                  "error_budget", "image", "still", "judges", "video", "transport"});
+                  "error_budget", "image", "still", "judges", "video", "transport", "policy"});
   Suite suite;
   suite.name = NameField(page, "suite");
   suite.path = page.file();
@@ -184,6 +211,7 @@ Suite Build(const Config& page) {
   suite.judges = page.Get<std::vector<std::string>>("judges", {});
   suite.video = ReadVideo(page);
   suite.transport = ReadTransport(page);
+  ReadPolicySection(page, suite);
   CheckWhole(suite, page);
   suite.hash = SuiteHash(page, suite);
   return suite;

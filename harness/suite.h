@@ -8,6 +8,7 @@
 
 #include "core/store.h"
 #include "core/types.h"
+#include "harness/policy_latency.h"
 
 namespace evac {
 
@@ -31,6 +32,9 @@ struct Transport {
   std::string images = "jpeg"; ///< jpeg or raw
 };
 
+/// What is done about a policy whose first chunk does not look like its declared conventions (harness/start_probe.h).
+enum class StartProbe { kRefuse, kWarn, kOff };
+
 /// One YAML file holds a whole evaluation (docs/suite.md). Paths in it are relative to the file.
 struct Suite {
   std::string name;
@@ -49,6 +53,8 @@ struct Suite {
   std::vector<std::string> judges;
   VideoOptions video;
   Transport transport;
+  PolicyLatency latency;
+  StartProbe start_probe = StartProbe::kRefuse;
   std::optional<std::filesystem::path> recording;
 };
 

@@ -50,7 +50,7 @@ std::string SuiteHash(const Config& page, const Suite& suite) {
   for (std::string line; std::getline(lines, line);) {
     const bool by_content = StartsWithAny(line, {".recording=", ".tasks."}) || line.find(".profile=") != std::string::npos;
     if (!by_content && !StartsWithAny(line, {".lanes=", ".threads=", ".error_budget=", ".description=", ".transport.deadline_s=",
-                                          ".transport.repeat_after_s=", ".transport.start_s="})) text << line << "\n";
+                                          ".transport.repeat_after_s=", ".transport.start_s=", ".policy.start_probe="})) text << line << "\n";
   }
   for (const Task& task : suite.tasks) text << "task " << task.id << " " << HashOfPage(task.page_path) << "\n";
   for (const SuiteWorld& world : suite.worlds) {

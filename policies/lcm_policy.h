@@ -16,12 +16,18 @@ namespace evac {
 struct LcmPolicyOptions {
   LcmAddress address{};
   double deadline_s = 20;       ///< from a request's first sending to giving it up as policy_timeout
-  double repeat_after_s = 0.5;  ///< before the first repeat of what was not answered; doubles with each
+  double start_s = 0;           ///< for an episode's start, if longer: a process that was restarted may have much to load
+  double repeat_after_s = 0.5;  ///< before the first repeat of what was not answered; doubles with each, up to eightfold
   bool raw_images = false;      ///< exact pixels instead of JPEG; for tests
   int jpeg_quality = 95;        ///< 0 … 100
   Pacing pacing{};
   /// Asked while waiting: why nobody will ever answer (PolicyProcess::WhyGone), so that nobody waits for the deadline.
   std::function<std::optional<std::string>()> why_gone{};
+  /// Called when the policy was silent for a whole deadline: it hangs (PolicyProcess::Restart). May be empty.
+  std::function<void()> restart{};
+  /// Asked while waiting: the user wants an end. Who waits gets a Failure at once; nobody is to keep it. May be empty.
+  std::function<bool()> interrupted{};
+  bool keep_longer_chunks = false;  ///< a chunk longer than the harness executes stays whole (policy latency needs it)
 };
 
 /// A policy in another process, at the end of an LCM link (docs/formats/policy_wire.md).
@@ -55,6 +61,7 @@ class LcmPolicy : public Policy {
   void Reset(SceneId scene, const Task& task, std::uint64_t seed) override;
 
   /// All scenes' requests are sent before the first answer is awaited. Chunks longer than the harness's are cut to it.
+  /// ActionChunk::thinking_s is the time from a request's first sending to its answer.
   std::vector<Acted> Act(std::span<const SceneObservation> batch) override;
 
   /// repeats, stale_replies (of an earlier request), duplicate_replies, late_replies (after the deadline),

@@ -4,6 +4,7 @@
 #include <map>
 #include <set>
 
+#include "core/config.h"
 #include "reports/findings.h"
 #include "reports/html.h"
 #include "reports/page_parts.h"
@@ -62,6 +63,17 @@ std::string Policies(const RunSummary& summary) {
                                        : Folded(label, policy.declaration);
   }
   return html;
+}
+
+/// As the suite says: results are only comparable where it is the same.
+std::string Latency(const RunSummary& summary) try {
+  const Config suite = Config::FromText(summary.data.run.suite_text, "suite");
+  const std::string latency = suite.Has("policy") ? suite.Section("policy").Get<std::string>("latency", "off") : "off";
+  if (latency == "off") return "off: the worlds wait while a policy thinks";
+  if (latency == "measured") return "measured: the worlds move on while a policy thinks, and no two runs are alike";
+  return fmt::format("{} s: the worlds move on for that long while a policy thinks", Escaped(latency));
+} catch (const Error&) {
+  return "";
 }
 
 std::string Judges(const RunSummary& summary) {
@@ -132,7 +144,7 @@ std::string ProvenancePart(const RunSummary& summary, const PageOptions& options
   html += Row("Suite", "SHA-256 " + Code(run.suite_hash) + Folded("The effective suite", run.suite_text));
   html +=
       Row("Versions", fmt::format("run by evac {}, page by {}", Escaped(run.evac_version), Escaped(options.program)));
-  html += Row("Worlds", Worlds(summary)) + Row("Tasks", Tasks(summary)) + Row("Policies", Policies(summary)) +
+  html += Row("Worlds", Worlds(summary)) + Row("Tasks", Tasks(summary)) + Row("Policies", Policies(summary)) + Row("Policy latency", Latency(summary)) +
           Row("Judges", Judges(summary));
   html += Row("Methods", Methods(summary)) + Row("Not counted", Exclusions(summary));
   return html +

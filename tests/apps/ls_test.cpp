@@ -123,5 +123,11 @@ TEST_F(Ls, TheTableEndsWithASummary) {
   EXPECT_THAT(table, HasSubstr("\n3 episodes (1 task, 1 policy, 2 worlds), 1 failed, 1 judged\n"));
 }
 
+TEST_F(Ls, HowTheWireMisbehavedIsShownWhereItDid) {
+  EXPECT_THAT(Print({}), testing::Not(HasSubstr("wire:")));
+  store_.Count("visual_pick@good", {{"repeats", 31}, {"late_replies", 0}, {"timeouts", 2}});
+  EXPECT_THAT(Print({}), HasSubstr("wire: visual_pick@good: 31 repeats, 2 timeouts\n"));
+}
+
 }  // namespace
 }  // namespace evac

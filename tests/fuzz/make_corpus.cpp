@@ -2,11 +2,62 @@
 
 #include "core/file.h"
 #include "core/npy.h"
+#include "core/store.h"
+#include "core/store_codec.h"
 #include "tests/support/synthetic_recording.h"
 
 namespace {
 
 namespace fs = std::filesystem;
+
+evac::Task SomeTask() {
+  evac::Task task;
+  task.id = "take_bottle";
+  task.cameras.push_back({.name = "head", .width_px = 8, .height_px = 8, .fx_px = 8, .fy_px = 8, .cx_px = 4, .cy_px = 4});
+  task.rubric.stages.push_back({.name = "reach", .all_of = {{.kind = "distance", .a = "gripper", .b = "bottle", .below = 0.2}}});
+  return task;
+}
+
+/// A run with one of everything; each kind of bytes after the letter that says which it is (store_fuzz.cpp).
+void MakeStoreSeeds(const fs::path& folder) {
+  const auto seed = [&](const std::string& name, const char kind, const std::string& bytes) {
+    evac::WriteText(folder / name, kind + bytes);
+  };
+  const evac::Task task = SomeTask();
+  const cv::Mat image(8, 8, CV_8UC3, cv::Scalar(10, 120, 200));
+  evac::Episode episode{.key = {{task.id, "1-0000", "hold", "a", 1}, "real"}, .stop = evac::StopReason::kStill, .stop_reason = "still"};
+  episode.observations.assign(2, {.images = {}, .arms = evac::Arms(1)});
+  episode.commands.assign(1, evac::Arms(1));
+  const evac::PrivilegedTrack track(2, {.bodies = {{"bottle"}, {"table"}}, .contacts = {{"bottle", "table", 1}}});
+  const fs::path run = folder / "run";
+  {
+    evac::Store store = evac::Store::CreateOrContinue(run, {.suite_text = "suite: t", .suite_hash = "h", .suite_path = "", .evac_version = "0"});
+    store.AddTask(task);
+    store.AddWorld({.name = "real", .type = "mujoco", .is_real = true, .profile_hash = ""});
+    store.AddPolicy({"hold", "a", "{}"});
+    store.Add({.episode = episode, .privileged = track, .video = {}, .thumbnail_jpeg = {}});
+    store.AddInitialScene(episode.key.pair, {{image}, evac::Arms(1), task.cameras});
+    store.AddVerdict({.episode_id = episode.key.Id(), .judge = "oracle", .label = evac::Label::kSuccess});
+    store.Count("hold@a", {{"repeats", 3}});
+  }
+  seed("arms", 0, evac::codec::EncodeArms({{evac::Arms(2), true}}));
+  seed("privileged", 1, evac::codec::EncodePrivileged(track));
+  seed("cameras", 2, evac::codec::EncodeCameras(task.cameras));
+  seed("task", 3, evac::codec::EncodeTask(task));
+  seed("database", 4, evac::ReadFile(run / "evac.sqlite"));
+  fs::remove_all(run);
+  evac::WriteText(folder.parent_path() / "png_fuzz/small.png", evac::codec::EncodePng(image));
+}
+
+/// The project's own pages, each after the letter that says what it is (suite_fuzz.cpp).
+void MakePageSeeds(const fs::path& folder) {
+  const fs::path root = EVAC_SOURCE_DIR;
+  for (const char* suite : {"apps/configs/demo.yaml", "apps/configs/agibot_replay.yaml", "tests/system/faults.yaml"})
+    evac::WriteText(folder / fs::path(suite).filename(), "1" + evac::ReadFile(root / suite));
+  for (const auto& page : fs::directory_iterator(root / "worldmodel/sim/scenes")) {
+    if (page.path().extension() == ".yaml") evac::WriteText(folder / page.path().filename(), "0" + evac::ReadFile(page.path()));
+  }
+}
 
 /// CORPUS/npy_fuzz: one array per type. CORPUS/recording_fuzz: a camera's pages, each after the letter that says which
 /// it is. CORPUS/proprio_fuzz and CORPUS/video_fuzz: a track and a video of four steps.
@@ -25,6 +76,8 @@ void MakeCorpus(const fs::path& corpus) {
   fs::rename(clip / "proprio_stats.h5", corpus / "proprio_fuzz" / "four_steps.h5");
   fs::rename(clip / "head_color.mp4", corpus / "video_fuzz" / "four_frames.mp4");
   fs::remove_all(clip);
+  MakeStoreSeeds(corpus / "store_fuzz");
+  MakePageSeeds(corpus / "suite_fuzz");
 }
 
 }  // namespace

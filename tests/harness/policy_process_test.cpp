@@ -91,6 +91,18 @@ TEST_F(PolicyProcessTest, OneThatDiesIsStartedAgain) {
   EXPECT_EQ(process.WhyGone(), std::nullopt);
 }
 
+TEST_F(PolicyProcessTest, OneThatHangsIsRestartedOnDemand) {
+  PolicyProcess process(Shell("trap '' TERM; echo $$ > $FOLDER/self; while :; do sleep 1000; done"));
+  const pid_t first = PidIn("self");
+  fs::remove(folder_ / "self");
+  process.Restart();
+  const pid_t second = PidIn("self");
+  EXPECT_NE(second, first);
+  EXPECT_FALSE(IsAlive(first));
+  EXPECT_EQ(process.restarts(), 1);
+  EXPECT_FALSE(process.WhyGone());
+}
+
 TEST_F(PolicyProcessTest, OneThatDiesAgainAndAgainIsGivenUpWithItsLastWords) {
   PolicyProcessOptions options = Shell("echo first words; echo no such checkpoint; exit 3");
   options.restarts = 2;

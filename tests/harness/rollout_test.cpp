@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <fstream>
 #include <map>
 
 #include "core/error.h"
@@ -252,7 +253,7 @@ TEST_F(Rollout, AnInterruptedRunKeepsWhatIsFinishedAndTheRestRunsLater) {
   WalkingPolicy policy;
   Store store = NewDeclaredStore("interrupted");
   options_.lanes = 2;
-  options_.interrupted = [chunks = 0]() mutable { return ++chunks > 7; };
+  options_.interrupted = [chunks = 0]() mutable { return ++chunks > 20; };
   const Summary first = Run(policy, Jobs(5), store);
   EXPECT_TRUE(first.interrupted);
   EXPECT_EQ(first.done, 2);
@@ -262,6 +263,41 @@ TEST_F(Rollout, AnInterruptedRunKeepsWhatIsFinishedAndTheRestRunsLater) {
   std::vector<Job> rest = Jobs(5);
   std::erase_if(rest, [&](const Job& job) { return store.Has(job.key); });
   EXPECT_EQ(Run(policy, rest, store).done, 3);
+}
+
+TEST_F(Rollout, WhatTheDiskRefusesEndsTheRunAndIsNoEpisodesFailure) {
+  WalkingPolicy policy;
+  Store store = NewDeclaredStore("full");
+  Run(policy, Jobs(1), store);
+  std::filesystem::remove_all(store.folder() / "videos");
+  std::ofstream(store.folder() / "videos") << "no folder any more";
+  std::vector<Job> rest = Jobs(3);
+  rest.erase(rest.begin());
+  EXPECT_THROW(Run(policy, rest, store), Error);
+  EXPECT_EQ(store.Episodes().size(), 1u);
+}
+
+TEST_F(Rollout, WhoeverWasSentAwayByAnInterruptIsNotStoredAsFailed) {
+  bool wants_an_end = false;
+  FaultyPolicy policy([&](Acted plain, std::uint64_t request) -> Acted {
+    if (request < 2) return plain;
+    wants_an_end = true;
+    return Failure{StopReason::kPolicyError, "interrupted"};
+  });
+  Store store = NewDeclaredStore("sent_away");
+  options_.interrupted = [&] { return wants_an_end; };
+  const Summary summary = Run(policy, Jobs(3), store);
+  EXPECT_TRUE(summary.interrupted);
+  EXPECT_EQ(summary.failed, 0);
+  EXPECT_TRUE(store.Episodes().empty());
+}
+
+TEST_F(Rollout, WhileASlowPolicyThinksTheWorldMovesOn) {
+  options_.lane.latency = {.kind = PolicyLatency::Kind::kFixed, .fixed_s = .2};
+  const Episode episode = OnlyEpisode([](Acted plain, std::uint64_t) { return plain; });
+  EXPECT_EQ(episode.chunks, 5);
+  EXPECT_EQ(episode.commands.size(), 5u * (2 + kChunk));
+  EXPECT_EQ(episode.observations.size(), episode.commands.size() + 1);
 }
 
 TEST_F(Rollout, AnEpisodeThatCannotBeginIsARowToo) {

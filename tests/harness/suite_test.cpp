@@ -78,6 +78,23 @@ TEST_F(SuiteTest, TheHashIgnoresCommentsLayoutAndSpeedButNotTheContentOfFiles) {
   EXPECT_NE(ReadSuite(path, {}).hash, hash);
 }
 
+TEST_F(SuiteTest, APresetThatTheEncoderDoesNotKnowIsRefusedBeforeTheFirstVideo) {
+  EXPECT_THAT(Complaint(std::string(kSuite) + "video: {preset: quick}\n"),
+              AllOf(HasSubstr("field video.preset"), HasSubstr("quick"), HasSubstr("ultrafast, superfast, veryfast")));
+}
+
+TEST_F(SuiteTest, LatencyIsOffMeasuredOrSecondsAndAPartOfTheHashAsTheProbeIsNot) {
+  const auto path = Write("suite.yaml", kSuite);
+  EXPECT_EQ(ReadSuite(path, {}).latency.kind, PolicyLatency::Kind::kOff);
+  EXPECT_EQ(ReadSuite(path, {"policy={latency: 0.3}"}).latency.Text(), "0.3 s");
+  EXPECT_EQ(ReadSuite(path, {"policy={latency: measured}", "lanes=1"}).latency.Text(), "measured");
+  EXPECT_THAT(Complaint(kSuite, {"policy={latency: measured}"}), HasSubstr("lanes: 1"));
+  EXPECT_THAT(Complaint(kSuite, {"policy={latency: -2}"}), HasSubstr("field policy.latency"));
+  EXPECT_NE(ReadSuite(path, {"policy={latency: 0.3}"}).hash, ReadSuite(path, {"policy={latency: 0.4}"}).hash);
+  EXPECT_EQ(ReadSuite(path, {"policy={latency: 0.3, start_probe: warn}"}).hash, ReadSuite(path, {"policy={latency: 0.3}"}).hash);
+  EXPECT_THAT(Complaint(kSuite, {"policy={start_probe: perhaps}"}), HasSubstr("refuse, warn or off"));
+}
+
 TEST_F(SuiteTest, PathsInSetAreRelativeToTheWorkingDirectory) {
   const auto path = Write("suite.yaml", kSuite);
   const auto relative = std::filesystem::relative(folder_ / "rec");

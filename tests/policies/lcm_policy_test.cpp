@@ -309,6 +309,72 @@ TEST_F(LcmPolicyTest, AnAnswerAfterTheDeadlineIsLateAndHarmsNoOther) {
   EXPECT_EQ(Count(policy.counters(), "late_replies"), 1);
 }
 
+TEST_F(LcmPolicyTest, OneThatOnlyAnswersThePreviousRequestFailsAndIsSaidTo) {
+  const LcmAddress address = wire::OwnAddress();
+  wire::RawServer server(address, [&](LcmLink& link, const observation_t& header) {
+    chunk_t reply = wire::RawServer::Honest(header);
+    reply.request -= header.request > 0;
+    link.Publish(address.Channel("chunk"), reply);
+  });
+  LcmPolicy policy(Hasty(address));
+  policy.Reset(0, wire::TwoCameraTask(), 1);
+  EXPECT_EQ(Told(Ask(policy, {0}, wire::TwoCameraTask())[0]), "chunk");
+  EXPECT_THAT(Told(Ask(policy, {0}, wire::TwoCameraTask())[0]),
+              testing::ContainsRegex("policy_timeout: .*it sent [0-9]+ answers to earlier requests"));
+}
+
+TEST_F(LcmPolicyTest, OneThatIsSilentForAWholeDeadlineIsRestartedAndOneThatAnswersOthersIsNot) {
+  const LcmAddress address = wire::OwnAddress();
+  std::atomic<bool> is_mute = false;
+  wire::RawServer server(address, [&](LcmLink& link, const observation_t& header) {
+    if (!is_mute && header.episode == 0) link.Publish(address.Channel("chunk"), wire::RawServer::Honest(header));
+  });
+  int restarts = 0;
+  LcmPolicyOptions options = Hasty(address);
+  options.restart = [&] { ++restarts; };
+  LcmPolicy policy(options);
+  policy.Reset(0, wire::TwoCameraTask(), 1);
+  policy.Reset(1, wire::TwoCameraTask(), 1);
+  EXPECT_THAT(Told(Ask(policy, {0, 1}, wire::TwoCameraTask())[1]), HasSubstr("policy_timeout"));
+  EXPECT_EQ(restarts, 0);
+  is_mute = true;
+  EXPECT_THAT(Told(Ask(policy, {0}, wire::TwoCameraTask())[0]), HasSubstr("policy_timeout"));
+  EXPECT_EQ(restarts, 1);
+}
+
+TEST_F(LcmPolicyTest, AStartMayTakeLongerThanAnAnswer) {
+  LcmPolicyOptions options = Hasty(wire::OwnAddress());
+  options.start_s = 0.6;
+  LcmPolicy policy(options);
+  policy.Reset(0, wire::TwoCameraTask(), 1);
+  EXPECT_THAT(Told(Ask(policy, {0}, wire::TwoCameraTask())[0]),
+              testing::ContainsRegex("no answer to the episode's start within 0\\.[6-9].*deadline 0\\.6 s"));
+}
+
+TEST_F(LcmPolicyTest, WhoeverWaitsIsSentAwayWhenTheUserWantsAnEnd) {
+  LcmPolicyOptions options = Patient(wire::OwnAddress());
+  options.interrupted = [] { return true; };
+  LcmPolicy policy(options);
+  policy.Reset(0, wire::TwoCameraTask(), 1);
+  EXPECT_EQ(Told(Ask(policy, {0}, wire::TwoCameraTask())[0]), "policy_error: interrupted");
+  EXPECT_THROW(policy.Handshake(HarnessSpec(wire::TwoCameraTask(), 2), 1000), Error);
+}
+
+TEST_F(LcmPolicyTest, ALongerChunkIsKeptWholeWhereThatIsWantedAndItsTimeIsMeasured) {
+  const LcmAddress address = wire::OwnAddress();
+  wire::ProbePolicy probe(5);
+  wire::Served served(probe, wire::ProbeSpec(5), address);
+  LcmPolicyOptions options = Patient(address);
+  options.keep_longer_chunks = true;
+  LcmPolicy policy(options);
+  policy.Handshake(HarnessSpec(wire::TwoCameraTask(), 2), 30);
+  policy.Reset(0, wire::TwoCameraTask(), 1);
+  const auto answers = Ask(policy, {0}, wire::TwoCameraTask());
+  ASSERT_EQ(Told(answers[0]), "chunk");
+  EXPECT_EQ(std::get<ActionChunk>(answers[0]).targets.size(), 5u);
+  EXPECT_GT(std::get<ActionChunk>(answers[0]).thinking_s, 0);
+}
+
 TEST_F(LcmPolicyTest, TwoRunsOnOneMachineDoNotHearEachOther) {
   const LcmAddress left = wire::OwnAddress("left"), right = wire::OwnAddress("right"), same_port{left.url, right.token};
   wire::ProbePolicy one, other, third;

@@ -13,6 +13,8 @@
 #include "core/seed.h"
 #include "tests/support/command.h"
 #include "tests/support/temp_folder.h"
+#include "tests/system/process_support.h"
+#include "tests/system/run_support.h"
 
 namespace evac {
 namespace {
@@ -20,13 +22,16 @@ namespace {
 namespace fs = std::filesystem;
 using Clock = std::chrono::steady_clock;
 
-const std::string kSuite = EVAC_SOURCE_DIR "/tests/system/small.yaml";
+using system_test::kFaults;
+using system_test::KillAll;
+using system_test::List;
+using system_test::Mark;
+using system_test::RunWords;
+using system_test::WaitUntil;
 
-std::vector<std::string> RunWords(const fs::path& run, const std::string& lanes) {
-  return {Binary("evac"), "run", kSuite, "--out", run.string(), "--set", "lanes=" + lanes};
-}
+const std::string& kSuite = system_test::kSmall;
 
-std::string List(const fs::path& run) { return RunCommand({Binary("evac"), "ls", run.string(), "--json"}).out; }
+std::string Lanes(int lanes) { return "lanes=" + std::to_string(lanes); }
 
 /// Every file of a run but the store itself and what policies print: name → content.
 std::map<std::string, std::string> Videos(const fs::path& run) {
@@ -43,24 +48,59 @@ TEST(Resume, AfterAnyKillTheTablesAndVideosAreThoseOfAnUninterruptedRun) {
   const TempFolder folder;
   const fs::path whole = folder / "whole", killed = folder / "killed";
   const auto begin = Clock::now();
-  const CommandResult straight = RunCommand(RunWords(whole, "3"));
+  const CommandResult straight = RunCommand(RunWords(kSuite, whole, {Lanes(3)}));
   ASSERT_EQ(straight.exit_code, 0) << straight.err;
   const double whole_s = std::chrono::duration<double>(Clock::now() - begin).count();
 
   SplitMix64 random(20);
   for (int kill = 0; kill < Kills(); ++kill) {
-    const pid_t pid = StartCommand(RunWords(killed, kill % 2 ? "3" : "2"), folder / "log");
+    const pid_t pid = StartCommand(RunWords(kSuite, killed, {Lanes(kill % 2 ? 3 : 2)}), folder / "log");
     std::this_thread::sleep_for(std::chrono::duration<double>(random.Uniform(0, 1.5 * whole_s / Kills())));
     ::kill(pid, SIGKILL);
     ::waitpid(pid, nullptr, 0);
   }
-  const CommandResult last = RunCommand(RunWords(killed, "4"));
+  const CommandResult last = RunCommand(RunWords(kSuite, killed, {Lanes(4)}));
   ASSERT_EQ(last.exit_code, 0) << last.err;
 
   EXPECT_EQ(List(killed), List(whole));
   EXPECT_EQ(Videos(killed), Videos(whole));
   for (const auto& episode : nlohmann::json::parse(List(killed))) {
     EXPECT_EQ(Sha256HexOfFile(killed / episode["video"].get<std::string>()), episode["video_sha256"]);
+  }
+}
+
+/// A run of the small suite of one world whose policy, or it and its policy, is killed at random moments and which is
+/// continued each time; in the end the failed episodes run again.
+std::string ListAfterKilling(const fs::path& run, bool harness_too, int kills) {
+  const Mark mark(run.string());
+  const std::vector<std::string> words = RunWords(kFaults, run, {"initial_states.count=4", Lanes(2)});
+  SplitMix64 random(harness_too ? 21 : 22);
+  for (int kill = 0; kill < kills;) {
+    const pid_t pid = StartCommand(words, run.string() + ".log");
+    bool has_ended = false;
+    for (int in_this_run = 0; in_this_run < 3 && !has_ended && kill < kills; ++in_this_run, ++kill) {
+      WaitUntil([&] { return !mark.Processes("faulty-policy").empty() || ::waitpid(pid, nullptr, WNOHANG) == pid; });
+      std::this_thread::sleep_for(std::chrono::duration<double>(random.Uniform(0, 0.6)));
+      if (harness_too) ::kill(pid, SIGKILL);
+      KillAll(mark.Processes("faulty-policy"));
+      has_ended = harness_too;
+    }
+    ::waitpid(pid, nullptr, 0);
+    EXPECT_TRUE(WaitUntil([&] { return mark.Processes().empty(); })) << "something outlived the run";
+  }
+  RunCommand(words);
+  const CommandResult retried = RunCommand({Binary("evac"), "resume", run.string(), "--retry-failed"});
+  EXPECT_EQ(retried.exit_code, 0) << retried.err;
+  return List(run);
+}
+
+TEST(Resume, AfterThePolicyOrBothWereKilledTheTablesAndVideosAreThoseOfAnUninterruptedRun) {
+  const TempFolder folder;
+  ASSERT_EQ(RunCommand(RunWords(kFaults, folder / "whole", {"initial_states.count=4"})).exit_code, 0);
+  const int kills = std::getenv("EVAC_LONG") ? 20 : 3;
+  for (const char* killed : {"policy", "both"}) {
+    EXPECT_EQ(ListAfterKilling(folder / killed, killed == std::string("both"), kills), List(folder / "whole")) << killed;
+    EXPECT_EQ(Videos(folder / killed), Videos(folder / "whole")) << killed;
   }
 }
 

@@ -1,0 +1,22 @@
+#pragma once
+
+#include <filesystem>
+#include <vector>
+
+namespace evac {
+
+struct MergeSummary {
+  int episodes = 0;    ///< in the merged run
+  int duplicates = 0;  ///< that several shards held, and agreed about
+};
+
+/// Joins runs of one suite, such as the shards of `evac run --shard`, into a new one with everything they hold:
+/// episodes, videos (copied and checked against their hashes), initial scenes, verdicts, trials on a real robot,
+/// counters. Sequential looks stay behind: they were looks at a part, and are none at the whole.
+///
+/// An episode that several shards hold must be the same in all, to the bytes of its video; a failed one yields to one
+/// that did not fail. `out` is there whole or not at all.
+/// @throws InvalidInput if `out` exists, a shard is of another suite, or duplicates disagree (all are named).
+MergeSummary MergeRuns(const std::vector<std::filesystem::path>& shards, const std::filesystem::path& out);
+
+}  // namespace evac

@@ -1,0 +1,104 @@
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <gtest/gtest.h>
+#include <pty.h>
+#include <unistd.h>
+
+#include <fstream>
+
+#include "tests/support/temp_folder.h"
+#include "tests/system/process_support.h"
+#include "tests/system/run_support.h"
+
+namespace evac {
+namespace {
+
+using system_test::kFaults;
+using system_test::List;
+using system_test::Mark;
+using system_test::RunWords;
+using system_test::WaitUntil;
+using Clock = std::chrono::steady_clock;
+
+/// On a terminal of its own: closing `terminal` is what closing its window is. @returns the process.
+pid_t StartOnTerminal(const std::vector<std::string>& words, int& terminal) {
+  std::vector<char*> arguments;
+  for (const std::string& word : words) arguments.push_back(const_cast<char*>(word.c_str()));
+  arguments.push_back(nullptr);
+  const pid_t pid = ::forkpty(&terminal, nullptr, nullptr, nullptr);
+  if (pid != 0) return pid;
+  ::execv(arguments[0], arguments.data());
+  ::_exit(127);
+}
+
+/// Seconds that a machine may take for two: more when others work on it too.
+double Patience_s() {
+  double load = 0;
+  ::getloadavg(&load, 1);
+  return load > std::thread::hardware_concurrency() ? 20 : 2;
+}
+
+struct Interruption {
+  const char* name;
+  int signal;           ///< 0: the terminal is closed
+  const char* command;  ///< of the policy
+};
+
+void PrintTo(const Interruption& interruption, std::ostream* out) { *out << interruption.name; }
+
+class Interrupted : public testing::TestWithParam<Interruption> {};
+
+TEST_P(Interrupted, StopsWithinTwoSecondsLeavesNothingRunningAndGoesOnWhereItWas) {
+  const TempFolder folder;
+  const Mark mark(folder.path().string());
+  std::ofstream(folder / "sick") << "yes";
+  const std::string command = fmt::format(fmt::runtime(GetParam().command), (folder / "sick").string());
+  const bool hangs = command != "faulty-policy";
+  const std::filesystem::path videos = folder / "run/videos/real/take_bottle/faulty@default";
+  int terminal = -1;
+  const pid_t pid = StartOnTerminal(
+      RunWords(kFaults, folder / "run", {"policies.0.command=[" + command + "]", "transport.deadline_s=60", "initial_states.count=3"}), terminal);
+  ::fcntl(terminal, F_SETFL, O_NONBLOCK);
+  std::string said(4096, '\0');
+  ASSERT_TRUE(WaitUntil([&] {
+    while (::read(terminal, said.data(), said.size()) > 0) {  // or it blocks on a full terminal
+    }
+    return std::filesystem::exists(videos / (hangs ? "3-0000-s1.mp4.tmp" : "3-0001-s1.mp4.tmp"));
+  }));
+  if (hangs) std::this_thread::sleep_for(std::chrono::seconds(2));  // until it has come to the request that it never answers
+  const auto before = Clock::now();
+  const bool is_ctrl_c = GetParam().signal == SIGINT;
+  EXPECT_EQ(is_ctrl_c ? ::write(terminal, "\x03", 1) : 1, 1);  // reaches all of the terminal's processes
+  if (GetParam().signal == SIGTERM) ::kill(pid, SIGTERM);
+  if (GetParam().signal == 0) ::close(terminal);
+  int status = 0;
+  ASSERT_TRUE(WaitUntil([&] {
+    while (GetParam().signal != 0 && ::read(terminal, said.data(), said.size()) > 0) {
+    }
+    return ::waitpid(pid, &status, WNOHANG) == pid;
+  }));
+  EXPECT_LE(std::chrono::duration<double>(Clock::now() - before).count(), Patience_s());
+  EXPECT_TRUE(WIFEXITED(status) && WEXITSTATUS(status) == 4) << status;
+  EXPECT_TRUE(mark.Processes().empty()) << "something is left running";
+  if (GetParam().signal != 0) ::close(terminal);
+
+  std::filesystem::remove(folder / "sick");
+  const CommandResult resumed = RunCommand({Binary("evac"), "resume", (folder / "run").string()});
+  EXPECT_EQ(resumed.exit_code, 0) << resumed.err;
+  static const std::string whole = [] {
+    const TempFolder other;
+    EXPECT_EQ(RunCommand(RunWords(kFaults, other / "run", {"initial_states.count=3"})).exit_code, 0);
+    return List(other / "run");
+  }();
+  EXPECT_EQ(List(folder / "run"), whole);
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    By, Interrupted,
+    testing::Values(Interruption{"CtrlC", SIGINT, "faulty-policy"}, Interruption{"Sigterm", SIGTERM, "faulty-policy"},
+                    Interruption{"ClosedTerminal", 0, "faulty-policy"},
+                    Interruption{"CtrlCWhileThePolicyHangs", SIGINT, "faulty-policy, --fault, hang, --while, {}"}),
+    [](const testing::TestParamInfo<Interruption>& info) { return info.param.name; });
+
+}  // namespace
+}  // namespace evac

@@ -1,0 +1,135 @@
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "core/store.h"
+#include "tests/support/synthetic_recording.h"
+#include "tests/support/temp_folder.h"
+#include "tests/system/run_support.h"
+
+namespace evac {
+namespace {
+
+namespace fs = std::filesystem;
+using system_test::kFaults;
+using system_test::List;
+using system_test::RunWords;
+using testing::AllOf;
+using testing::HasSubstr;
+
+const std::vector<std::string> kFive = {"initial_states.count=5", "judges=[oracle]"};
+
+CommandResult RunShard(const fs::path& run, const std::string& shard, std::vector<std::string> assignments = kFive) {
+  std::vector<std::string> words = RunWords(kFaults, run, assignments);
+  words.insert(words.end(), {"--shard", shard});
+  return RunCommand(words);
+}
+
+CommandResult Merge(const std::vector<fs::path>& shards, const fs::path& out) {
+  std::vector<std::string> words = {Binary("evac"), "merge", "--out", out.string()};
+  for (const fs::path& shard : shards) words.push_back(shard.string());
+  return RunCommand(words);
+}
+
+/// One whole run and its two halves, made once.
+struct Runs {
+  Runs() {
+    EXPECT_EQ(RunCommand(RunWords(kFaults, folder / "whole", kFive)).exit_code, 0);
+    for (const char* shard : {"1", "2"}) EXPECT_EQ(RunShard(folder / shard, std::string(shard) + "/2").exit_code, 0);
+  }
+  TempFolder folder;
+};
+
+const Runs& TheRuns() {
+  static const Runs runs;
+  return runs;
+}
+
+TEST(Merge, ShardsJoinedAreTheRunThatWasNeverSplit) {
+  const TempFolder& runs = TheRuns().folder;
+  const std::size_t one = Store::Open(runs / "1", Store::Mode::kReadOnly).Episodes().size(),
+                    two = Store::Open(runs / "2", Store::Mode::kReadOnly).Episodes().size();
+  EXPECT_EQ(one + two, 5u);
+  const TempFolder folder;
+  const CommandResult merged = Merge({runs / "1", runs / "2"}, folder / "merged");
+  ASSERT_EQ(merged.exit_code, 0) << merged.err;
+  EXPECT_EQ(List(folder / "merged"), List(runs / "whole"));
+  EXPECT_EQ(RunCommand({Binary("evac"), "report", (folder / "merged").string()}).exit_code, 0);
+  const Store store = Store::Open(folder / "merged", Store::Mode::kReadOnly), whole = Store::Open(runs / "whole", Store::Mode::kReadOnly);
+  EXPECT_EQ(store.InitialScenes(), whole.InitialScenes());
+  for (Episode episode : store.Episodes()) {
+    EXPECT_TRUE(fs::exists(folder / "merged" / episode.video));
+    EXPECT_TRUE(fs::exists(folder / "merged" / episode.thumbnail));
+    EXPECT_EQ(store.LoadPrivileged(episode.key.Id()).size(), whole.LoadPrivileged(episode.key.Id()).size());
+  }
+  const CommandResult goes_on = RunCommand({Binary("evac"), "resume", (folder / "merged").string()});
+  EXPECT_EQ(goes_on.exit_code, 0) << goes_on.err;
+}
+
+TEST(Merge, DuplicatesThatAgreeAreTakenOnceAndNothingIsOverwritten) {
+  const TempFolder& runs = TheRuns().folder;
+  const TempFolder folder;
+  const CommandResult merged = Merge({runs / "1", runs / "whole"}, folder / "merged");
+  ASSERT_EQ(merged.exit_code, 0) << merged.err;
+  EXPECT_EQ(List(folder / "merged"), List(runs / "whole"));
+  EXPECT_EQ(Merge({runs / "1", runs / "2"}, folder / "merged").exit_code, 2);
+  EXPECT_EQ(Merge({runs / "1", folder / "nothing"}, folder / "again").exit_code, 2);
+  EXPECT_FALSE(fs::exists(folder / "again"));
+}
+
+TEST(Merge, RunsOfAnotherSuiteAreRefused) {
+  const TempFolder& runs = TheRuns().folder;
+  const TempFolder folder;
+  ASSERT_EQ(RunCommand(RunWords(kFaults, folder / "other", {"initial_states.count=1"})).exit_code, 0);
+  const CommandResult merged = Merge({runs / "1", folder / "other"}, folder / "merged");
+  EXPECT_EQ(merged.exit_code, 2);
+  EXPECT_THAT(merged.err, AllOf(HasSubstr("different suites"), HasSubstr((folder / "other").string())));
+  EXPECT_FALSE(fs::exists(folder / "merged"));
+}
+
+/// A run of the same suite whose episodes came out otherwise.
+void AddOther(const fs::path& from, const fs::path& to, bool as_failure) {
+  const Store whole = Store::Open(from, Store::Mode::kReadOnly);
+  Store other = Store::CreateOrContinue(to, whole.run());
+  for (const Task& task : whole.Tasks()) other.AddTask(task);
+  for (const WorldInfo& world : whole.Worlds()) other.AddWorld(world);
+  for (const PolicyInfo& policy : whole.Policies()) other.AddPolicy(policy);
+  Episode episode = whole.Episodes().at(1);
+  episode.video = episode.video_sha256 = episode.thumbnail = "";
+  episode.stop = as_failure ? StopReason::kPolicyError : StopReason::kMaxChunks;
+  episode.failure = as_failure ? "it broke" : "";
+  other.Add({.episode = episode, .privileged = {}, .video = {}, .thumbnail_jpeg = {}});
+}
+
+TEST(Merge, DuplicatesThatDisagreeAreNamedAndAFailedOneYields) {
+  const TempFolder& runs = TheRuns().folder;
+  const TempFolder folder;
+  AddOther(runs / "whole", folder / "other", false);
+  const CommandResult refused = Merge({runs / "whole", folder / "other"}, folder / "merged");
+  EXPECT_EQ(refused.exit_code, 2);
+  EXPECT_THAT(refused.err, AllOf(HasSubstr("real/take_bottle/faulty@default/3-0001-s1 in "), HasSubstr((folder / "other").string())));
+  EXPECT_FALSE(fs::exists(folder / "merged"));
+
+  AddOther(runs / "whole", folder / "failed", true);
+  ASSERT_EQ(Merge({folder / "failed", runs / "whole"}, folder / "merged").exit_code, 0);
+  EXPECT_EQ(List(folder / "merged"), List(runs / "whole"));
+}
+
+TEST(Merge, AVideoThatIsNotTheStoredOneIsRefused) {
+  const TempFolder& runs = TheRuns().folder;
+  const TempFolder folder;
+  fs::copy(runs / "1", folder / "spoiled", fs::copy_options::recursive);
+  const std::string video = Store::Open(folder / "spoiled", Store::Mode::kReadOnly).Episodes().at(0).video;
+  WriteText(folder / "spoiled" / video, "other bytes");
+  const CommandResult merged = Merge({folder / "spoiled", runs / "2"}, folder / "merged");
+  EXPECT_EQ(merged.exit_code, 2);
+  EXPECT_THAT(merged.err, HasSubstr(video));
+  EXPECT_FALSE(fs::exists(folder / "merged"));
+}
+
+TEST(Merge, AShardIsWhichOfHowMany) {
+  const TempFolder folder;
+  for (const char* shard : {"3/2", "0/2", "half", "1/2x"}) EXPECT_EQ(RunShard(folder / "run", shard).exit_code, 2) << shard;
+}
+
+}  // namespace
+}  // namespace evac
