@@ -4,7 +4,9 @@
 
 #include "apps/commands.h"
 #include "apps/factory.h"
+#include "core/error.h"
 #include "harness/scheduler.h"
+#include "judges/oracle_judge.h"
 
 namespace evac {
 namespace {
@@ -14,6 +16,13 @@ struct ValidateArguments {
   std::vector<std::string> assignments;
 };
 
+/// It can start, and has the bodies that the rubric names (worlds without physics have none and are not asked).
+void CheckStart(World& world, const Task& task, const InitialState& initial) {
+  const PrivilegedFrame frame = world.Reset(0, task, initial, 0).privileged;
+  if (frame.bodies.empty()) return;
+  if (const auto wrong = WhatIsWrong(task.rubric, frame)) throw InvalidInput("{}: field rubric: {}", task.page_path, *wrong);
+}
+
 /// Everything that can be known to be wrong before the first episode, short of starting the policies.
 ExitCode Validate(const ValidateArguments& arguments) {
   Suite suite = ReadSuite(arguments.suite, arguments.assignments);
@@ -22,7 +31,7 @@ ExitCode Validate(const ValidateArguments& arguments) {
   int episodes = 0;
   for (const SuiteWorld& world : suite.worlds) {
     const std::unique_ptr<World> built = MakeWorld(world, suite);
-    for (const Task& task : suite.tasks) built->Reset(0, task, suite.initial_states.front(), 0);
+    for (const Task& task : suite.tasks) CheckStart(*built, task, suite.initial_states.front());
     for (const SuitePolicy& policy : suite.policies) {
       if (!policy.command.empty()) CommandLine(policy, suite);
       episodes += static_cast<int>(AllJobs(suite, world, policy).size());
