@@ -11,7 +11,7 @@ namespace {
 constexpr double kRadians = std::numbers::pi / 180;
 constexpr double kSmallestPatchPx = 4;  // in a picture 96 wide; grows with the area
 constexpr double kSecondPatch = 0.15;  // of the largest patch: a thing cut in two by what stands before it is still one
-constexpr double kReach_m = 0.06;        // half a thing's width
+constexpr double kReach_m = 0.06;      // half a thing's width
 constexpr double kReachOfHeight = 1.3;   // its upper end is seen against the table this far behind its foot, per metre
 constexpr double kPoorestOverlap = 0.2;  // below it the patch is something else
 
@@ -129,7 +129,8 @@ Thing Ham() {
 Thing Bread() {
   Thing bread;
   bread.colour = {.hue_deg = 35, .hue_tolerance_deg = 16, .min_saturation = 0.4, .min_value = 0.15};
-  bread.shape = {Cuboid({-0.056, -0.056, 0}, {0.056, 0.056, 0.018}), Cuboid({-0.050, -0.050, 0.017}, {0.050, 0.050, 0.018})};
+  bread.shape = {Cuboid({-0.056, -0.056, 0}, {0.056, 0.056, 0.018}),
+                 Cuboid({-0.050, -0.050, 0.017}, {0.050, 0.050, 0.018})};
   bread.shape.back().coloured = false;  // the pale crumb within the crust
   bread.yaw_reach_rad = 6 * kRadians;
   return bread;
@@ -153,7 +154,8 @@ PickKnowledge TakeHam() {
 Thing Leaf() {
   Thing leaf;
   leaf.colour = {.hue_deg = 97, .hue_tolerance_deg = 26, .min_saturation = 0.3, .min_value = 0.1};
-  leaf.shape = {Cuboid({-0.024, -0.038, 0.004}, {0.024, 0.038, 0.010}), Cuboid({0.022, -0.029, 0.008}, {0.064, 0.029, 0.014}),
+  leaf.shape = {Cuboid({-0.024, -0.038, 0.004}, {0.024, 0.038, 0.010}),
+                Cuboid({0.022, -0.029, 0.008}, {0.064, 0.029, 0.014}),
                 Cuboid({-0.021, -0.004, 0.0}, {0.021, 0.004, 0.026})};
   leaf.yaw_reach_rad = 14 * kRadians;
   return leaf;
@@ -207,7 +209,9 @@ PickKnowledge KnowledgeOf(const std::string& task_id) {
   if (task_id == "take_toast") return TakeToast();
   if (task_id == "take_ham") return TakeHam();
   if (task_id == "take_lettuce") return TakeLettuce();
-  throw InvalidInput("visual_pick: found task {}, wanted take_bottle, take_bottle_two_arms, take_toast, take_ham or take_lettuce", task_id);
+  throw InvalidInput(
+      "visual_pick: found task {}, wanted take_bottle, take_bottle_two_arms, take_toast, take_ham or take_lettuce",
+      task_id);
 }
 
 }  // namespace evac

@@ -35,7 +35,8 @@ bool HasArm(const mjModel& model, const std::string& arm);
 
 /// Whether a body has a free joint, and so can be placed and carried.
 bool IsFree(const mjModel& model, int body);
-/// Whether a body is a thing or part of one: it is free, or linked by joints to a free body (a leaf's wings to its rib).
+/// Whether a body is a thing or part of one: it is free, or linked by joints to a free body (a leaf's wings to its
+/// rib).
 bool IsOfThing(const mjModel& model, int body);
 
 /// Position and row-major rotation, e.g. data.site_xpos + 3 * id and data.site_xmat + 9 * id.

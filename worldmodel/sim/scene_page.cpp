@@ -84,7 +84,8 @@ Clutter ReadClutter(const Config& page) {
 }
 
 /// A suite's hash covers the files that a page names; so a page must name all that its scene is made of.
-void RequireIncludesNamed(const Config& page, const std::vector<std::string>& named, const std::filesystem::path& scene) {
+void RequireIncludesNamed(const Config& page, const std::vector<std::string>& named,
+                          const std::filesystem::path& scene) {
   const std::string text = ReadFile(scene);
   const std::regex include(R"re(<include\s+file\s*=\s*"([^"]*)")re");
   for (std::sregex_iterator match(text.begin(), text.end(), include), end; match != end; ++match) {

@@ -1,9 +1,8 @@
 #include "worldmodel/sim/mujoco_world.h"
 
+#include <fmt/ranges.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-
-#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <functional>

@@ -110,7 +110,8 @@ TEST(HiddenErrors, AreOneRigsAndShareNoStreamWithAnotherProfiles) {
 TEST(HiddenErrors, OfASecondArmAreItsOwnAndChangeNothingOfTheFirst) {
   Task two = ReadTask("take_bottle_two_arms");
   const Profile profile = ReadProfile(ProfilePage("real"));
-  const HiddenErrors of_one = DrawHiddenErrors(profile, ReadTask("take_bottle")), of_two = DrawHiddenErrors(profile, two);
+  const HiddenErrors of_one = DrawHiddenErrors(profile, ReadTask("take_bottle")),
+                     of_two = DrawHiddenErrors(profile, two);
   ASSERT_EQ(of_two.joint_offset.size(), 2U);
   EXPECT_EQ(of_two.joint_offset[1], of_one.joint_offset[0]);
   EXPECT_NE(of_two.joint_offset[0], of_two.joint_offset[1]);
