@@ -5,6 +5,7 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <csignal>
 #include <cstdlib>
 #include <deque>
 #include <random>
@@ -272,17 +273,34 @@ void PolicyServer::Run() {
 
 const Counters& PolicyServer::counters() const { return impl_->counters; }
 
-int ServePolicy(Policy& policy, const PolicySpec& spec, const LcmAddress& address) {
+namespace {
+
+volatile std::sig_atomic_t g_must_end = 0;
+
+/// SIGTERM and SIGINT end the loop. They are blocked here and in LCM's thread, which inherits that (a select that they
+/// interrupt is an error to LCM), and wait for sigtimedwait; threads that libraries started before may still take them,
+/// which is what the handler is for.
+sigset_t CatchEnding() {
   sigset_t ending;
   sigemptyset(&ending);
-  sigaddset(&ending, SIGTERM);
-  sigaddset(&ending, SIGINT);
-  pthread_sigmask(SIG_BLOCK, &ending, nullptr);  // also in LCM's thread, which inherits it: they wait for sigtimedwait
+  for (const int number : {SIGTERM, SIGINT}) {
+    sigaddset(&ending, number);
+    std::signal(number, [](int) { g_must_end = 1; });
+  }
+  pthread_sigmask(SIG_BLOCK, &ending, nullptr);
+  return ending;
+}
+
+}  // namespace
+
+int ServePolicy(Policy& policy, const PolicySpec& spec, const LcmAddress& address) {
+  const sigset_t ending = CatchEnding();
   const pid_t parent = getppid();
   PolicyServer server(policy, spec, address);
   const timespec at_once{};
   const bool is_supervised = std::getenv("EVAC_SUPERVISED") != nullptr;
-  while (sigtimedwait(&ending, nullptr, &at_once) < 0 && !(is_supervised && getppid() != parent)) server.Handle(0.1);
+  const auto must_end = [&] { return g_must_end != 0 || sigtimedwait(&ending, nullptr, &at_once) > 0; };
+  while (!must_end() && !(is_supervised && getppid() != parent)) server.Handle(0.1);
   return 0;
 }
 

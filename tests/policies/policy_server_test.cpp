@@ -4,9 +4,10 @@
 #include <signal.h>
 #include <sys/wait.h>
 
-#include "policies/hold_policy.h"
 #include "policies/messages.h"
 #include "tests/policies/wire_support.h"
+#include "tests/support/command.h"
+#include "tests/support/temp_folder.h"
 
 namespace evac {
 namespace {
@@ -183,11 +184,9 @@ TEST_F(PolicyServerTest, ImagesThatAreNotTheTasksAreAnErrorReply) {
 
 TEST_F(PolicyServerTest, AServedPolicyLeavesOnSigtermWithExitCodeZero) {
   const LcmAddress address = wire::OwnAddress();
-  const pid_t child = ::fork();
-  if (child == 0) {
-    HoldPolicy hold(4);
-    ::_exit(ServePolicy(hold, {.name = "hold", .chunk_size = 4, .needs = {"arms"}}, address));
-  }
+  const TempFolder folder;
+  const pid_t child = StartCommand({Binary("evac-policy"), "hold", "--chunk-size", "4", "--url", address.url, "--token", address.token},
+                                   folder / "policy.log");
   {
     LcmPolicy policy({.address = address});
     policy.Handshake(HarnessSpec(task_, 4), 60);
