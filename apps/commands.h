@@ -16,6 +16,10 @@ void AddCorrelate(CLI::App& app, ExitCode& exit_code);
 void AddReport(CLI::App& app, ExitCode& exit_code);
 void AddValidate(CLI::App& app, ExitCode& exit_code);
 void AddDoctor(CLI::App& app, ExitCode& exit_code);
+void AddCompare(CLI::App& app, ExitCode& exit_code);
+void AddImportReal(CLI::App& app, ExitCode& exit_code);
+void AddTrust(CLI::App& app, ExitCode& exit_code);
+void AddPlan(CLI::App& app, ExitCode& exit_code);
 void AddLs(CLI::App& app, ExitCode& exit_code);
 
 }  // namespace evac

@@ -19,6 +19,10 @@ int main(int argc, char** argv) {
     evac::AddJudge(app, exit_code);
     evac::AddCorrelate(app, exit_code);
     evac::AddReport(app, exit_code);
+    evac::AddPlan(app, exit_code);
+    evac::AddCompare(app, exit_code);
+    evac::AddImportReal(app, exit_code);
+    evac::AddTrust(app, exit_code);
     evac::AddValidate(app, exit_code);
     evac::AddDoctor(app, exit_code);
     evac::AddLs(app, exit_code);

@@ -19,7 +19,7 @@ struct SampleSize {
   std::int64_t n = 0;  ///< smallest whole number not below it; 0 where undefined
 };
 
-/// The smallest n whose Wilson interval at rate p is not wider than ± half_width, half_width in (0, 0.5).
+/// The smallest n whose Wilson interval at rate p is not wider than ± half_width, half_width > 0. At least 1.
 std::int64_t TrialsForHalfWidth(double p, double half_width, double confidence = 0.95);
 /// Half the width of Wilson's interval at rate p of n trials.
 double WilsonHalfWidth(double p, std::int64_t n, double confidence = 0.95);

@@ -88,6 +88,32 @@ Estimate TangoDifference(const PairedOutcomes& outcomes, double confidence) {
   return difference;
 }
 
+PairedOutcomes EffectivePairs(std::span<const PairedOutcomes> clusters) {
+  PairedOutcomes total;
+  double groups = 0;
+  for (const PairedOutcomes& cluster : clusters) {
+    Check(cluster);
+    total.pairs += cluster.pairs;
+    total.flips.only_first += cluster.flips.only_first;
+    total.flips.only_second += cluster.flips.only_second;
+    groups += cluster.pairs > 0;
+  }
+  const double n = static_cast<double>(total.pairs), b = static_cast<double>(total.flips.only_first),
+               c = static_cast<double>(total.flips.only_second);
+  const double mean = n > 0 ? (b - c) / n : 0, spread = b + c - n * mean * mean;  // n times the variance of one pair
+  if (groups < 2 || groups == n) return total;
+  double residuals = 0;  // linearised, as of a ratio
+  for (const PairedOutcomes& cluster : clusters) {
+    const double difference = static_cast<double>(cluster.flips.only_first - cluster.flips.only_second);
+    const double residual = difference - mean * static_cast<double>(cluster.pairs);
+    residuals += residual * residual;
+  }
+  const double design_effect = spread > 0 ? std::max(1.0, groups / (groups - 1) * residuals / spread) : n / groups;
+  const auto shrunk = [&](std::int64_t count) { return std::llround(static_cast<double>(count) / design_effect); };
+  const Flips flips{shrunk(total.flips.only_first), shrunk(total.flips.only_second)};
+  return {flips, std::max<std::int64_t>(shrunk(total.pairs), flips.only_first + flips.only_second)};
+}
+
 Estimate BonettPriceDifference(const PairedOutcomes& outcomes, double confidence) {
   Estimate difference = PairedDifference(outcomes, confidence);
   difference.method = "Bonett-Price";

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <span>
 
 #include "core/statistics/estimate.h"
 #include "core/statistics/mcnemar.h"
@@ -22,6 +23,13 @@ struct PairedOutcomes {
 
 /// Same initial states: score interval (Tango 1998), the one of record. Its test is McNemar's.
 Estimate TangoDifference(const PairedOutcomes& outcomes, double confidence = 0.95);
+
+/// Pairs that come in clusters (several seeds or policies on one initial state) as the number of independent pairs that
+/// would tell as much: divided by the design effect of their differences, at least 1, and rounded. Where all
+/// differences are equal that effect cannot be seen, and each cluster counts as one pair. One pair per cluster, or one
+/// cluster: as they are.
+/// @param clusters  each one initial state's pairs. @throws InvalidInput for impossible counts.
+PairedOutcomes EffectivePairs(std::span<const PairedOutcomes> clusters);
 
 /// Same initial states: Wald's interval with 1 added to each kind of flip and 2 to the pairs (Bonett & Price 2012). The
 /// quick form; its value is that of the data as they are.

@@ -49,6 +49,22 @@ TEST(RateDifference, WithoutDataNothingIsKnown) {
   EXPECT_THROW(TangoDifference({{1, 2}, 4}, 1.0), Error);
 }
 
+TEST(EffectivePairs, CopiesOfOnePairCountOnceAndIndependentOnesAllOfThem) {
+  using Clusters = std::vector<PairedOutcomes>;
+  const PairedOutcomes single = EffectivePairs(Clusters{{{1, 0}, 1}, {{0, 1}, 1}, {{0, 0}, 1}});
+  EXPECT_EQ(single.pairs, 3);
+  EXPECT_EQ(single.flips.only_first, 1);
+  const PairedOutcomes agreeing = EffectivePairs(Clusters{{{0, 0}, 5}, {{0, 0}, 5}});
+  EXPECT_EQ(agreeing.pairs, 2) << "nothing shows that the five are not one";
+  Clusters copies;
+  for (int state = 0; state < 40; ++state) copies.push_back({{state < 10 ? 5 : 0, 0}, 5});
+  const PairedOutcomes effective = EffectivePairs(copies);
+  EXPECT_NEAR(static_cast<double>(effective.pairs), 40, 2);
+  EXPECT_NEAR(static_cast<double>(effective.flips.only_first), 10, 1);
+  EXPECT_EQ(EffectivePairs(Clusters{}).pairs, 0);
+  EXPECT_THROW(EffectivePairs(Clusters{{{2, 2}, 3}}), Error);
+}
+
 TEST(RateDifference, TangoLeavesOutZeroWhenItsScoreTestRejects) {
   for (int b = 0; b <= 20; ++b) {
     const Interval interval = *TangoDifference({{b, 3}, 40}).interval;

@@ -1,0 +1,197 @@
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <cstdio>
+#include <filesystem>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <set>
+#include <string>
+#include <vector>
+
+#include "apps/commands.h"
+#include "core/statistics/sequential.h"
+#include "core/store.h"
+#include "reports/policy_comparison_output.h"
+#include "reports/summary.h"
+
+namespace evac {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+struct CompareArguments {
+  std::string first, second, run;
+  std::string world, judge = "oracle";
+  ComparisonOptions options;
+  bool sequential = false, json = false;
+};
+
+/// A policy of a run: "visual_pick@good" of --run, "out/a:visual_pick@good", or a folder with one policy.
+struct PolicyPlace {
+  std::string run, policy;  ///< policy empty: the run's only one
+};
+
+PolicyPlace PlaceOf(const std::string& word, const std::string& default_run) {
+  const auto is_folder = [](const std::string& name) { return std::filesystem::is_directory(name); };
+  const std::size_t colon = word.rfind(':');
+  if (colon != std::string::npos && is_folder(word.substr(0, colon))) {
+    return {word.substr(0, colon), word.substr(colon + 1)};
+  }
+  if (default_run.empty() && is_folder(word)) return {word, ""};
+  if (default_run.empty()) {
+    throw InvalidInput("compare: '{}' is no folder, wanted RUN:POLICY, a RUN with one policy, or --run RUN beside it",
+                       word);
+  }
+  return {default_run, word};
+}
+
+/// A run's episodes, judged.
+struct JudgedRun {
+  std::string folder;
+  RunSummary summary;
+};
+
+JudgedRun Read(const std::string& folder, const CompareArguments& arguments) {
+  SummaryOptions options;
+  options.judge = arguments.judge;
+  options.confidence = arguments.options.confidence();
+  options.bootstrap_replicates = 1;  // no correlation is shown
+  JudgedRun run{folder, Summarise(ReadRun(Store::Open(folder, Store::Mode::kReadOnly)), options)};
+  if (std::ranges::find(run.summary.judges, arguments.judge) == run.summary.judges.end()) {
+    throw InvalidInput("{}: no verdict of judge '{}', found: {}", folder, arguments.judge,
+                       fmt::join(run.summary.judges, ", "));
+  }
+  return run;
+}
+
+std::string PolicyOf(const JudgedRun& run, const std::string& wanted) {
+  const std::vector<std::string>& known = run.summary.policies;
+  if (wanted.empty() && known.size() == 1) return known.front();
+  if (!wanted.empty() && std::ranges::find(known, wanted) != known.end()) return wanted;
+  throw InvalidInput("{}: {}, wanted one of: {}", run.folder,
+                     wanted.empty() ? "holds several policies" : "has no policy '" + wanted + "'",
+                     fmt::join(known, ", "));
+}
+
+ComparedPolicy Side(const JudgedRun& run, const std::string& policy, const std::string& world) {
+  ComparedPolicy side{policy, {}};
+  for (const JudgedEpisode& judged : run.summary.episodes) {
+    const EpisodeKey& key = judged.episode.key;
+    if (key.world == world && PolicyLabel(key.pair.policy, key.pair.checkpoint) == policy)
+      side.episodes.push_back(judged);
+  }
+  return side;
+}
+
+std::vector<std::string> WorldsOfBoth(const JudgedRun& first, const JudgedRun& second, const std::string& wanted) {
+  std::set<std::string> names;
+  std::vector<std::string> shared;
+  for (const WorldInfo& world : first.summary.data.worlds) names.insert(world.name);
+  for (const WorldInfo& world : second.summary.data.worlds) {
+    if (names.contains(world.name) && (wanted.empty() || wanted == world.name)) shared.push_back(world.name);
+  }
+  if (shared.empty()) {
+    throw InvalidInput("compare: {} has the worlds {}, which are not all in {}{}", first.folder, fmt::join(names, ", "),
+                       second.folder, wanted.empty() ? "" : fmt::format(", or not '{}'", wanted));
+  }
+  return shared;
+}
+
+/// A run that is being written cannot take them; the bets stay valid without, they only forget.
+void Keep(const std::vector<SequentialLook>& looks, const std::string& run) {
+  try {
+    Store::Open(run, Store::Mode::kReadWrite).AddLooks(looks);
+  } catch (const Error& error) {
+    fmt::print(stderr, "evac: warning: this look was not kept: {}\n", error.what());
+  }
+}
+
+/// This look's bets, and what was kept of the looks before; only what has changed since is a new look.
+std::vector<BetState> Bet(const ComparedWorld& compared, const std::string& run) {
+  const PolicyComparison& comparison = compared.comparison;
+  std::vector<ComparisonRow> rows = comparison.tasks;
+  if (rows.size() > 1) rows.push_back(comparison.all);
+  const std::string name =
+      fmt::format("{} against {} in {}, judge {}", comparison.first, comparison.second, compared.world, compared.judge);
+  const std::vector<SequentialLook> before = Store::Open(run, Store::Mode::kReadOnly).Looks();
+  std::vector<SequentialLook> added;
+  std::vector<BetState> bets;
+  for (const ComparisonRow& row : rows) {
+    if (!row.is_paired) {
+      throw InvalidInput("compare: --sequential bets on pairs, but {} shares {} of {} and {} initial states",
+                         row.task.empty() ? "all tasks together" : row.task, row.shared, row.first_episodes,
+                         row.second_episodes);
+    }
+    BetState bet{row.task, row.shared, row.flips, FlipsEValue(row.flips.only_first, row.flips.only_second), 1, 0};
+    SequentialLook look{name, row.task, row.shared, row.flips.only_first, row.flips.only_second, bet.e_value};
+    bool is_new = true;
+    for (const SequentialLook& old : before) {
+      if (old.comparison != look.comparison || old.task != look.task) continue;
+      bet.largest = std::max(bet.largest, old.e_value);
+      ++bet.looks;
+      is_new = old != look;  // against the last of them
+    }
+    bet.largest = std::max(bet.largest, bet.e_value);
+    bet.looks += is_new;
+    if (is_new) added.push_back(std::move(look));
+    bets.push_back(std::move(bet));
+  }
+  if (!added.empty()) Keep(added, run);
+  return bets;
+}
+
+void Compare(const CompareArguments& arguments) {
+  const PolicyPlace first = PlaceOf(arguments.first, arguments.run), second = PlaceOf(arguments.second, arguments.run);
+  const JudgedRun one = Read(first.run, arguments), two = Read(second.run, arguments);
+  const std::string a = PolicyOf(one, first.policy), b = PolicyOf(two, second.policy);
+  const bool same_run = std::filesystem::equivalent(first.run, second.run);
+  if (same_run && a == b) throw InvalidInput("compare: {} against itself", a);
+  Json all = {{"schema", 1}, {"worlds", Json::array()}};
+  for (const std::string& world : WorldsOfBoth(one, two, arguments.world)) {
+    ComparedPolicy left = Side(one, a, world), right = Side(two, b, world);
+    if (a == b) {
+      left.name = first.run + ":" + a;
+      right.name = second.run + ":" + b;
+    }
+    ComparedWorld compared{world, arguments.judge, ComparePolicies(left, right, arguments.options), {}};
+    if (arguments.sequential) compared.bets = Bet(compared, first.run);
+    if (!arguments.json) fmt::print("{}{}", all["worlds"].empty() ? "" : "\n", ComparisonText(compared));
+    all["worlds"].push_back(ComparisonJson(compared));
+  }
+  if (arguments.json) fmt::print("{}\n", all.dump(2));
+}
+
+}  // namespace
+
+void AddCompare(CLI::App& app, ExitCode& exit_code) {
+  const auto arguments = std::make_shared<CompareArguments>();
+  CLI::App* command = app.add_subcommand("compare", "Say which of two policies is better, and how sure.");
+  command
+      ->add_option("A", arguments->first, "POLICY@CHECKPOINT of --run, RUN:POLICY@CHECKPOINT, or a RUN with one policy")
+      ->required();
+  command->add_option("B", arguments->second, "the same; the baseline")->required();
+  command->add_option("--run", arguments->run, "the run that both are in")->type_name("RUN");
+  command->add_option("--world", arguments->world, "only in this world; else in every world of both")
+      ->type_name("NAME");
+  command->add_option("--judge", arguments->judge, "whose verdicts are counted")->capture_default_str();
+  command->add_option("--alpha", arguments->options.alpha, "risk of a false decision, two-sided")
+      ->capture_default_str();
+  command->add_option("--power", arguments->options.power, "that 'how many more' promises")->capture_default_str();
+  command->add_flag("--sequential", arguments->sequential,
+                    "also a bet that stays valid however often one looks; keeps its e-values in A's run");
+  command->add_flag("--json", arguments->json, "for programs: docs/compare.md");
+  command->footer(
+      "Examples:\n"
+      "  evac compare visual_pick@good visual_pick@poor --run out/demo\n"
+      "  evac compare out/candidate out/baseline --world sim --json\n"
+      "  evac compare out/a:visual_pick@good out/b:visual_pick@good --sequential\n"
+      "Paired by initial state and seed where 80 % are shared. Not decided is no error: the exit code is 0.");
+  command->callback([arguments, &exit_code] {
+    Compare(*arguments);
+    exit_code = ExitCode::kOk;
+  });
+}
+
+}  // namespace evac

@@ -1,0 +1,81 @@
+#include <fmt/format.h>
+
+#include <cstdio>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <string>
+#include <vector>
+
+#include "apps/commands.h"
+#include "core/store.h"
+#include "reports/trust_output.h"
+#include "reports/wording.h"
+
+namespace evac {
+namespace {
+
+struct TrustArguments {
+  std::string run, world, judge = "oracle";
+  TrustOptions options;
+  bool json = false;
+};
+
+std::vector<std::string> ModelWorlds(const RunSummary& summary, const std::string& wanted) {
+  std::vector<std::string> worlds;
+  for (const WorldInfo& world : summary.data.worlds) {
+    if (!world.is_real && wanted.empty()) worlds.push_back(world.name);
+  }
+  if (!wanted.empty()) worlds.push_back(wanted);  // complained of later, if it is none
+  if (worlds.empty()) throw InvalidInput("trust: the run has no world beside the real one");
+  return worlds;
+}
+
+void PrintTrust(const TrustArguments& arguments) {
+  const Store store = Store::Open(arguments.run, Store::Mode::kReadOnly);
+  SummaryOptions options;
+  options.judge = arguments.judge;
+  options.bootstrap_replicates = 1;  // its correlations are not shown
+  const RunSummary summary = Summarise(ReadRun(store), options);
+  const std::vector<RealTrial> imported = store.RealTrials();
+  const std::string real = imported.empty()
+                               ? "the world " + summary.reference
+                               : Counted(static_cast<std::int64_t>(imported.size()), "imported real trial");
+  nlohmann::ordered_json all = {{"schema", 1}, {"worlds", nlohmann::ordered_json::array()}};
+  for (const std::string& world : ModelWorlds(summary, arguments.world)) {
+    const TrustReport report{world, real, arguments.judge, arguments.options,
+                             TrustOf(TrustInputOf(summary, imported, world), arguments.options)};
+    if (!arguments.json) fmt::print("{}{}", all["worlds"].empty() ? "" : "\n", TrustText(report));
+    all["worlds"].push_back(TrustJson(report));
+  }
+  if (arguments.json) fmt::print("{}\n", all.dump(2));
+}
+
+}  // namespace
+
+void AddTrust(CLI::App& app, ExitCode& exit_code) {
+  const auto arguments = std::make_shared<TrustArguments>();
+  CLI::App* command = app.add_subcommand(
+      "trust", "Say for each task whether a world may be trusted, and estimate the real success rates.");
+  command->add_option("RUN", arguments->run, "folder of a run")->required();
+  command->add_option("--world", arguments->world, "only this one; else every world beside the real one")
+      ->type_name("NAME");
+  command->add_option("--judge", arguments->judge, "whose verdicts on episodes are counted")->capture_default_str();
+  command->add_option("--margin", arguments->options.margin, "how far its rate may be from the real one")
+      ->capture_default_str();
+  command->add_option("--confidence", arguments->options.confidence, "of the intervals")->capture_default_str();
+  command->add_option("--seed", arguments->options.bootstrap.seed, "of the bootstrap and of betting's order")
+      ->capture_default_str();
+  command->add_flag("--json", arguments->json, "for programs: docs/trust.md");
+  command->footer(
+      "Held against imported real trials (evac import-real) if the run has any, else against its real world.\n"
+      "Examples:\n"
+      "  evac trust out/demo\n"
+      "  evac trust out/demo --world sim --margin 0.15 --json\n"
+      "Unknown is an answer: the exit code is 0.");
+  command->callback([arguments, &exit_code] {
+    PrintTrust(*arguments);
+    exit_code = ExitCode::kOk;
+  });
+}
+
+}  // namespace evac

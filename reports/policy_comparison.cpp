@@ -1,0 +1,226 @@
+#include "reports/policy_comparison.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <set>
+#include <utility>
+
+#include "core/error.h"
+#include "core/statistics/many_comparisons.h"
+#include "core/statistics/planning.h"
+#include "core/statistics/rate_difference.h"
+#include "core/statistics/stratified.h"
+#include "core/statistics/two_by_two.h"
+#include "reports/comparison.h"
+
+namespace evac {
+namespace {
+
+/// Share of the larger side's episodes from which on only pairs are looked at.
+constexpr double kPairedFrom = 0.8;
+
+using Where = std::pair<std::string, std::uint64_t>;  // initial state, seed
+
+/// One policy's episodes of one task that count, and how many do not.
+struct Side {
+  std::map<Where, const JudgedEpisode*> counted;
+  std::int64_t apart = 0;
+};
+
+std::map<std::string, Side> SidesByTask(const ComparedPolicy& policy) {
+  std::map<std::string, Side> sides;
+  for (const JudgedEpisode& judged : policy.episodes) {
+    const PairKey& pair = judged.episode.key.pair;
+    Side& side = sides[pair.task];
+    if (judged.Counts()) {
+      side.counted[{pair.initial_state, pair.seed}] = &judged;
+    } else {
+      ++side.apart;
+    }
+  }
+  return sides;
+}
+
+bool Succeeded(const JudgedEpisode& judged) { return judged.outcome == Outcome::kSuccess; }
+
+Estimate RateOfSide(const Side& side, double confidence) {
+  std::vector<const JudgedEpisode*> episodes;
+  for (const auto& [where, judged] : side.counted) episodes.push_back(judged);
+  return RateOf(episodes, confidence);
+}
+
+Count CountOf(const Side& side) {
+  Count count{0, static_cast<std::int64_t>(side.counted.size())};
+  for (const auto& [where, judged] : side.counted) count.successes += Succeeded(*judged);
+  return count;
+}
+
+Side SharedPart(const Side& side, const Side& other) {
+  Side shared = side;
+  std::erase_if(shared.counted, [&](const auto& entry) { return !other.counted.contains(entry.first); });
+  return shared;
+}
+
+Flips FlipsOf(const Side& first, const Side& second) {
+  Flips flips;
+  for (const auto& [where, judged] : first.counted) {
+    const auto partner = second.counted.find(where);
+    if (partner == second.counted.end()) continue;
+    flips.only_first += Succeeded(*judged) && !Succeeded(*partner->second);
+    flips.only_second += !Succeeded(*judged) && Succeeded(*partner->second);
+  }
+  return flips;
+}
+
+/// Pairs by initial state, so that repeats of one do not count as if they were new.
+PairedOutcomes EffectivePairsOf(const Side& first, const Side& second) {
+  std::map<std::string, PairedOutcomes> states;
+  for (const auto& [where, judged] : first.counted) {
+    const auto partner = second.counted.find(where);
+    if (partner == second.counted.end()) continue;
+    PairedOutcomes& state = states[where.first];
+    ++state.pairs;
+    state.flips.only_first += Succeeded(*judged) && !Succeeded(*partner->second);
+    state.flips.only_second += !Succeeded(*judged) && Succeeded(*partner->second);
+  }
+  std::vector<PairedOutcomes> clusters;
+  for (const auto& [state, outcomes] : states) clusters.push_back(outcomes);
+  return EffectivePairs(clusters);
+}
+
+Winner WinnerOf(const ComparisonRow& row, const Number& p, double alpha) {
+  if (!p || !row.difference.value || *p > alpha || *row.difference.value == 0) return Winner::kNotDecided;
+  return *row.difference.value > 0 ? Winner::kFirst : Winner::kSecond;
+}
+
+/// From the flips seen, half a flip added to each kind so that none is thought impossible.
+Defined<std::int64_t> MorePairs(const ComparisonRow& row, const ComparisonOptions& options) {
+  const auto [b, c] = row.flips;
+  if (b == c) return Undefined{b == 0 ? "no pair differs" : "the flips lean to neither side"};
+  const double n = static_cast<double>(row.shared) + 1;
+  const FlipRates rates{(static_cast<double>(b) + 0.5) / n, (static_cast<double>(c) + 0.5) / n};
+  const SampleSize size = PairsForMcNemar(rates, {options.alpha, options.power});
+  if (!size.exact) return Undefined{size.exact.reason()};
+  return std::max<std::int64_t>(1, size.n - row.shared);
+}
+
+Defined<std::int64_t> MoreEpisodes(const ComparisonRow& row, const ComparisonOptions& options) {
+  if (!row.first.value || !row.second.value) return Undefined{"one of the two has no episode that counts"};
+  const SampleSize size = TrialsPerPolicy(*row.first.value, *row.second.value, {options.alpha, options.power});
+  if (!size.exact) return Undefined{size.exact.reason()};
+  return std::max<std::int64_t>(1, size.n - std::min(row.first_episodes, row.second_episodes));
+}
+
+/// Winner and "how many more", once the p that counts is known.
+void Decide(const ComparisonOptions& options, ComparisonRow& row) {
+  row.winner = WinnerOf(row, row.p_holm, options.alpha);
+  if (row.winner == Winner::kNotDecided)
+    row.more = row.is_paired ? MorePairs(row, options) : MoreEpisodes(row, options);
+}
+
+void ComparePaired(const Side& first, const Side& second, const ComparisonOptions& options, ComparisonRow& row) {
+  row.first = RateOfSide(SharedPart(first, second), options.confidence());
+  row.second = RateOfSide(SharedPart(second, first), options.confidence());
+  const PairedOutcomes effective = EffectivePairsOf(first, second);
+  const Number seen = TangoDifference({row.flips, row.shared}, options.confidence()).value;
+  row.difference = TangoDifference(effective, options.confidence());
+  row.difference.value = seen;
+  row.difference.n = row.shared;
+  const bool has_repeats = effective.pairs < row.shared;
+  if (has_repeats) row.difference.method = fmt::format("Tango on {} effective pairs", effective.pairs);
+  row.test = has_repeats ? fmt::format("exact McNemar on {} effective pairs", effective.pairs) : "exact McNemar";
+  if (row.shared > 0) row.p = McNemarExact(effective.flips).p_exact;
+}
+
+void CompareUnpaired(const Side& first, const Side& second, const ComparisonOptions& options, ComparisonRow& row) {
+  const Count one = CountOf(first), two = CountOf(second);
+  row.first = RateOfSide(first, options.confidence());
+  row.second = RateOfSide(second, options.confidence());
+  row.difference = NewcombeDifference(one, two, options.confidence());
+  row.test = "Boschloo";
+  if (one.trials > 0 && two.trials > 0) row.p = BoschlooExact(one, two).two_sided;
+}
+
+ComparisonRow CompareTask(const std::string& task, const Side& first, const Side& second,
+                          const ComparisonOptions& options) {
+  ComparisonRow row;
+  row.task = task;
+  row.first_episodes = static_cast<std::int64_t>(first.counted.size());
+  row.second_episodes = static_cast<std::int64_t>(second.counted.size());
+  row.first_apart = first.apart;
+  row.second_apart = second.apart;
+  row.shared = static_cast<std::int64_t>(SharedPart(first, second).counted.size());
+  row.flips = FlipsOf(first, second);
+  const double most = static_cast<double>(std::max(row.first_episodes, row.second_episodes));
+  row.is_paired = row.shared > 0 && static_cast<double>(row.shared) >= kPairedFrom * most;
+  row.is_paired ? ComparePaired(first, second, options, row) : CompareUnpaired(first, second, options, row);
+  return row;
+}
+
+void AdjustForTasks(const ComparisonOptions& options, std::vector<ComparisonRow>& rows) {
+  std::vector<double> p_values;
+  for (const ComparisonRow& row : rows) {
+    if (row.p) p_values.push_back(*row.p);
+  }
+  const std::vector<double> adjusted = HolmAdjusted(p_values);
+  auto next = adjusted.begin();
+  for (ComparisonRow& row : rows) {
+    if (row.p) row.p_holm = *next++;
+    Decide(options, row);
+  }
+}
+
+/// The episodes of all tasks as one side; states keep their task's name so that they stay apart.
+Side AllTasks(const std::map<std::string, Side>& sides) {
+  Side all;
+  for (const auto& [task, side] : sides) {
+    all.apart += side.apart;
+    for (const auto& [where, judged] : side.counted) all.counted[{task + "\n" + where.first, where.second}] = judged;
+  }
+  return all;
+}
+
+/// Paired: each pair is a stratum of its own, so that the pooled flips are the stratified test already.
+ComparisonRow CompareAll(const std::map<std::string, Side>& first, const std::map<std::string, Side>& second,
+                         const std::set<std::string>& tasks, const ComparisonOptions& options) {
+  ComparisonRow row = CompareTask("", AllTasks(first), AllTasks(second), options);
+  if (!row.is_paired && tasks.size() > 1) {
+    std::vector<Stratum> strata;
+    for (const std::string& task : tasks) {
+      const auto one = first.find(task), two = second.find(task);
+      if (one != first.end() && two != second.end()) strata.push_back({CountOf(one->second), CountOf(two->second)});
+    }
+    const StratifiedTest test = MantelHaenszel(strata, options.confidence());
+    row.difference = test.risk_difference;
+    row.test = "Cochran-Mantel-Haenszel";
+    row.p = test.p;
+  }
+  row.p_holm = row.p;
+  Decide(options, row);
+  return row;
+}
+
+}  // namespace
+
+PolicyComparison ComparePolicies(const ComparedPolicy& first, const ComparedPolicy& second,
+                                 const ComparisonOptions& options) {
+  const auto is_share = [](double x) { return x > 0 && x < 1; };
+  if (!is_share(options.alpha) || !is_share(options.power)) {
+    throw InvalidInput("compare: alpha is {} and power {}, wanted both between 0 and 1", options.alpha, options.power);
+  }
+  std::map<std::string, Side> one = SidesByTask(first), two = SidesByTask(second);
+  std::set<std::string> tasks;
+  for (const auto& [task, side] : one) tasks.insert(task);
+  for (const auto& [task, side] : two) tasks.insert(task);
+  if (tasks.empty()) throw InvalidInput("compare: neither {} nor {} has an episode here", first.name, second.name);
+  PolicyComparison comparison{first.name, second.name, options, {}, {}};
+  for (const std::string& task : tasks) comparison.tasks.push_back(CompareTask(task, one[task], two[task], options));
+  AdjustForTasks(options, comparison.tasks);
+  comparison.all = CompareAll(one, two, tasks, options);
+  return comparison;
+}
+
+}  // namespace evac

@@ -1,0 +1,58 @@
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "core/statistics/estimate.h"
+#include "core/statistics/mcnemar.h"
+#include "reports/outcome.h"
+
+/// Which of two policies is better, and how sure: per task and over all tasks (statistics.md 3.2). Paired by initial
+/// state and seed wherever at least 80 % of them are shared. Output: policy_comparison_output.h.
+namespace evac {
+
+/// One policy's episodes in one world.
+struct ComparedPolicy {
+  std::string name;  ///< "visual_pick@good"
+  std::vector<JudgedEpisode> episodes;
+};
+
+struct ComparisonOptions {
+  double alpha = 0.05;  ///< two-sided; over tasks after Holm
+  double power = 0.8;   ///< of the sizes that "how many more" promises
+  double confidence() const { return 1 - alpha; }
+};
+
+enum class Winner { kFirst, kSecond, kNotDecided };
+
+/// One task, or all of them.
+struct ComparisonRow {
+  std::string task;        ///< empty: all tasks, stratified
+  Estimate first, second;  ///< success rates; over the shared pairs where paired, else over all that count
+  std::int64_t first_episodes = 0, second_episodes = 0, shared = 0;  ///< that count, and with one (state, seed)
+  std::int64_t first_apart = 0, second_apart = 0;  ///< errors, cannot tell, invalid, not judged: in no rate
+  bool is_paired = false;
+  Flips flips;          ///< of the shared pairs
+  Estimate difference;  ///< first - second
+  std::string test;     ///< "exact McNemar", "Boschloo", "Cochran-Mantel-Haenszel"
+  Number p = Undefined{"no episodes to compare"};
+  Number p_holm = Undefined{"no episodes to compare"};  ///< over the tasks shown; of all tasks: p itself
+  Winner winner = Winner::kNotDecided;
+  Defined<std::int64_t> more = Undefined{"decided"};  ///< further pairs, or episodes per policy, that would decide with
+                                                      ///< the power asked for if the rates are those seen
+};
+
+struct PolicyComparison {
+  std::string first, second;
+  ComparisonOptions options;
+  std::vector<ComparisonRow> tasks;  ///< in the order of their names
+  ComparisonRow all;                 ///< over all tasks; equal to the task where there is one
+};
+
+/// @throws InvalidInput if alpha or power is not in (0, 1), or neither policy has an episode.
+PolicyComparison ComparePolicies(const ComparedPolicy& first, const ComparedPolicy& second,
+                                 const ComparisonOptions& options = {});
+
+}  // namespace evac

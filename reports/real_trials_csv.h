@@ -1,0 +1,35 @@
+#pragma once
+
+#include <set>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include "core/store.h"
+
+/// Trials on a real robot, from a lab's own table (docs/formats/real_trials_csv.md).
+namespace evac {
+
+/// What a row may name.
+struct KnownNames {
+  std::set<std::string> tasks;
+  std::set<std::pair<std::string, std::string>> states;    ///< task, initial state
+  std::set<std::pair<std::string, std::string>> policies;  ///< name, checkpoint
+  bool new_states_too = false;                             ///< a state that is not known is accepted
+};
+
+struct RealTrialsCsv {
+  std::vector<RealTrial> trials;      ///< in the order of the file; `video` as written, `source` "trials.csv:12"
+  std::vector<std::string> warnings;  ///< one sentence each
+};
+
+/// @param file  what messages call the text.
+/// @throws InvalidInput naming every wrong line (at most 20) and what was wanted there; nothing is read in part.
+RealTrialsCsv ReadRealTrialsCsv(std::string_view text, const std::string& file, const KnownNames& known);
+
+/// Those of `trials` that `stored` does not hold yet. @throws InvalidInput naming every one (at most 20) that is there
+/// with another outcome.
+std::vector<RealTrial> NewTrials(const std::vector<RealTrial>& trials, const std::vector<RealTrial>& stored);
+
+}  // namespace evac

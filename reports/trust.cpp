@@ -1,0 +1,299 @@
+#include "reports/trust.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <set>
+#include <utility>
+
+#include "core/error.h"
+#include "core/statistics/special.h"
+
+namespace evac {
+namespace {
+
+using StateKey = std::pair<std::string, std::string>;  // policy, state
+
+/// One task's outcomes of one world, by policy and state, in order of seed.
+using ByState = std::map<StateKey, std::vector<TrialOutcome>>;
+
+std::map<std::string, ByState> ByTask(const std::vector<TrialOutcome>& outcomes) {
+  std::map<std::string, ByState> tasks;
+  for (const TrialOutcome& outcome : outcomes) tasks[outcome.task][{outcome.policy, outcome.state}].push_back(outcome);
+  for (auto& [task, states] : tasks) {
+    for (auto& [key, trials] : states) std::ranges::stable_sort(trials, {}, &TrialOutcome::seed);
+  }
+  return tasks;
+}
+
+/// One task's pairs by policy and state, and the outcomes that have no partner.
+struct Paired {
+  std::map<StateKey, std::vector<BothOutcomes>> pairs;
+  std::map<std::string, std::int64_t> real_alone;               ///< by policy
+  std::map<std::string, std::map<std::string, Count>> further;  ///< by policy and state
+};
+
+std::vector<BothOutcomes> PairsOf(const std::vector<TrialOutcome>& real, const std::vector<TrialOutcome>& model,
+                                  bool seeds_agree) {
+  std::vector<BothOutcomes> pairs;
+  if (!seeds_agree) {
+    for (std::size_t i = 0; i < std::min(real.size(), model.size()); ++i)
+      pairs.push_back({real[i].success, model[i].success});
+    return pairs;
+  }
+  for (const TrialOutcome& trial : real) {
+    const auto partner = std::ranges::find(model, trial.seed, &TrialOutcome::seed);
+    if (partner != model.end()) pairs.push_back({trial.success, partner->success});
+  }
+  return pairs;
+}
+
+Paired PairUp(const ByState& real, const ByState& model, bool seeds_agree) {
+  Paired paired;
+  for (const auto& [key, trials] : real) {
+    const auto partner = model.find(key);
+    std::vector<BothOutcomes> pairs;
+    if (partner != model.end()) pairs = PairsOf(trials, partner->second, seeds_agree);
+    paired.real_alone[key.first] += static_cast<std::int64_t>(trials.size() - pairs.size());
+    if (!pairs.empty()) paired.pairs[key] = std::move(pairs);
+  }
+  for (const auto& [key, trials] : model) {
+    if (real.contains(key)) continue;  // its further repeats are not independent of the pair's
+    for (const TrialOutcome& trial : trials) {
+      Count& count = paired.further[key.first][key.second];
+      ++count.trials;
+      count.successes += trial.success;
+    }
+  }
+  return paired;
+}
+
+std::vector<Count> CountsOf(const ByState& states, const std::string& policy) {
+  std::vector<Count> counts;
+  for (const auto& [key, trials] : states) {
+    if (key.first != policy) continue;
+    Count& count = counts.emplace_back();
+    for (const TrialOutcome& trial : trials) {
+      ++count.trials;
+      count.successes += trial.success;
+    }
+  }
+  return counts;
+}
+
+/// Repeats of one state count by the design effect, so that H's spread is not understated.
+Count EffectiveCount(const std::map<std::string, Count>& states) {
+  std::vector<Count> clusters;
+  Count total;
+  for (const auto& [state, count] : states) {
+    clusters.push_back(count);
+    total.successes += count.successes;
+    total.trials += count.trials;
+  }
+  const ClusterStatistics statistics = StatisticsOfClusters(clusters);
+  if (!statistics.effective_trials) return total;
+  const double trials = std::max(1.0, std::floor(*statistics.effective_trials));
+  return {static_cast<std::int64_t>(std::lround(*statistics.rate * trials)), static_cast<std::int64_t>(trials)};
+}
+
+std::vector<bool> Flags(const Count& count) {
+  std::vector<bool> flags(static_cast<std::size_t>(count.trials), false);
+  std::fill_n(flags.begin(), count.successes, true);
+  return flags;
+}
+
+PredictedRate Predict(const std::string& policy, const Paired& paired, const TrustOptions& options) {
+  PredictedRate rate;
+  rate.policy = policy;
+  std::vector<BothOutcomes> pairs;
+  for (const auto& [key, of_state] : paired.pairs) {
+    if (key.first == policy) pairs.insert(pairs.end(), of_state.begin(), of_state.end());
+  }
+  rate.pairs = TableOf(pairs);
+  if (const auto further = paired.further.find(policy); further != paired.further.end()) {
+    rate.further = EffectiveCount(further->second);
+  }
+  if (const auto alone = paired.real_alone.find(policy); alone != paired.real_alone.end())
+    rate.real_alone = alone->second;
+  rate.predicted = PpiMover(rate.pairs, rate.further, options.confidence);
+  rate.betting =
+      PpiBetting(pairs, Flags(rate.further), {.confidence = options.confidence, .seed = options.bootstrap.seed});
+  rate.tuned = PpiMean(rate.pairs, rate.further, PpiWeight::kTuned, options.confidence);
+  return rate;
+}
+
+/// The policies' rates over the pairs, with their states, for the bootstrap.
+Estimate CorrelationOver(const std::vector<std::string>& policies, const Paired& paired, const TrustOptions& options) {
+  std::set<std::string> states;
+  for (const auto& [key, pairs] : paired.pairs) states.insert(key.second);
+  TaskPoints task;
+  for (const std::string& policy : policies) {
+    PointOutcomes outcomes;
+    CorrelationPoint point;
+    point.policy = policy;
+    point.real = point.sim = Count{};
+    for (const std::string& state : states) {
+      const auto of_state = paired.pairs.find({policy, state});
+      const BothWorlds table = of_state == paired.pairs.end() ? BothWorlds{} : TableOf(of_state->second);
+      outcomes.real.push_back({table.both + table.only_real, table.n()});
+      outcomes.sim.push_back({table.both + table.only_model, table.n()});
+      point.real->successes += outcomes.real.back().successes;
+      point.sim->successes += outcomes.sim.back().successes;
+      point.real->trials += table.n();
+      point.sim->trials += table.n();
+    }
+    if (point.real->trials == 0) continue;
+    point.real_sr = static_cast<double>(point.real->successes) / static_cast<double>(point.real->trials);
+    point.sim_sr = static_cast<double>(point.sim->successes) / static_cast<double>(point.sim->trials);
+    task.points.push_back(std::move(point));
+    task.outcomes.points.push_back(std::move(outcomes));
+  }
+  if (task.points.size() < kMinTrustPolicies) {
+    Estimate none;
+    none.n = static_cast<std::int64_t>(task.points.size());
+    none.value =
+        Undefined{fmt::format("{} policies, and fewer than {} say nothing", task.points.size(), kMinTrustPolicies)};
+    none.interval = Undefined{none.value.reason()};
+    return none;
+  }
+  BootstrapOptions bootstrap = options.bootstrap;
+  bootstrap.confidence = options.confidence;
+  return CorrelateOutcomes("", {task}, {.convention = {}, .bootstrap = bootstrap}).pearson;
+}
+
+/// Pairs by initial state: policies that share one, and its repeats, are not independent.
+PairedOutcomes EffectiveOf(const Paired& paired) {
+  std::map<std::string, PairedOutcomes> states;
+  for (const auto& [key, pairs] : paired.pairs) {
+    const BothWorlds table = TableOf(pairs);
+    PairedOutcomes& state = states[key.second];
+    state.pairs += table.n();
+    state.flips.only_first += table.only_model;
+    state.flips.only_second += table.only_real;
+  }
+  std::vector<PairedOutcomes> clusters;
+  for (const auto& [state, outcomes] : states) clusters.push_back(outcomes);
+  return EffectivePairs(clusters);
+}
+
+/// model - real and its test, on the effective number of pairs.
+void AddBias(const Paired& paired, double confidence, TaskTrust& task) {
+  const PairedOutcomes effective = EffectiveOf(paired);
+  const Flips flips{task.pairs.only_model, task.pairs.only_real};
+  task.bias = TangoDifference(effective, confidence);
+  task.bias.value = TangoDifference({flips, task.pairs.n()}, confidence).value;
+  task.bias.n = task.pairs.n();
+  if (effective.pairs < task.pairs.n()) task.bias.method = fmt::format("Tango on {} effective pairs", effective.pairs);
+  task.test = McNemarExact(effective.flips);
+}
+
+/// From how many pairs on the bias's interval would no longer reach the margin it is nearest to.
+Defined<std::int64_t> MorePairs(const BothWorlds& pairs, const TrustOptions& options) {
+  if (pairs.n() == 0) return Undefined{"no pair to plan from"};
+  const double n = static_cast<double>(pairs.n());
+  const double bias = static_cast<double>(pairs.only_model - pairs.only_real) / n;
+  const double distance = std::abs(options.margin - std::abs(bias)), z = TwoSidedZ(options.confidence);
+  if (distance < 0.005) return Undefined{"the bias seen is at the margin"};
+  const double variance = (static_cast<double>(pairs.discordant()) + 1) / (n + 1) - bias * bias;
+  const double wanted = std::ceil(z * z * variance / (distance * distance));
+  return std::max<std::int64_t>(1, static_cast<std::int64_t>(wanted) - pairs.n());
+}
+
+void Decide(const TrustOptions& options, TaskTrust& task) {
+  if (task.bias.value) {
+    const auto [low, high] = *task.bias.interval;
+    if (-options.margin <= low && high <= options.margin) task.trust = Trust::kYes;
+    if (low > options.margin || high < -options.margin) task.trust = Trust::kNo;
+  }
+  if (task.trust == Trust::kUnknown) task.more = MorePairs(task.pairs, options);
+}
+
+TaskTrust TrustTask(const std::string& name, const ByState& real, const ByState& model, const TrustInput& input,
+                    const TrustOptions& options) {
+  const Paired paired = PairUp(real, model, input.seeds_agree);
+  TaskTrust task;
+  task.task = name;
+  std::set<std::string> policies;
+  for (const auto& [key, trials] : real) policies.insert(key.first);
+  for (const auto& [key, pairs] : paired.pairs) {
+    const BothWorlds table = TableOf(pairs);
+    task.pairs.both += table.both;
+    task.pairs.only_real += table.only_real;
+    task.pairs.only_model += table.only_model;
+    task.pairs.neither += table.neither;
+  }
+  const auto [both, only_real, only_model, neither] = task.pairs;
+  task.real = WilsonInterval(both + only_real, task.pairs.n(), options.confidence);
+  task.model = WilsonInterval(both + only_model, task.pairs.n(), options.confidence);
+  task.same = WilsonInterval(both + neither, task.pairs.n(), options.confidence);
+  AddBias(paired, options.confidence, task);
+  task.agreement = StatisticsOf({.both_success = both,
+                                 .only_judge_success = only_model,
+                                 .only_human_success = only_real,
+                                 .both_failure = neither},
+                                options.confidence);
+  for (const std::string& policy : policies) {
+    PredictedRate& rate = task.policies.emplace_back(Predict(policy, paired, options));
+    rate.real = ClusteredWilsonInterval(CountsOf(real, policy), options.confidence);
+    rate.model = ClusteredWilsonInterval(CountsOf(model, policy), options.confidence);
+  }
+  task.correlation = CorrelationOver({policies.begin(), policies.end()}, paired, options);
+  Decide(options, task);
+  return task;
+}
+
+}  // namespace
+
+const char* Name(Trust trust) {
+  switch (trust) {
+    case Trust::kYes:
+      return "yes";
+    case Trust::kNo:
+      return "no";
+    case Trust::kUnknown:
+      return "unknown";
+  }
+  return "unknown";
+}
+
+std::vector<TaskTrust> TrustOf(const TrustInput& input, const TrustOptions& options) {
+  if (!(options.margin > 0 && options.margin < 1)) {
+    throw InvalidInput("trust: margin is {}, wanted 0 < margin < 1", options.margin);
+  }
+  TwoSidedZ(options.confidence);  // complains
+  if (input.real.empty()) throw InvalidInput("trust: no real trial is a success or a failure");
+  if (input.model.empty()) throw InvalidInput("trust: no imagined episode is judged a success or a failure");
+  std::map<std::string, ByState> real = ByTask(input.real), model = ByTask(input.model);
+  std::vector<TaskTrust> tasks;
+  for (const auto& [task, states] : real) tasks.push_back(TrustTask(task, states, model[task], input, options));
+  return tasks;
+}
+
+TrustInput TrustInputOf(const RunSummary& summary, const std::vector<RealTrial>& imported, const std::string& world) {
+  TrustInput input;
+  input.seeds_agree = imported.empty();
+  if (imported.empty() && summary.reference.empty()) {
+    throw InvalidInput("trust: the run has no real world and no imported trials (evac import-real)");
+  }
+  const auto is_it = [&](const WorldInfo& info) { return info.name == world && !info.is_real; };
+  if (std::ranges::none_of(summary.data.worlds, is_it)) {
+    throw InvalidInput("trust: '{}' is no world of the run beside the real one", world);
+  }
+  for (const JudgedEpisode& judged : summary.episodes) {
+    const auto& [pair, in_world] = judged.episode.key;
+    if (!judged.Counts() || (in_world != world && (!imported.empty() || in_world != summary.reference))) continue;
+    (in_world == world ? input.model : input.real)
+        .push_back({pair.task, PolicyLabel(pair.policy, pair.checkpoint), pair.initial_state, pair.seed,
+                    judged.outcome == Outcome::kSuccess});
+  }
+  for (const RealTrial& trial : imported) {
+    if (trial.outcome != Label::kSuccess && trial.outcome != Label::kFailure) continue;
+    input.real.push_back({trial.task, PolicyLabel(trial.policy, trial.checkpoint), trial.initial_state,
+                          static_cast<std::uint64_t>(trial.trial), trial.outcome == Label::kSuccess});
+  }
+  return input;
+}
+
+}  // namespace evac

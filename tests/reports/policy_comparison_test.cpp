@@ -1,0 +1,153 @@
+#include "reports/policy_comparison.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "core/error.h"
+#include "core/statistics/planning.h"
+#include "reports/policy_comparison_output.h"
+
+namespace evac {
+namespace {
+
+using testing::HasSubstr;
+
+/// Outcomes of one task in the states 0, 1, …: s success, f failure, e error, - no such episode.
+void Add(const std::string& task, const std::string& outcomes, ComparedPolicy& policy, std::uint64_t seed = 1) {
+  for (std::size_t state = 0; state < outcomes.size(); ++state) {
+    if (outcomes[state] == '-') continue;
+    JudgedEpisode judged;
+    judged.episode.key.pair = {task, std::to_string(state), "p", "c", seed};
+    judged.outcome = outcomes[state] == 's'   ? Outcome::kSuccess
+                     : outcomes[state] == 'f' ? Outcome::kFailure
+                                              : Outcome::kError;
+    policy.episodes.push_back(judged);
+  }
+}
+
+ComparedPolicy Policy(const std::string& name, const std::string& outcomes, const std::string& task = "take") {
+  ComparedPolicy policy{name, {}};
+  Add(task, outcomes, policy);
+  return policy;
+}
+
+std::string Times(int count, const std::string& text) {
+  std::string all;
+  for (int i = 0; i < count; ++i) all += text;
+  return all;
+}
+
+TEST(ComparePolicies, OnSharedStatesTheFlipsDecide) {
+  const PolicyComparison comparison =
+      ComparePolicies(Policy("good", Times(12, "s") + "ffff"), Policy("bad", Times(4, "s") + Times(12, "f")));
+  ASSERT_EQ(comparison.tasks.size(), 1u);
+  const ComparisonRow& row = comparison.tasks[0];
+  EXPECT_TRUE(row.is_paired);
+  EXPECT_EQ(row.shared, 16);
+  EXPECT_EQ(row.flips.only_first, 8);
+  EXPECT_EQ(row.flips.only_second, 0);
+  EXPECT_NEAR(*row.p, 2.0 / 256, 1e-12);
+  EXPECT_EQ(row.winner, Winner::kFirst);
+  EXPECT_EQ(comparison.all.winner, Winner::kFirst);
+  EXPECT_THAT(DecisionOf(comparison), HasSubstr("good is better than bad: 75 % against 25 %, +50 points"));
+}
+
+TEST(ComparePolicies, TheLoserIsNamedFromBothSides) {
+  const ComparedPolicy good = Policy("good", Times(10, "s")), bad = Policy("bad", Times(10, "f"));
+  EXPECT_EQ(ComparePolicies(good, bad).all.winner, Winner::kFirst);
+  EXPECT_EQ(ComparePolicies(bad, good).all.winner, Winner::kSecond);
+}
+
+TEST(ComparePolicies, WhatIsNotDecidedSaysHowManyMorePairsWould) {
+  const PolicyComparison comparison = ComparePolicies(Policy("a", "ssssffffss"), Policy("b", "sfsfffffss"));
+  const ComparisonRow& row = comparison.all;
+  EXPECT_EQ(row.winner, Winner::kNotDecided);
+  ASSERT_TRUE(row.more);
+  const FlipRates rates{2.5 / 11, 0.5 / 11};
+  EXPECT_GE(McNemarPower(row.shared + *row.more, rates), 0.8);
+  EXPECT_LT(McNemarPower(row.shared + *row.more - 1, rates), 0.8);
+  const PolicyComparison equal = ComparePolicies(Policy("a", "ssff"), Policy("b", "ssff"));
+  EXPECT_FALSE(equal.all.more);
+  EXPECT_THAT(DecisionOf(equal), HasSubstr("No number of further episodes can be named: no pair differs"));
+}
+
+TEST(ComparePolicies, BelowEightyPercentSharedStatesTheTwoAreNotPaired) {
+  const ComparedPolicy one = Policy("a", "ssssssffff");
+  EXPECT_TRUE(ComparePolicies(one, Policy("b", "--ssffffff")).all.is_paired);
+  const ComparisonRow row = ComparePolicies(one, Policy("b", "---sffffff")).all;
+  EXPECT_FALSE(row.is_paired);
+  EXPECT_EQ(row.test, "Boschloo");
+  EXPECT_EQ(row.first_episodes, 10);
+  EXPECT_EQ(row.second_episodes, 7);
+  EXPECT_EQ(row.difference.method, "Newcombe");
+}
+
+TEST(ComparePolicies, SeveralTasksAreAdjustedForEachAndStratifiedTogether) {
+  ComparedPolicy one{"a", {}}, two{"b", {}};
+  Add("t1", Times(8, "s"), one);
+  Add("t1", "ssffffff", two);
+  Add("t2", Times(8, "s"), one);
+  Add("t2", "ssffffff", two);
+  const PolicyComparison paired = ComparePolicies(one, two);
+  ASSERT_EQ(paired.tasks.size(), 2u);
+  EXPECT_NEAR(*paired.tasks[0].p, 0.03125, 1e-12);
+  EXPECT_NEAR(*paired.tasks[0].p_holm, 0.0625, 1e-12) << "two tasks are on the page";
+  EXPECT_EQ(paired.tasks[0].winner, Winner::kNotDecided);
+  EXPECT_EQ(paired.all.shared, 16) << "states of one name in two tasks are two states";
+  EXPECT_EQ(paired.all.winner, Winner::kFirst);
+
+  ComparedPolicy elsewhere{"c", {}};
+  Add("t1", Times(8, "-") + "ssffffff", elsewhere);
+  Add("t2", Times(8, "-") + "ssffffff", elsewhere);
+  const ComparisonRow pooled = ComparePolicies(one, elsewhere).all;
+  EXPECT_EQ(pooled.test, "Cochran-Mantel-Haenszel");
+  EXPECT_NEAR(*pooled.difference.value, 0.75, 1e-12);
+}
+
+TEST(ComparePolicies, RepeatsOfOneStateDoNotCountAsNewStates) {
+  ComparedPolicy one{"a", {}}, two{"b", {}};
+  for (std::uint64_t seed = 0; seed < 10; ++seed) {  // always the same outcome: ten times the same four states
+    Add("t", "sssf", one, seed);
+    Add("t", "sfff", two, seed);
+  }
+  const ComparisonRow row = ComparePolicies(one, two).all;
+  EXPECT_EQ(row.shared, 40);
+  EXPECT_EQ(row.flips.only_first, 20);
+  EXPECT_NEAR(*row.difference.value, 0.5, 1e-12);
+  EXPECT_THAT(row.test, HasSubstr("effective pairs"));
+  EXPECT_GT(*row.p, 0.05) << "two states of four flipped, whatever the number of seeds";
+}
+
+TEST(ComparePolicies, ErrorsAreInNoRateAndAreCounted) {
+  const ComparisonRow row = ComparePolicies(Policy("a", "ssee"), Policy("b", "sfff")).all;
+  EXPECT_EQ(row.first_apart, 2);
+  EXPECT_EQ(row.first_episodes, 2);
+  EXPECT_FALSE(row.is_paired) << "2 of 4 are shared";
+}
+
+TEST(ComparePolicies, WithoutEpisodesNothingIsSaid) {
+  EXPECT_THROW(ComparePolicies({"a", {}}, {"b", {}}), Error);
+  EXPECT_THROW(ComparePolicies(Policy("a", "s"), Policy("b", "s"), {.alpha = 0}), Error);
+  const ComparisonRow row = ComparePolicies(Policy("a", "ss"), {"b", {}}).all;
+  EXPECT_FALSE(row.p);
+  EXPECT_EQ(row.winner, Winner::kNotDecided);
+  EXPECT_FALSE(row.more);
+}
+
+TEST(ComparePoliciesOutput, TextAndJsonSayTheSame) {
+  const ComparedWorld compared{"sim",
+                               "oracle",
+                               ComparePolicies(Policy("good", Times(12, "s") + "e"), Policy("bad", Times(13, "f"))),
+                               {{"", 12, {12, 0}, 400, 500, 3}}};
+  const std::string text = ComparisonText(compared);
+  EXPECT_THAT(text, HasSubstr("World sim, judge oracle. good is better than bad"));
+  EXPECT_THAT(text, HasSubstr("In no rate (errors, cannot tell, invalid, not judged): 1 of good, 0 of bad."));
+  EXPECT_THAT(text, HasSubstr("different"));
+  const auto json = ComparisonJson(compared);
+  EXPECT_EQ(json.at("winner"), "first");
+  EXPECT_EQ(json.at("all_tasks").at("flips").at("only_first"), 12);
+  EXPECT_NEAR(json.at("sequential").at(0).at("p").get<double>(), 1 / 500.0, 1e-12);
+}
+
+}  // namespace
+}  // namespace evac

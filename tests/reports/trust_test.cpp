@@ -1,0 +1,169 @@
+#include "reports/trust.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "core/error.h"
+#include "reports/plan.h"
+#include "reports/trust_output.h"
+#include "tests/reports/sample_run.h"
+
+namespace evac {
+namespace {
+
+using testing::HasSubstr;
+
+/// One policy's outcomes in the states 0, 1, …: s, f, - none.
+void Add(const std::string& policy, const std::string& outcomes, std::vector<TrialOutcome>& trials,
+         std::uint64_t seed = 1) {
+  for (std::size_t state = 0; state < outcomes.size(); ++state) {
+    if (outcomes[state] != '-') trials.push_back({"take", policy, std::to_string(state), seed, outcomes[state] == 's'});
+  }
+}
+
+std::string Times(int count, const std::string& text) {
+  std::string all;
+  for (int i = 0; i < count; ++i) all += text;
+  return all;
+}
+
+TrustInput Input(const std::string& real, const std::string& model) {
+  TrustInput input;
+  Add("p", real, input.real);
+  Add("p", model, input.model);
+  return input;
+}
+
+TEST(TrustIn, AFaithfulModelIsTrustedOnceThereAreEnoughPairs) {
+  const std::string outcomes = Times(30, "sf");
+  EXPECT_EQ(TrustOf(Input(outcomes, outcomes))[0].trust, Trust::kYes);
+  const TaskTrust few = TrustOf(Input("sfsf", "sfsf"))[0];
+  EXPECT_EQ(few.trust, Trust::kUnknown);
+  EXPECT_TRUE(few.more);
+}
+
+TEST(TrustIn, AModelThatAlwaysSucceedsIsNot) {
+  const TaskTrust task = TrustOf(Input(Times(15, "sf"), Times(30, "s")))[0];
+  EXPECT_EQ(task.trust, Trust::kNo);
+  EXPECT_NEAR(*task.bias.value, 0.5, 1e-12);
+  EXPECT_LT(task.test.p_exact, 0.001);
+  EXPECT_NEAR(*task.agreement.kappa.value, 0, 1e-12);
+}
+
+TEST(TrustIn, EqualRatesWithOtherStatesShowInKappaNotInTheBias) {
+  const TaskTrust task = TrustOf(Input(Times(20, "sf"), Times(20, "fs")))[0];
+  EXPECT_NEAR(*task.bias.value, 0, 1e-12);
+  EXPECT_NEAR(*task.agreement.kappa.value, -1, 1e-12);
+  EXPECT_EQ(task.trust, Trust::kUnknown);
+}
+
+TEST(TrustIn, FewerThanFourPoliciesGiveNoCorrelation) {
+  TrustInput input;
+  for (const auto& [policy, real, model] : {std::tuple{"a", "ssssssssss", "sssssssssf"},
+                                            {"b", "sssssffffs", "ssssffffff"},
+                                            {"c", "sfffffffff", "ssffffffff"}}) {
+    Add(policy, real, input.real);
+    Add(policy, model, input.model);
+  }
+  const TrustReport report{"sim", "the world real", "oracle", {}, TrustOf(input)};
+  EXPECT_FALSE(report.tasks[0].correlation.value);
+  EXPECT_THAT(TrustText(report), HasSubstr("over 3 policies it would mean nothing"));
+  Add("d", "ffffffffff", input.real);
+  Add("d", "ffffffffff", input.model);
+  const TaskTrust four = TrustOf(input)[0];
+  EXPECT_GT(*four.correlation.value, 0.9);
+  EXPECT_TRUE(four.correlation.interval);
+}
+
+TEST(TrustIn, PoliciesThatShareStatesAreNotCountedAsIndependent) {
+  TrustInput input;
+  for (const char* policy : {"a", "b", "c", "d"}) {  // the model is wrong in the same states for all
+    Add(policy, Times(5, "ssssf"), input.real);
+    Add(policy, Times(5, "fsssf"), input.model);
+  }
+  const TaskTrust task = TrustOf(input)[0];
+  EXPECT_EQ(task.pairs.n(), 100);
+  EXPECT_THAT(task.bias.method, HasSubstr("effective pairs"));
+  const TaskTrust alone = TrustOf(Input(Times(5, "ssssf"), Times(5, "fsssf")))[0];
+  EXPECT_NEAR(task.bias.interval->high - task.bias.interval->low, alone.bias.interval->high - alone.bias.interval->low,
+              0.03);
+}
+
+TEST(TrustIn, FewRealAndManyImaginedTrialsGiveOneRate) {
+  TrustInput input;
+  Add("p", Times(20, "ssf"), input.real);
+  Add("p", Times(300, "ssf"), input.model);
+  const PredictedRate rate = TrustOf(input)[0].policies[0];
+  EXPECT_EQ(rate.pairs.n(), 60);
+  EXPECT_EQ(rate.further.trials, 840);
+  EXPECT_NEAR(*rate.predicted.value, 2.0 / 3, 1e-12);
+  EXPECT_LT(rate.predicted.interval->high - rate.predicted.interval->low,
+            rate.real.interval->high - rate.real.interval->low);
+  EXPECT_FALSE(rate.tuned.allowed) << "the worlds never differ: PPI++'s interval would be a fairy tale";
+}
+
+TEST(TrustIn, ImportedTrialsArePairedByStateAndOwnEpisodesBySeed) {
+  TrustInput input;
+  Add("p", "ss", input.real, 1);
+  Add("p", "ff", input.real, 2);
+  Add("p", "ss", input.model, 41);
+  input.seeds_agree = true;
+  EXPECT_EQ(TrustOf(input)[0].pairs.n(), 0);
+  input.seeds_agree = false;
+  const TaskTrust task = TrustOf(input)[0];
+  EXPECT_EQ(task.pairs.both, 2);
+  EXPECT_EQ(task.policies[0].real_alone, 2) << "the second trial of each state has no partner";
+}
+
+TEST(TrustIn, NothingToHoldAgainstIsRefused) {
+  TrustInput input;
+  EXPECT_THROW(TrustOf(input), Error);
+  EXPECT_THROW(TrustOf(Input("ss", "")), Error);
+  EXPECT_THROW(TrustOf(Input("ss", "ss"), {.margin = 0}), Error);
+}
+
+TEST(TrustIn, ARunIsHeldAgainstItsRealWorldOrAgainstImportedTrials) {
+  const SampleRun run({{"take", "p", "c", "ssssf", "ssfsfsss"}});
+  const RunSummary summary = run.Summary();
+  const TrustInput own = TrustInputOf(summary, {}, "sim");
+  EXPECT_EQ(own.real.size(), 5u);
+  EXPECT_EQ(own.model.size(), 8u);
+  RealTrial trial{"take", "41-0000", "p", "c", 1, Label::kSuccess, "", "t.csv:2"}, unclear = trial;
+  unclear.outcome = Label::kCannotTell;
+  unclear.trial = 2;
+  const TrustInput imported = TrustInputOf(summary, {trial, unclear}, "sim");
+  EXPECT_EQ(imported.real.size(), 1u) << "the run's own real world no longer counts";
+  EXPECT_FALSE(imported.seeds_agree);
+  EXPECT_THROW(TrustInputOf(summary, {}, "reel"), Error);
+  EXPECT_THROW(TrustInputOf(summary, {}, "real"), Error);
+}
+
+TEST(TrustOutput, JsonHoldsEveryNumberWithItsReason) {
+  const TrustReport report{"sim", "the world real", "oracle", {}, TrustOf(Input("sfsfsfsfsf", "sfsfsfsfss"))};
+  const auto task = TrustJson(report).at("tasks").at(0);
+  EXPECT_EQ(task.at("trust"), "unknown");
+  EXPECT_EQ(task.at("pairs").at("model_only"), 1);
+  EXPECT_TRUE(task.at("pearson").at("value").is_null());
+  EXPECT_TRUE(task.at("policies").at(0).at("predicted").contains("value_reason"));
+}
+
+TEST(PlanFor, AnswersInWordsAndATableForTheUsersNumbers) {
+  const Plan plan = MakePlan({.rate = 0.28, .difference = 0.08, .trials = 25});
+  EXPECT_THAT(PlanText(plan), HasSubstr("it takes 533 episodes of each"));
+  const auto json = PlanJson(plan);
+  EXPECT_EQ(json.at("rows").at(0).at("key"), "interval_half_width");
+  EXPECT_EQ(json.at("rows").size(), plan.rows.size());
+  for (const PlanRow& row : plan.rows) EXPECT_FALSE(row.shown.empty()) << row.key;
+}
+
+TEST(PlanFor, WhatCannotBeIsRefusedAndWhatCannotBeKnownIsUndefined) {
+  EXPECT_THROW(MakePlan({.rate = 1.2}), Error);
+  EXPECT_THROW(MakePlan({.difference = 0.3, .flips = 0.1}), Error);
+  EXPECT_THROW(MakePlan({.accuracy = 0.5}), Error);
+  EXPECT_THROW(MakePlan({.promise = {.alpha = 0}}), Error);
+  const Plan plan = MakePlan({.imagined = 0});
+  EXPECT_THAT(PlanText(plan), HasSubstr("undefined: no further model outcomes"));
+}
+
+}  // namespace
+}  // namespace evac
