@@ -142,7 +142,7 @@ void OverheadPerChunk(benchmark::State& state) {
   auto last = Clock::now();
   RolloutOptions options;
   options.lanes = lanes;
-  options.lane = {.chunk_size = steps, .policy_chunk_size = policy.spec.chunk_size, .video = {}};
+  options.lane = {.chunk_size = steps, .policy_chunk_size = policy.spec.chunk_size, .latency = {}, .video = {}};
   options.on_progress = [&](const Progress& progress) {
     const double round_s = SecondsSince(last) - world.TakeOwnSeconds();
     if (progress.done == 0 && progress.lanes[0].chunks > 1)  // neither the first pictures nor the rows at the end
@@ -174,7 +174,7 @@ void MujocoLanes(benchmark::State& state) {
   world.Reset(0, task, {"warm", 1}, 1);
   RolloutOptions options;
   options.lanes = lanes;
-  options.lane = {.chunk_size = 8, .policy_chunk_size = policy.spec.chunk_size, .video = {.scale = 4}};
+  options.lane = {.chunk_size = 8, .policy_chunk_size = policy.spec.chunk_size, .latency = {}, .video = {.scale = 4}};
   std::uint64_t chunks = 0;
   for (auto _ : state) {
     JobQueue jobs(Jobs(task, "real", episodes));

@@ -39,7 +39,10 @@ const std::vector<Fault> kFaultsByEpisode = {
 
 /// What tells the policy which of the suite's episodes this is.
 std::uint64_t SeedOfEpisode(std::size_t number) {
-  return Job{nullptr, {}, {{"take_bottle", fmt::format("3-{:04}", number), "faulty", "default", 1}, "real"}}.PolicySeed();
+  Job job;
+  job.key.pair = {"take_bottle", fmt::format("3-{:04}", number), "faulty", "default", 1};
+  job.key.world = "real";
+  return job.PolicySeed();
 }
 
 TEST(PolicyFaults, EachFailsItsOwnEpisodeWithTheReasonTheOthersGoOnAndRetryFailedMakesThemGood) {
