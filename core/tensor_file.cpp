@@ -1,0 +1,207 @@
+#include "core/tensor_file.h"
+
+#include <fcntl.h>
+#include <sys/mman.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <bit>
+#include <cerrno>
+#include <cstring>
+#include <utility>
+
+#include "core/tensor_file_header.h"
+
+namespace evac {
+namespace {
+
+namespace fs = std::filesystem;
+static_assert(std::endian::native == std::endian::little, "tensors are used as they lie in the file");
+
+constexpr std::size_t kLengthBytes = 8;
+constexpr std::size_t kMaxHeaderBytes = 100'000'000;
+
+TensorError SystemError(const fs::path& path, const char* doing) {
+  return TensorError(path.string() + ": cannot " + doing + ": " + std::strerror(errno));
+}
+
+class Descriptor {
+ public:
+  explicit Descriptor(int file) : file_(file) {}
+  Descriptor(const Descriptor&) = delete;
+  Descriptor& operator=(const Descriptor&) = delete;
+  ~Descriptor() {
+    if (file_ >= 0) ::close(file_);
+  }
+  int get() const { return file_; }
+
+ private:
+  int file_;
+};
+
+void SyncFolderOf(const fs::path& path) {
+  const fs::path folder = path.parent_path().empty() ? fs::path(".") : path.parent_path();
+  const Descriptor file(::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));
+  if (file.get() < 0 || ::fsync(file.get()) != 0) throw SystemError(folder, "sync");
+}
+
+}  // namespace
+
+TensorFile TensorFile::Open(const fs::path& path) {
+  const Descriptor file(::open(path.c_str(), O_RDONLY | O_CLOEXEC));
+  struct stat status {};
+  if (file.get() < 0 || ::fstat(file.get(), &status) != 0) throw SystemError(path, "open");
+  if (!S_ISREG(status.st_mode)) throw TensorError(path.string() + ": no regular file");
+  const auto size = static_cast<std::size_t>(status.st_size);
+  if (size < kLengthBytes) throw TensorError(path.string() + ": cut off within the safetensors header");
+  void* mapping = ::mmap(nullptr, size, PROT_READ, MAP_PRIVATE, file.get(), 0);
+  if (mapping == MAP_FAILED) throw SystemError(path, "map");
+  TensorFile tensors;
+  tensors.name_ = path.string();
+  tensors.mapping_ = mapping;
+  tensors.bytes_ = {static_cast<const std::byte*>(mapping), size};
+  tensors.ReadHeader();
+  return tensors;
+}
+
+TensorFile TensorFile::Parse(std::string bytes, const std::string& name) {
+  TensorFile tensors;
+  tensors.name_ = name;
+  tensors.owned_ = std::move(bytes);
+  tensors.bytes_ = std::as_bytes(std::span(tensors.owned_));
+  tensors.ReadHeader();
+  return tensors;
+}
+
+TensorFile::TensorFile(TensorFile&& other) noexcept { *this = std::move(other); }
+
+TensorFile& TensorFile::operator=(TensorFile&& other) noexcept {
+  if (this == &other) return *this;
+  Unmap();
+  name_ = std::move(other.name_);
+  const std::byte* before = other.bytes_.data();
+  owned_ = std::move(other.owned_);
+  bytes_ = std::exchange(other.bytes_, {});
+  mapping_ = std::exchange(other.mapping_, nullptr);
+  metadata_ = std::move(other.metadata_);
+  tensors_ = std::move(other.tensors_);
+  by_name_ = std::move(other.by_name_);
+  if (mapping_ == nullptr && before != nullptr) {  // a short string moves its bytes along
+    bytes_ = std::as_bytes(std::span(owned_));
+    for (TensorView& tensor : tensors_) {
+      tensor.bytes = bytes_.subspan(static_cast<std::size_t>(tensor.bytes.data() - before), tensor.bytes.size());
+    }
+  }
+  return *this;
+}
+
+TensorFile::~TensorFile() { Unmap(); }
+
+void TensorFile::Unmap() {
+  if (mapping_ != nullptr) ::munmap(mapping_, bytes_.size());
+  mapping_ = nullptr;
+}
+
+void TensorFile::ReadHeader() {
+  if (bytes_.size() < kLengthBytes) throw TensorError(name_ + ": cut off within the safetensors header");
+  std::uint64_t length = 0;
+  std::memcpy(&length, bytes_.data(), kLengthBytes);
+  if (length > kMaxHeaderBytes || length > bytes_.size() - kLengthBytes) {
+    throw TensorError(name_ + ": the safetensors header claims " + std::to_string(length) + " bytes, the file has " +
+                      std::to_string(bytes_.size()) + " and a header at most " + std::to_string(kMaxHeaderBytes));
+  }
+  const auto* text = reinterpret_cast<const char*>(bytes_.data() + kLengthBytes);
+  TensorHeader header = ParseTensorHeader({text, static_cast<std::size_t>(length)}, name_);
+  metadata_ = std::move(header.metadata);
+  std::stable_sort(header.entries.begin(), header.entries.end(), [](const HeaderEntry& a, const HeaderEntry& b) {
+    return std::pair(a.begin, a.end) < std::pair(b.begin, b.end);
+  });
+  const std::span<const std::byte> data = bytes_.subspan(kLengthBytes + static_cast<std::size_t>(length));
+  std::size_t at = 0;
+  for (HeaderEntry& entry : header.entries) {
+    if (entry.begin != at || entry.end < entry.begin || entry.end > data.size() ||
+        entry.end - entry.begin != entry.ByteCount()) {
+      throw TensorError(name_ + ": tensor '" + entry.name + "' claims bytes " + std::to_string(entry.begin) + " to " +
+                        std::to_string(entry.end) + ", wanted " + std::to_string(entry.ByteCount()) +
+                        " bytes from byte " + std::to_string(at) + " of " + std::to_string(data.size()));
+    }
+    at = entry.end;
+    by_name_.emplace(entry.name, tensors_.size());
+    const std::span<const std::byte> bytes = data.subspan(entry.begin, entry.end - entry.begin);
+    tensors_.push_back({static_cast<TensorDeclaration&&>(entry), bytes});
+  }
+  if (at != data.size())
+    throw TensorError(name_ + ": " + std::to_string(data.size() - at) + " bytes after the last tensor belong to none");
+}
+
+const TensorView& TensorFile::Get(const std::string& tensor) const {
+  const auto found = by_name_.find(tensor);
+  if (found == by_name_.end()) throw TensorError(name_ + ": there is no tensor '" + tensor + "'");
+  return tensors_[found->second];
+}
+
+void TensorFile::LetGo(const TensorView& tensor) const {
+  if (mapping_ == nullptr || tensor.bytes.empty()) return;
+  const auto page = static_cast<std::size_t>(::sysconf(_SC_PAGESIZE));
+  const auto offset = static_cast<std::size_t>(tensor.bytes.data() - bytes_.data());
+  const std::size_t first = (offset + page - 1) / page * page, last = (offset + tensor.bytes.size()) / page * page;
+  if (first < last) ::madvise(static_cast<std::byte*>(mapping_) + first, last - first, MADV_DONTNEED);
+}
+
+TensorFileWriter::TensorFileWriter(const fs::path& path, std::span<const TensorDeclaration> tensors,
+                                   const TensorMetadata& metadata)
+    : path_(path), partial_(path.string() + ".partial-" + std::to_string(::getpid())) {
+  const std::string header = TensorHeaderText(tensors, metadata);
+  if (header.size() > kMaxHeaderBytes) throw TensorError(path.string() + ": a header beyond 100 MB");
+  file_ = ::open(partial_.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0644);
+  if (file_ < 0) throw SystemError(partial_, "write");
+  const std::uint64_t length = header.size();
+  Write(&length, sizeof length);
+  Write(header.data(), header.size());
+  for (const TensorDeclaration& tensor : tensors) missing_ += tensor.ByteCount();
+}
+
+TensorFileWriter::~TensorFileWriter() {
+  if (file_ < 0) return;
+  ::close(file_);
+  ::unlink(partial_.c_str());
+}
+
+void TensorFileWriter::Append(std::span<const std::byte> bytes) {
+  if (bytes.size() > missing_) throw TensorError(path_.string() + ": more bytes than were declared");
+  Write(bytes.data(), bytes.size());
+  missing_ -= bytes.size();
+}
+
+void TensorFileWriter::Write(const void* bytes, std::size_t count) {
+  const char* at = static_cast<const char*>(bytes);
+  while (count > 0) {
+    const ssize_t written = ::write(file_, at, std::min<std::size_t>(count, 1u << 30));
+    if (written < 0 && errno == EINTR) continue;
+    if (written <= 0) throw SystemError(partial_, "write");
+    at += written;
+    count -= static_cast<std::size_t>(written);
+  }
+}
+
+void TensorFileWriter::Finish() {
+  if (missing_ > 0) throw TensorError(path_.string() + ": " + std::to_string(missing_) + " declared bytes are missing");
+  if (::fsync(file_) != 0) throw SystemError(partial_, "sync");
+  ::close(std::exchange(file_, -1));
+  if (::rename(partial_.c_str(), path_.c_str()) != 0) throw SystemError(path_, "rename to");
+  SyncFolderOf(path_);
+}
+
+void WriteTensorFile(const fs::path& path, std::span<const TensorView> tensors, const TensorMetadata& metadata) {
+  const std::vector<TensorDeclaration> declarations(tensors.begin(), tensors.end());
+  TensorFileWriter writer(path, declarations, metadata);
+  for (const TensorView& tensor : tensors) {
+    if (tensor.bytes.size() != tensor.ByteCount())
+      throw TensorError("tensor '" + tensor.name + "': its bytes do not fill its shape");
+    writer.Append(tensor.bytes);
+  }
+  writer.Finish();
+}
+
+}  // namespace evac

@@ -1,0 +1,111 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <map>
+#include <span>
+#include <stdexcept>
+#include <string>
+#include <string_view>
+#include <vector>
+
+/// Tensors in files: the safetensors format (https://huggingface.co/docs/safetensors, "Format"), little-endian.
+/// Standard library and POSIX only, so that the network builds alone with a compiler and libtorch.
+namespace evac {
+
+/// What is wrong with tensors or the file that holds them, in one sentence that names the file. The only exception of
+/// this header and of `worldmodel/nn`; `main` treats it like InvalidInput.
+class TensorError : public std::runtime_error {
+ public:
+  using std::runtime_error::runtime_error;
+};
+
+enum class TensorType : std::uint8_t { kBool, kU8, kI8, kI16, kI32, kI64, kF16, kBF16, kF32, kF64 };
+std::size_t BytesOf(TensorType type);
+/// "BOOL", "U8", …, "F64": the format's own names.
+const char* Name(TensorType type);
+
+/// What a tensor is, without its numbers.
+struct TensorDeclaration {
+  std::string name;
+  TensorType type = TensorType::kF32;
+  std::vector<std::int64_t> shape;  ///< row-major; empty: a single number
+  /// @throws TensorError if the size in bytes is beyond 2^62.
+  std::size_t ByteCount() const;
+};
+
+/// A tensor in somebody's memory. `bytes` need not be aligned to the type.
+struct TensorView : TensorDeclaration {
+  std::span<const std::byte> bytes;
+};
+
+using TensorMetadata = std::map<std::string, std::string>;
+
+/// An open file of tensors, mapped, not read: opening costs the header alone, whatever the size.
+class TensorFile {
+ public:
+  /// @throws TensorError naming the file: not there, cut off, a header that is none, that lies about sizes, overlaps,
+  ///   leaves gaps, names a tensor twice, or is longer than 100 MB.
+  static TensorFile Open(const std::filesystem::path& path);
+  /// The same from bytes in memory; `name` stands for the file in messages.
+  static TensorFile Parse(std::string bytes, const std::string& name);
+
+  TensorFile(TensorFile&& other) noexcept;
+  TensorFile& operator=(TensorFile&& other) noexcept;
+  ~TensorFile();
+
+  const std::string& name() const { return name_; }
+  const TensorMetadata& metadata() const { return metadata_; }
+  /// In the order of their bytes.
+  const std::vector<TensorView>& tensors() const { return tensors_; }
+  bool Has(const std::string& tensor) const { return by_name_.contains(tensor); }
+  /// @throws TensorError naming file and tensor if it is not there.
+  const TensorView& Get(const std::string& tensor) const;
+  /// The system may forget the pages of this tensor, which were copied elsewhere; they can still be read again.
+  void LetGo(const TensorView& tensor) const;
+
+ private:
+  TensorFile() = default;
+  void ReadHeader();
+  void Unmap();
+
+  std::string name_;
+  std::string owned_;                 ///< the bytes of Parse
+  std::span<const std::byte> bytes_;  ///< all of the file
+  void* mapping_ = nullptr;
+  TensorMetadata metadata_;
+  std::vector<TensorView> tensors_;
+  std::map<std::string, std::size_t> by_name_;
+};
+
+/// Writes a file of declared tensors piece by piece: what is larger than memory can be written.
+///   TensorFileWriter writer(path, declarations, metadata);
+///   for (…) writer.Append(bytes of the next tensor, in the order of the declarations);
+///   writer.Finish();   // until then there is no file at `path`
+class TensorFileWriter {
+ public:
+  TensorFileWriter(const std::filesystem::path& path, std::span<const TensorDeclaration> tensors,
+                   const TensorMetadata& metadata);
+  TensorFileWriter(const TensorFileWriter&) = delete;
+  TensorFileWriter& operator=(const TensorFileWriter&) = delete;
+  ~TensorFileWriter();
+
+  /// @throws TensorError with the system's reason (disk full).
+  void Append(std::span<const std::byte> bytes);
+  /// Syncs and renames. @throws TensorError unless exactly the declared bytes were written.
+  void Finish();
+
+ private:
+  void Write(const void* bytes, std::size_t count);
+
+  std::filesystem::path path_, partial_;
+  int file_ = -1;
+  std::size_t missing_ = 0;  ///< bytes still to come
+};
+
+/// All at once. The same tensors and metadata give the same bytes.
+void WriteTensorFile(const std::filesystem::path& path, std::span<const TensorView> tensors,
+                     const TensorMetadata& metadata);
+
+}  // namespace evac

@@ -1,0 +1,73 @@
+#include "worldmodel/nn/diffusion_loss.h"
+
+#include <ATen/ops/mse_loss.h>
+
+#include <cmath>
+
+namespace evac::nn {
+namespace {
+
+/// Numbers that depend on each row's step, [N, 1, 1, 1, 1] (or [N, 1, 1, 1]).
+template <typename Function>
+Tensor PerRow(const Tensor& steps, std::int64_t dims, Function value) {
+  const Tensor cpu = steps.to(at::kCPU, at::kLong).contiguous();
+  std::vector<float> values;
+  for (std::int64_t i = 0; i < cpu.numel(); ++i) values.push_back(static_cast<float>(value(cpu.data_ptr<std::int64_t>()[i])));
+  std::vector<std::int64_t> shape(static_cast<std::size_t>(dims), 1);
+  shape[0] = cpu.numel();
+  return at::tensor(values).reshape(shape).to(steps.device());
+}
+
+struct Levels {
+  Tensor signal, noise;
+};
+
+Levels LevelsAt(const NoiseSchedule& schedule, const Tensor& steps, std::int64_t dims) {
+  return {PerRow(steps, dims, [&](std::int64_t t) { return std::sqrt(schedule.AlphaBar(t)); }),
+          PerRow(steps, dims, [&](std::int64_t t) { return std::sqrt(1 - schedule.AlphaBar(t)); })};
+}
+
+/// Memory noised by steps that rise towards the newest frame.
+Tensor WithNoisyMemory(const NoiseSchedule& schedule, const Tensor& latents, const TeacherForcing& forcing) {
+  const std::int64_t rows = latents.size(0), frames = forcing.angle.size(1);
+  const Tensor angle = forcing.angle.clamp(0, 1.57);
+  const Tensor steps = ((1 - angle.cos()) * 1000 / static_cast<double>(forcing.divisor)).to(at::kLong);
+  const Levels levels = LevelsAt(schedule, std::get<0>(steps.sort(1)).flatten(), 4);
+  const Tensor memory = latents.narrow(2, 0, frames).transpose(1, 2).flatten(0, 1);  // [BV N, z, h, w]
+  const Tensor noisy = (memory * levels.signal + forcing.noise * levels.noise)
+                           .reshape({rows, frames, latents.size(1), latents.size(3), latents.size(4)})
+                           .transpose(1, 2);
+  return at::cat({noisy, latents.narrow(2, frames, latents.size(2) - frames)}, 2);
+}
+
+}  // namespace
+
+Tensor ImageCondition(const Tensor& memory, std::int64_t chunk, const Tensor& mask) {
+  std::vector<std::int64_t> shape = memory.sizes().vec();
+  shape[2] = chunk;
+  return at::cat({memory, memory.narrow(2, memory.size(2) - 1, 1).expand(shape)}, 2) * mask;
+}
+
+Tensor DenoiserInput(const Tensor& x, const Concat& concat) {
+  return at::cat({x, concat.image, concat.mask, concat.pose_map, concat.direction, concat.origin}, 1);
+}
+
+Tensor DiffusionLoss(const UNet& unet, const NoiseSchedule& schedule, const DiffusionBatch& batch) {
+  const std::int64_t chunk = batch.latents.size(2) - batch.memory;
+  const Tensor latents = batch.teacher_forcing
+                             ? WithNoisyMemory(schedule, batch.latents, *batch.teacher_forcing)
+                             : batch.latents;
+  Concat concat = batch.concat;
+  concat.image = ImageCondition(latents.narrow(2, 0, batch.memory), chunk, concat.mask);
+  const Tensor t = batch.t.repeat_interleave(batch.context.views, 0);  // [BV]
+  const Levels levels = LevelsAt(schedule, t, 5);
+  const Tensor x = latents * PerRow(t, 5, [&](std::int64_t step) { return schedule.Scale(step); });
+  const Tensor noisy = x * levels.signal + batch.noise * levels.noise;
+  const Tensor target = batch.noise * levels.signal - x * levels.noise;
+  const Tensor seen = at::cat({x.narrow(2, 0, batch.memory), noisy.narrow(2, batch.memory, chunk)}, 2);
+  const UNet::Input input{DenoiserInput(seen, concat), t, batch.context.views, batch.memory};
+  const Tensor v = unet(input, unet.Prepare(batch.context));
+  return at::mse_loss(v.narrow(2, batch.memory, chunk), target.narrow(2, batch.memory, chunk));
+}
+
+}  // namespace evac::nn

@@ -1,0 +1,45 @@
+#pragma once
+
+#include <optional>
+
+#include "worldmodel/nn/evac_model.h"
+
+/// The denoiser's training objective (spec 8.3), and how its input is put together (spec 4).
+namespace evac::nn {
+
+/// What stands beside the noisy latents.
+struct Concat {
+  Tensor image;      ///< [BV, z, T, h, w]: memory latents, the last of them repeated, times mask
+  Tensor mask;       ///< [BV, 1, T, h, w]: 1 where `image` may be read
+  Tensor pose_map;   ///< [BV, z, T, h, w]: 0 in memory frames
+  Tensor direction;  ///< [BV, 3, T, h, w]: unit rays, base frame
+  Tensor origin;     ///< [BV, 3, T, h, w]: metres, base frame
+};
+
+/// The memory [BV, z, N, h, w], its last frame `chunk` times more, all times `mask`. @returns [BV, z, T, h, w]
+Tensor ImageCondition(const Tensor& memory, std::int64_t chunk, const Tensor& mask);
+
+/// [BV, in_channels, T, h, w] in the order the network was trained with.
+Tensor DenoiserInput(const Tensor& x, const Concat& concat);
+
+/// Noise on the memory in training, so that the network bears with its own mistakes later.
+struct TeacherForcing {
+  Tensor angle;                ///< [BV, N] in [-1.57, 1.57]: below 0 no noise
+  std::int64_t divisor = 3;    ///< 3 … 20
+  Tensor noise;                ///< [BV N, z, h, w]
+};
+
+struct DiffusionBatch {
+  Tensor latents;              ///< [BV, z, T, h, w], clean
+  Concat concat;               ///< `image` is worked out here
+  UNet::Context context;
+  Tensor t;                    ///< [B] integers
+  Tensor noise;                ///< [BV, z, T, h, w]
+  std::int64_t memory = 0;     ///< N
+  std::optional<TeacherForcing> teacher_forcing;
+};
+
+/// Mean squared error of v over the frames to imagine. @returns a number, differentiable.
+Tensor DiffusionLoss(const UNet& unet, const NoiseSchedule& schedule, const DiffusionBatch& batch);
+
+}  // namespace evac::nn

@@ -1,0 +1,95 @@
+#include "worldmodel/nn/imagine.h"
+
+#include <ATen/ops/ones_like.h>
+#include <ATen/ops/zeros_like.h>
+
+#include <algorithm>
+
+#include "worldmodel/nn/dpm_solver.h"
+
+namespace evac::nn {
+namespace {
+
+constexpr std::int64_t kCodecBatch = 2;
+
+/// [rows, frames, ...] pictures through `function`, a few at a time.
+template <typename Function>
+Tensor InBatches(std::int64_t count, Function function) {
+  std::vector<Tensor> parts;
+  for (std::int64_t from = 0; from < count; from += kCodecBatch)
+    parts.push_back(function(from, std::min(kCodecBatch, count - from)));
+  return at::cat(parts, 0);
+}
+
+}  // namespace
+
+Tensor EncodeImages(const EvacModel& model, const Tensor& images, const Tensor& noise) {
+  return InBatches(images.size(0), [&](std::int64_t from, std::int64_t count) {
+    const Posterior posterior = model.vae().Encode(images.narrow(0, from, count));
+    return posterior.Sample(noise.defined() ? noise.narrow(0, from, count) : noise) * model.vae().scale_factor();
+  });
+}
+
+Tensor EncodePoseMaps(const EvacModel& model, const Tensor& maps, const Tensor& noise) {
+  const Tensor encoded = EncodeImages(model, maps.flatten(0, 1), noise.defined() ? noise.flatten(0, 1) : noise);
+  return encoded.unflatten(0, {maps.size(0), maps.size(1)}).transpose(1, 2).contiguous();
+}
+
+Tensor DecodeLatents(const EvacModel& model, const Tensor& latents) {
+  return InBatches(latents.size(0), [&](std::int64_t from, std::int64_t count) {
+    return model.vae().Decode(latents.narrow(0, from, count));
+  });
+}
+
+Conditioning Condition(const EvacModel& model, const ChunkRequest& request) {
+  Conditioning conditioning;
+  conditioning.views = request.memory.size(0) / request.deltas.size(0);
+  conditioning.memory = request.memory.size(2);
+  Concat& concat = conditioning.concat;
+  concat.pose_map = at::cat({at::zeros_like(request.memory), request.pose_maps}, 2);
+  concat.mask = at::ones_like(concat.pose_map.narrow(1, 0, 1));
+  concat.image = ImageCondition(request.memory, request.pose_maps.size(2), concat.mask);
+  concat.direction = request.direction;
+  concat.origin = request.origin;
+  conditioning.tokens = model.ContextTokens(model.ImageTokens(request.image), model.ActionTokens(request.deltas));
+  return conditioning;
+}
+
+Conditioning Unconditioned(const EvacModel& model, const ChunkRequest& request, const Conditioning& conditioning) {
+  Conditioning without = conditioning;
+  const std::int64_t memory = request.memory.size(2), chunk = request.pose_maps.size(2);
+  const Tensor& mask = conditioning.concat.mask;
+  without.concat.mask = at::cat({mask.narrow(2, 0, memory), at::zeros_like(mask.narrow(2, memory, chunk))}, 2);
+  without.concat.image = ImageCondition(request.memory, chunk, without.concat.mask);
+  without.tokens = model.ContextTokens(model.ImageTokens(at::zeros_like(request.image)), model.ActionTokens(request.deltas));
+  return without;
+}
+
+Denoise MakeDenoise(const EvacModel& model, const Conditioning& conditioning) {
+  const std::int64_t rows = conditioning.tokens.size(0), views = conditioning.views, memory = conditioning.memory;
+  const auto constant = [&](std::int64_t value) { return at::full({rows / views}, value, at::kLong); };
+  const at::Device device = conditioning.tokens.device();
+  PreparedContext context = model.unet().Prepare({conditioning.tokens, constant(model.config().fps).to(device),
+                                                  constant(model.config().domain).to(device), views});
+  return [&model, concat = conditioning.concat, context = std::move(context), views, rows, memory](const Tensor& x_t,
+                                                                                                   std::int64_t t) {
+    const Tensor steps = at::full({rows}, t, at::kLong).to(x_t.device());
+    return model.unet()({DenoiserInput(x_t, concat), steps, views, memory}, context);
+  };
+}
+
+Tensor ImagineChunk(const EvacModel& model, const ChunkRequest& request, const ChunkNoise& noise,
+                    const ImagineOptions& options) {
+  const Conditioning conditioning = Condition(model, request);
+  Denoise denoise = MakeDenoise(model, conditioning);
+  if (options.guidance != 1) {
+    const Conditioning without = Unconditioned(model, request, conditioning);
+    denoise = Guided(denoise, MakeDenoise(model, without), options.guidance, options.guidance_rescale);
+  }
+  const SampleStart start{at::cat({request.memory, noise.start}, 2), request.memory.size(2), !options.memory_not_scaled};
+  if (options.solver == Solver::kDpmSolver) return SampleDpmSolver(model.schedule(), options.steps, start, denoise);
+  const DdimOptions ddim{options.steps, options.eta, options.residual_noise};
+  return SampleDdim(model.schedule(), ddim, start, denoise, noise.step);
+}
+
+}  // namespace evac::nn

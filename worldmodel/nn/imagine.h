@@ -1,0 +1,65 @@
+#pragma once
+
+#include <functional>
+
+#include "worldmodel/nn/ddim.h"
+#include "worldmodel/nn/diffusion_loss.h"
+#include "worldmodel/nn/evac_model.h"
+
+/// One chunk of imagination: conditioning, then denoising. Tensors in, latents out; whose robot it is, is known elsewhere.
+namespace evac::nn {
+
+enum class Solver { kDdim, kDpmSolver };
+
+struct ImagineOptions {
+  Solver solver = Solver::kDdim;
+  std::int64_t steps = 27;
+  double eta = 1;       ///< of DDIM
+  double guidance = 1;  ///< 1: the unconditional half is not computed
+  double guidance_rescale = 0.7;
+  bool memory_not_scaled = false;  ///< quirk of the reference: see docs/evac_quirks.md
+  bool residual_noise = false;     ///< likewise
+};
+
+/// What is known before a chunk, of B scenes with V views each.
+struct ChunkRequest {
+  Tensor memory;      ///< [BV, z, N, h, w] latents, newest last
+  Tensor image;       ///< [BV, 3, H, W] in [-1, 1]: the oldest of the memory, for the image encoder
+  Tensor pose_maps;   ///< [BV, z, K, h, w] latents of the maps of the frames to imagine: EncodePoseMaps
+  Tensor direction;   ///< [BV, 3, T, h, w]
+  Tensor origin;      ///< [BV, 3, T, h, w]
+  Tensor deltas;      ///< [B, any, 14], normalised
+};
+
+/// Everything random, drawn by the caller.
+struct ChunkNoise {
+  Tensor start;    ///< [BV, z, K, h, w]
+  DrawNoise step;  ///< [BV, z, T, h, w]
+};
+
+/// What the denoiser is told.
+struct Conditioning {
+  std::int64_t views = 1, memory = 0;  ///< V, N
+  Concat concat;
+  Tensor tokens;  ///< [BV, image tokens + action tokens, context_dim]
+};
+
+Conditioning Condition(const EvacModel& model, const ChunkRequest& request);
+/// The same without the image: the other half of guidance. Actions, pose maps and rays stay.
+Conditioning Unconditioned(const EvacModel& model, const ChunkRequest& request, const Conditioning& conditioning);
+
+/// The network with its context worked out, as the samplers want it. `model` must outlive it.
+Denoise MakeDenoise(const EvacModel& model, const Conditioning& conditioning);
+
+/// Pictures [N, 3, H, W] in [-1, 1] → [N, z, h, w], scaled; undefined noise: the posterior's mean. Two at a time.
+Tensor EncodeImages(const EvacModel& model, const Tensor& images, const Tensor& noise);
+/// Pictures [BV, K, 3, H, W] and noise [BV, K, z, h, w] → [BV, z, K, h, w].
+Tensor EncodePoseMaps(const EvacModel& model, const Tensor& maps, const Tensor& noise);
+/// [N, z, h, w] → [N, 3, H, W], not clamped.
+Tensor DecodeLatents(const EvacModel& model, const Tensor& latents);
+
+/// @returns [BV, z, T, h, w]: the memory as given, then the imagined latents.
+Tensor ImagineChunk(const EvacModel& model, const ChunkRequest& request, const ChunkNoise& noise,
+                    const ImagineOptions& options);
+
+}  // namespace evac::nn

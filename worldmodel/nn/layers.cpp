@@ -1,0 +1,90 @@
+#include "worldmodel/nn/layers.h"
+
+#include "worldmodel/nn/kernels.h"
+
+namespace evac::nn {
+namespace {
+
+constexpr std::int64_t kGroups = 32;
+constexpr double kLayerNormEpsilon = 1e-5;
+
+/// What training needs: differentiable, exact for pictures of one colour too.
+Tensor DifferentiableGroupNorm(const Tensor& x, const GroupNorm& norm, double epsilon) {
+  const Tensor channels_second = x.reshape({x.size(0), -1, x.size(-1)}).transpose(1, 2).contiguous();
+  return at::group_norm(channels_second, kGroups, norm.weight, norm.bias, epsilon).transpose(1, 2).reshape(x.sizes());
+}
+
+}  // namespace
+
+bool CanUseKernels(const Tensor& x) {
+  return !(at::GradMode::is_enabled()) && x.is_cpu() && x.scalar_type() == at::kFloat && x.is_contiguous();
+}
+
+Linear::Linear(const Scope& at, std::int64_t in, std::int64_t out, Bias with_bias) {
+  weight = at.Take("weight", {out, in});
+  if (with_bias == Bias::kYes) bias = at.Take("bias", {out});
+}
+
+Linear Linear::Pointwise(const Scope& at, std::int64_t in, std::int64_t out, std::int64_t extra_sides) {
+  Linear linear;
+  std::vector<std::int64_t> shape = {out, in};
+  shape.resize(2 + static_cast<std::size_t>(extra_sides), 1);
+  linear.weight = at.Take("weight", shape);
+  linear.bias = at.Take("bias", {out});
+  return linear;
+}
+
+Tensor Linear::operator()(const Tensor& x) const {
+  return at::linear(x, weight.dim() > 2 ? weight.flatten(1) : weight, bias);
+}
+
+Conv2d::Conv2d(const Scope& at, std::int64_t in, std::int64_t out, const Options& options)
+    : weight(at.Take("weight", {out, in, options.kernel, options.kernel})),
+      bias(at.Take("bias", {out})),
+      options_(options) {}
+
+Tensor Conv2d::operator()(const Tensor& x) const {
+  const Tensor channels_second = x.permute({0, 3, 1, 2});
+  const Tensor y = at::conv2d(channels_second, weight, bias, options_.stride, options_.padding);
+  return y.permute({0, 2, 3, 1}).contiguous();
+}
+
+CausalConv::CausalConv(const Scope& at, std::int64_t channels)
+    : weight(at.Take("weight", {channels, channels, 3, 1, 1})), bias(at.Take("bias", {channels})) {}
+
+Tensor CausalConv::operator()(const Tensor& x) const {
+  const Tensor first = x.narrow(1, 0, 1);
+  const Tensor padded = at::cat({first, first, x}, 1);                             // [N, T + 2, L, C]
+  const Tensor y = at::conv2d(padded.permute({0, 3, 1, 2}), weight.flatten(3), bias);  // kernel (3, 1)
+  return y.permute({0, 2, 3, 1}).contiguous();
+}
+
+GroupNorm::GroupNorm(const Scope& at, std::int64_t channels, double epsilon)
+    : weight(at.Take("weight", {channels})), bias(at.Take("bias", {channels})), epsilon_(epsilon) {}
+
+Tensor GroupNorm::operator()(const Tensor& x, Activation activation) const {
+  const bool silu = activation == Activation::kSilu;
+  if (!CanUseKernels(x)) {
+    const Tensor y = DifferentiableGroupNorm(x, *this, epsilon_);
+    return silu ? at::silu(y) : y;
+  }
+  Tensor y = at::empty(x.sizes(), x.options());
+  const std::int64_t channels = x.size(-1);
+  const kernels::NormShape shape{x.size(0), x.numel() / x.size(0) / channels, channels, kGroups, epsilon_};
+  kernels::GroupNorm(shape, x.data_ptr<float>(), weight.data_ptr<float>(), bias.data_ptr<float>(), silu, y.data_ptr<float>());
+  return y;
+}
+
+LayerNorm::LayerNorm(const Scope& at, std::int64_t channels)
+    : weight(at.Take("weight", {channels})), bias(at.Take("bias", {channels})) {}
+
+Tensor LayerNorm::operator()(const Tensor& x) const {
+  return at::layer_norm(x, weight.sizes(), weight, bias, kLayerNormEpsilon);
+}
+
+Tensor UpsampleNearest(const Tensor& x) {
+  const std::int64_t n = x.size(0), h = x.size(1), w = x.size(2), c = x.size(3);
+  return x.reshape({n, h, 1, w, 1, c}).expand({n, h, 2, w, 2, c}).reshape({n, 2 * h, 2 * w, c});
+}
+
+}  // namespace evac::nn

@@ -1,0 +1,90 @@
+#pragma once
+
+#include <cstdint>
+
+#include "worldmodel/nn/parameters.h"
+#include "worldmodel/nn/tensor.h"
+
+/// The small layers. Channels are always the last and fastest axis: [N, H, W, C] for pictures, [N, L, C] for tokens.
+/// So a linear layer is one matrix product, convolutions run channels-last, and a picture is tokens without a copy.
+namespace evac::nn {
+
+/// Whether x may go through `kernels`: floats on the CPU, laid out as they are read, nothing to be differentiated.
+bool CanUseKernels(const Tensor& x);
+
+class Linear {
+ public:
+  enum class Bias { kNo, kYes };
+  Linear(const Scope& at, std::int64_t in, std::int64_t out, Bias bias = Bias::kYes);
+  /// A 1x1 convolution: its weight has `extra_sides` more sides of 1, as it lies in the checkpoint.
+  static Linear Pointwise(const Scope& at, std::int64_t in, std::int64_t out, std::int64_t extra_sides);
+  /// [..., in] → [..., out]
+  Tensor operator()(const Tensor& x) const;
+
+  Tensor weight;  ///< [out, in]
+  Tensor bias;    ///< [out] or undefined
+
+ private:
+  Linear() = default;
+};
+
+/// A convolution over the picture.
+class Conv2d {
+ public:
+  struct Options {
+    std::int64_t kernel = 3;
+    std::int64_t stride = 1;
+    std::int64_t padding = 1;
+  };
+  Conv2d(const Scope& at, std::int64_t in, std::int64_t out, const Options& options);
+  Conv2d(const Scope& at, std::int64_t in, std::int64_t out) : Conv2d(at, in, out, Options{}) {}
+  /// [N, H, W, in] → [N, H', W', out]
+  Tensor operator()(const Tensor& x) const;
+
+  Tensor weight;  ///< [out, in, kernel, kernel]
+  Tensor bias;    ///< [out]
+
+ private:
+  Options options_;
+};
+
+/// A convolution over time that sees the frame itself and the two before it; the first frame stands in for those
+/// before the first (EVAC's causal 3x1x1 convolution, spec 6.3).
+class CausalConv {
+ public:
+  CausalConv(const Scope& at, std::int64_t channels);
+  /// [N, T, L, C] → [N, T, L, C]
+  Tensor operator()(const Tensor& x) const;
+
+  Tensor weight;  ///< [C, C, 3, 1, 1]
+  Tensor bias;    ///< [C]
+};
+
+enum class Activation { kNone, kSilu };
+
+/// 32 groups of channels, statistics over everything but the first axis.
+class GroupNorm {
+ public:
+  GroupNorm(const Scope& at, std::int64_t channels, double epsilon);
+  /// [N, ..., C] → the same, activated.
+  Tensor operator()(const Tensor& x, Activation activation) const;
+
+  Tensor weight, bias;  ///< [C]
+
+ private:
+  double epsilon_;
+};
+
+/// Over the last axis, epsilon 1e-5.
+class LayerNorm {
+ public:
+  LayerNorm(const Scope& at, std::int64_t channels);
+  Tensor operator()(const Tensor& x) const;
+
+  Tensor weight, bias;  ///< [C]
+};
+
+/// [N, H, W, C] → [N, 2H, 2W, C], each pixel four times.
+Tensor UpsampleNearest(const Tensor& x);
+
+}  // namespace evac::nn

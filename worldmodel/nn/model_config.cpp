@@ -1,0 +1,89 @@
+#include "worldmodel/nn/model_config.h"
+
+#include <utility>
+
+#include "core/tensor_file.h"
+
+namespace evac::nn {
+namespace {
+
+constexpr std::int64_t kGroups = 32;
+
+void Require(bool holds, const std::string& name, std::int64_t found, const std::string& wanted) {
+  if (!holds) throw TensorError(name + " is " + std::to_string(found) + ", wanted " + wanted);
+}
+
+void RequirePositive(std::initializer_list<std::pair<const char*, std::int64_t>> sizes) {
+  for (const auto& [name, size] : sizes) Require(size > 0 && size < (1 << 20), name, size, "a number from 1 to 2^20");
+}
+
+void CheckLevels(const char* name, const std::vector<std::int64_t>& multipliers) {
+  Require(!multipliers.empty() && multipliers.size() <= 8, name, static_cast<std::int64_t>(multipliers.size()),
+          "1 to 8 levels");
+  for (const std::int64_t multiplier : multipliers) Require(multiplier > 0 && multiplier < 1024, name, multiplier, "positive");
+}
+
+void CheckUNet(const UNetConfig& unet) {
+  RequirePositive({{"unet.in_channels", unet.in_channels},
+                   {"unet.out_channels", unet.out_channels},
+                   {"unet.num_res_blocks", unet.num_res_blocks},
+                   {"unet.num_head_channels", unet.num_head_channels},
+                   {"unet.transformer_depth", unet.transformer_depth},
+                   {"unet.context_dim", unet.context_dim},
+                   {"unet.init_attention_heads", unet.init_attention_heads},
+                   {"unet.domains", unet.domains},
+                   {"unet.model_channels", unet.model_channels}});
+  CheckLevels("unet.channel_mult", unet.channel_mult);
+  Require(unet.model_channels % kGroups == 0, "unet.model_channels", unet.model_channels, "a multiple of 32");
+  for (const std::int64_t multiplier : unet.channel_mult)
+    Require(unet.model_channels * multiplier % unet.num_head_channels == 0, "unet.num_head_channels",
+            unet.num_head_channels, "a divisor of every level's width");
+}
+
+void CheckResampler(const std::string& name, const ResamplerConfig& resampler, std::int64_t context_dim) {
+  for (const std::int64_t size : {resampler.embedding_dim, resampler.queries, resampler.dim, resampler.depth,
+                                  resampler.dim_head, resampler.heads, resampler.ff_mult})
+    Require(size > 0 && size < (1 << 20), name, size, "positive sizes");
+  Require(resampler.output_dim == context_dim, name + ".output_dim", resampler.output_dim,
+          "unet.context_dim = " + std::to_string(context_dim));
+}
+
+void CheckEncoder(const ImageEncoderConfig& clip) {
+  RequirePositive({{"clip.width", clip.width},
+                   {"clip.layers", clip.layers},
+                   {"clip.head_width", clip.head_width},
+                   {"clip.patch", clip.patch_px},
+                   {"clip.image", clip.image_px}});
+  Require(clip.width % clip.head_width == 0, "clip.head_width", clip.head_width, "a divisor of clip.width");
+  Require(clip.image_px % clip.patch_px == 0, "clip.image", clip.image_px, "a multiple of clip.patch");
+}
+
+}  // namespace
+
+void ModelConfig::Check() const {
+  CheckUNet(unet);
+  CheckLevels("vae.channel_mult", vae.channel_mult);
+  RequirePositive({{"vae.channels", vae.channels},
+                   {"vae.z_channels", vae.z_channels},
+                   {"vae.num_res_blocks", vae.num_res_blocks},
+                   {"chunk", chunk},
+                   {"memory", memory},
+                   {"views", views},
+                   {"schedule.steps", schedule.steps}});
+  Require(vae.channels % kGroups == 0, "vae.channels", vae.channels, "a multiple of 32");
+  CheckEncoder(image_encoder);
+  CheckResampler("action resampler", action_resampler, unet.context_dim);
+  CheckResampler("image resampler", image_resampler, unet.context_dim);
+  Require(image_resampler.embedding_dim == image_encoder.width, "image resampler embedding_dim",
+          image_resampler.embedding_dim, "clip.width = " + std::to_string(image_encoder.width));
+  Require(unet.in_channels == 3 * vae.z_channels + 7, "unet.in_channels", unet.in_channels,
+          "3 latents, a mask and 6 of the rays: " + std::to_string(3 * vae.z_channels + 7));
+  Require(unet.out_channels == vae.z_channels, "unet.out_channels", unet.out_channels, "vae.z_channels");
+  Require(domain >= 0 && domain < unet.domains, "domain", domain, "a row of unet.domains");
+  const std::int64_t multiple = vae.Stride() << (unet.channel_mult.size() - 1);
+  const std::string wanted = "a multiple of " + std::to_string(multiple) + ", codec stride x 2^(levels - 1)";
+  Require(image_height_px > 0 && image_height_px % multiple == 0, "image height", image_height_px, wanted);
+  Require(image_width_px > 0 && image_width_px % multiple == 0, "image width", image_width_px, wanted);
+}
+
+}  // namespace evac::nn

@@ -1,0 +1,97 @@
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+/// Every size of the EVAC network. The defaults are the published model; small ones differ in numbers alone.
+namespace evac::nn {
+
+/// The denoiser (EVAC, Sec. 3; a latent video UNet after DynamiCrafter).
+struct UNetConfig {
+  std::int64_t in_channels = 19;  ///< 4 noisy latent, 4 image latent, 1 mask, 4 pose map latent, 3 ray direction, 3 ray origin
+  std::int64_t out_channels = 4;
+  std::int64_t model_channels = 320;  ///< a multiple of 32: the groups of every normalisation
+  std::vector<std::int64_t> channel_mult = {1, 2, 4, 4};           ///< one per level, finest first
+  std::int64_t num_res_blocks = 2;                                 ///< per level
+  std::vector<std::int64_t> attention_resolutions = {4, 2, 1};     ///< downsampling factors with transformers
+  std::int64_t num_head_channels = 64;
+  std::int64_t transformer_depth = 1;
+  std::int64_t context_dim = 1024;
+  std::int64_t init_attention_heads = 8;
+  std::int64_t domains = 30;        ///< rows of the table of robots
+  std::int64_t image_tokens = 256;  ///< per view, first in the context
+  std::int64_t action_tokens = 16;  ///< after them
+};
+
+/// The latent codec: AutoencoderKL of Stable Diffusion.
+struct VaeConfig {
+  std::int64_t image_channels = 3;
+  std::int64_t channels = 128;
+  std::vector<std::int64_t> channel_mult = {1, 2, 4, 4};
+  std::int64_t num_res_blocks = 2;
+  std::int64_t z_channels = 4;
+  double scale_factor = 0.18215;  ///< latents are this times the posterior's sample
+  std::int64_t Stride() const { return std::int64_t{1} << (channel_mult.size() - 1); }
+};
+
+/// A Perceiver resampler: any number of inputs to `queries` tokens.
+struct ResamplerConfig {
+  std::int64_t embedding_dim = 14;
+  std::int64_t queries = 16;
+  std::int64_t dim = 1024;
+  std::int64_t depth = 4;
+  std::int64_t dim_head = 64;
+  std::int64_t heads = 12;
+  std::int64_t output_dim = 1024;
+  std::int64_t ff_mult = 4;
+};
+
+/// The visual tower of CLIP ViT-H/14.
+struct ImageEncoderConfig {
+  std::int64_t width = 1280;
+  std::int64_t layers = 32;
+  std::int64_t head_width = 80;
+  std::int64_t patch_px = 14;
+  std::int64_t image_px = 224;
+  std::int64_t embed_dim = 1024;    ///< of keys that a checkpoint carries and nothing reads
+  std::int64_t vocabulary = 49408;  ///< likewise
+  std::int64_t text_length = 77;    ///< likewise
+  std::int64_t Tokens() const { return image_px / patch_px * (image_px / patch_px) + 1; }
+};
+
+/// Diffusion noise (spec 8.1).
+struct ScheduleConfig {
+  std::int64_t steps = 1000;
+  double linear_start = 0.00085;
+  double linear_end = 0.012;
+  bool zero_terminal_snr = true;
+  bool dynamic_rescale = true;
+  double base_scale = 0.7;
+  std::int64_t turning_step = 400;
+};
+
+struct ModelConfig {
+  UNetConfig unet;
+  VaeConfig vae;
+  ResamplerConfig action_resampler;                                       ///< 14 numbers per step → 16 tokens
+  ResamplerConfig image_resampler{.embedding_dim = 1280, .queries = 256};  ///< CLIP's tokens → 256 tokens
+  ImageEncoderConfig image_encoder;
+  ScheduleConfig schedule;
+  std::int64_t chunk = 16;      ///< K: frames imagined at once
+  std::int64_t memory = 4;      ///< N: frames remembered
+  std::int64_t views = 1;       ///< V
+  std::int64_t image_height_px = 320;
+  std::int64_t image_width_px = 512;
+  std::int64_t fps = 2;         ///< a constant of the released model
+  std::int64_t domain = 11;     ///< AgiBot World's row in the table of robots
+
+  std::int64_t Frames() const { return memory + chunk; }
+  std::int64_t LatentHeight() const { return image_height_px / vae.Stride(); }
+  std::int64_t LatentWidth() const { return image_width_px / vae.Stride(); }
+
+  /// @throws TensorError naming the size that no network can have, what was found and what is wanted.
+  void Check() const;
+};
+
+}  // namespace evac::nn

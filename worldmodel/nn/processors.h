@@ -1,0 +1,10 @@
+#pragma once
+
+/// Put before a function: it is compiled for several processors, and the best is picked when the program starts.
+/// Sanitizers come before the picking does, and clang has no such thing here: then there is one, for the plainest.
+#if defined(__x86_64__) && defined(__GNUC__) && !defined(__clang__) && !defined(__SANITIZE_THREAD__) && \
+    !defined(__SANITIZE_ADDRESS__)
+#define EVAC_EACH_PROCESSOR __attribute__((target_clones("avx512f", "avx2", "default")))
+#else
+#define EVAC_EACH_PROCESSOR
+#endif
