@@ -25,7 +25,9 @@ namespace fs = std::filesystem;
 
 class ScratchFolder {
  public:
-  ScratchFolder() : path_(fs::temp_directory_path() / fmt::format("evac-doctor-{}", ::getpid())) { fs::create_directories(path_); }
+  ScratchFolder() : path_(fs::temp_directory_path() / fmt::format("evac-doctor-{}", ::getpid())) {
+    fs::create_directories(path_);
+  }
   ~ScratchFolder() {
     std::error_code ignored;
     fs::remove_all(path_, ignored);
@@ -52,7 +54,8 @@ Finding Video(const fs::path& folder) {
   writer.Append(cv::Mat(64, 96, CV_8UC3, cv::Scalar(200, 40, 40)));
   writer.Finish();
   const cv::Mat frame = VideoReader(folder / "video.mp4").Next();
-  if (frame.empty()) return Broken("a video that was just written cannot be read: apt-get install libavcodec59 with libx264");
+  if (frame.empty())
+    return Broken("a video that was just written cannot be read: apt-get install libavcodec59 with libx264");
   return Good("H.264 is encoded and decoded");
 }
 
@@ -67,8 +70,11 @@ Finding Images() {
 }
 
 Finding StoreWorks(const fs::path& folder) {
-  Store::CreateOrContinue(folder / "run", {.suite_text = "suite: doctor", .suite_hash = "doctor", .suite_path = "", .evac_version = EVAC_VERSION});
-  if (Store::Open(folder / "run", Store::Mode::kReadOnly).run().suite_hash != "doctor") return Broken("what was written to SQLite is not what is read");
+  Store::CreateOrContinue(
+      folder / "run",
+      {.suite_text = "suite: doctor", .suite_hash = "doctor", .suite_path = "", .evac_version = EVAC_VERSION});
+  if (Store::Open(folder / "run", Store::Mode::kReadOnly).run().suite_hash != "doctor")
+    return Broken("what was written to SQLite is not what is read");
   return Good("SQLite writes and reads a run");
 }
 
@@ -78,7 +84,8 @@ Finding DiskSpace(const fs::path& scratch) {
   Finding finding = Good(fmt::format("{} GB free here", fs::space(".").available / 1'000'000'000));
   for (const fs::path& folder : {fs::current_path(), scratch.parent_path()}) {
     const std::uintmax_t free_bytes = fs::space(folder).available;
-    const std::string sentence = fmt::format("{} MB free in {}; a thousand episodes take about a gigabyte", free_bytes / 1'000'000, folder.string());
+    const std::string sentence = fmt::format("{} MB free in {}; a thousand episodes take about a gigabyte",
+                                             free_bytes / 1'000'000, folder.string());
     if (free_bytes < kLeast) return Broken(sentence + ": make room, or give --out a folder on another disk");
     if (free_bytes < kEnough) finding = Advice(sentence);
   }
@@ -96,21 +103,26 @@ Finding LcmBuffers() {
   long limit = 0;
   std::ifstream("/proc/sys/net/core/rmem_max") >> limit;
   if (limit >= kWanted) return Good(fmt::format("receive buffers of up to {} kB", limit / 1024));
-  return Advice(fmt::format("receive buffers are limited to {} kB: large images get lost and are sent again, which costs time and changes no result. "
-                            "sysctl -w net.core.rmem_max={}", limit / 1024, kWanted));
+  return Advice(
+      fmt::format("receive buffers are limited to {} kB: large images get lost and are sent again, which costs time "
+                  "and changes no result. "
+                  "sysctl -w net.core.rmem_max={}",
+                  limit / 1024, kWanted));
 }
 
 Finding Rendering() {
   const sim::Renderer renderer;  // throws, naming the step that fails
   const char* display = std::getenv("DISPLAY");
-  return Good(fmt::format("MuJoCo draws without a display{}", display && *display ? " (DISPLAY is set and not needed)" : ""));
+  return Good(
+      fmt::format("MuJoCo draws without a display{}", display && *display ? " (DISPLAY is set and not needed)" : ""));
 }
 
 Finding Threads() {
   const unsigned cores = std::thread::hardware_concurrency();
   rlimit files{};
   ::getrlimit(RLIMIT_NOFILE, &files);
-  if (files.rlim_cur < 256) return Advice(fmt::format("only {} open files are allowed: ulimit -n 1024", files.rlim_cur));
+  if (files.rlim_cur < 256)
+    return Advice(fmt::format("only {} open files are allowed: ulimit -n 1024", files.rlim_cur));
   const char* omp = std::getenv("OMP_NUM_THREADS");
   const std::string limited = omp && *omp ? fmt::format("; OMP_NUM_THREADS={} limits networks, not physics", omp) : "";
   if (cores < 2) return Advice("one core: worlds and policies take turns" + limited);
@@ -119,8 +131,10 @@ Finding Threads() {
 
 /// What the program was built with and what it runs with.
 Finding Versions() {
-  const std::string all = fmt::format("{}, {}, OpenCV {}, MuJoCo {}", Store::Engine(), VideoLibrary(), cv::getVersionString(), mj_versionString());
-  if (mj_version() != mjVERSION_HEADER) return Broken(fmt::format("{}; built with MuJoCo {}: build again", all, mjVERSION_HEADER));
+  const std::string all = fmt::format("{}, {}, OpenCV {}, MuJoCo {}", Store::Engine(), VideoLibrary(),
+                                      cv::getVersionString(), mj_versionString());
+  if (mj_version() != mjVERSION_HEADER)
+    return Broken(fmt::format("{}; built with MuJoCo {}: build again", all, mjVERSION_HEADER));
   return Good(all);
 }
 
@@ -131,7 +145,9 @@ bool Passes(const char* what, const std::function<Finding()>& check) {
   } catch (const std::exception& error) {
     finding = Broken(error.what());
   }
-  const char* word = finding.kind == Finding::Kind::kGood ? "ok  " : finding.kind == Finding::Kind::kAdvice ? "note" : "FAIL";
+  const char* word = finding.kind == Finding::Kind::kGood     ? "ok  "
+                     : finding.kind == Finding::Kind::kAdvice ? "note"
+                                                              : "FAIL";
   fmt::print("{} {:<10} {}\n", word, what, finding.sentence);
   return finding.kind != Finding::Kind::kBroken;
 }
@@ -155,7 +171,9 @@ ExitCode Doctor() {
 
 void AddDoctor(CLI::App& app, ExitCode& exit_code) {
   CLI::App* command = app.add_subcommand("doctor", "Check that this machine can run evaluations");
-  command->footer("Example:\n  evac doctor\nExit code 1 if anything fails; the line says what to do; a note works, but could be better.");
+  command->footer(
+      "Example:\n  evac doctor\nExit code 1 if anything fails; the line says what to do; a note works, but could be "
+      "better.");
   command->callback([&exit_code] { exit_code = Doctor(); });
 }
 

@@ -23,8 +23,8 @@ std::vector<Store> OpenAll(const std::vector<fs::path>& shards) {
     stores.push_back(Store::Open(shard, Store::Mode::kReadOnly));
     const RunInfo first = stores.front().run(), run = stores.back().run();
     if (run.suite_hash == first.suite_hash) continue;
-    throw InvalidInput("{} and {} are runs of different suites (suite hashes {:.12}… and {:.12}…)", shards.front().string(),
-                       shard.string(), first.suite_hash, run.suite_hash);
+    throw InvalidInput("{} and {} are runs of different suites (suite hashes {:.12}… and {:.12}…)",
+                       shards.front().string(), shard.string(), first.suite_hash, run.suite_hash);
   }
   return stores;
 }
@@ -32,11 +32,13 @@ std::vector<Store> OpenAll(const std::vector<fs::path>& shards) {
 /// All that makes an episode what it is, in one text.
 std::string Fingerprint(const Store& store, Episode episode) {
   store.LoadSteps(episode);
-  std::string text = fmt::format("{} {} {} {}", episode.chunks, Name(episode.stop), episode.stop_reason, episode.video_sha256);
+  std::string text =
+      fmt::format("{} {} {} {}", episode.chunks, Name(episode.stop), episode.stop_reason, episode.video_sha256);
   for (const Arms& arms : episode.commands) {
     for (const ArmState& arm : arms) {
       const Eigen::Matrix4d pose = arm.base_from_gripper.matrix();
-      text += Sha256Hex({reinterpret_cast<const char*>(pose.data()), sizeof(double) * 16}) + fmt::format("{} ", arm.closure);
+      text += Sha256Hex({reinterpret_cast<const char*>(pose.data()), sizeof(double) * 16}) +
+              fmt::format("{} ", arm.closure);
     }
   }
   return text;
@@ -68,19 +70,21 @@ Choice Choose(const std::vector<Store>& stores, const std::vector<fs::path>& sha
       if (known_failed || this_failed) continue;
       const std::size_t before = choice.shard[episode.key];
       if (Fingerprint(stores[before], found->second) != Fingerprint(stores[s], episode))
-        disagreements.push_back(fmt::format("{} in {} and {}", episode.key.Id(), shards[before].string(), shards[s].string()));
+        disagreements.push_back(
+            fmt::format("{} in {} and {}", episode.key.Id(), shards[before].string(), shards[s].string()));
     }
   }
   if (disagreements.empty()) return choice;
-  throw InvalidInput("{} episodes are not the same in all shards that hold them; nothing was merged:\n  {}", disagreements.size(),
-                     fmt::join(disagreements, "\n  "));
+  throw InvalidInput("{} episodes are not the same in all shards that hold them; nothing was merged:\n  {}",
+                     disagreements.size(), fmt::join(disagreements, "\n  "));
 }
 
 void CopyDeclarations(const Store& from, Store& to) {
   for (const Task& task : from.Tasks()) to.AddTask(task);
   for (const WorldInfo& world : from.Worlds()) to.AddWorld(world);
   for (const PolicyInfo& policy : from.Policies()) to.AddPolicy(policy);
-  for (const PairKey& pair : from.InitialScenes()) to.AddInitialScene(pair, from.LoadInitialScene(pair.task, pair.initial_state).value());
+  for (const PairKey& pair : from.InitialScenes())
+    to.AddInitialScene(pair, from.LoadInitialScene(pair.task, pair.initial_state).value());
   for (const auto& [policy, counters] : from.CountersByPolicy()) to.Count(policy, counters);
 }
 
@@ -113,7 +117,9 @@ void CopyVerdicts(const Store& from, const std::set<std::string>& taken, Store& 
 /// Imported trials, those of the first shard that has them.
 void CopyRealTrials(const Store& from, Store& to) {
   std::set<std::tuple<std::string, std::string, std::string, std::string, std::int64_t>> known;
-  const auto key = [](const RealTrial& t) { return std::tuple(t.task, t.initial_state, t.policy, t.checkpoint, t.trial); };
+  const auto key = [](const RealTrial& t) {
+    return std::tuple(t.task, t.initial_state, t.policy, t.checkpoint, t.trial);
+  };
   for (const RealTrial& trial : to.RealTrials()) known.insert(key(trial));
   std::vector<RealTrial> fresh;
   for (const RealTrial& trial : from.RealTrials()) {

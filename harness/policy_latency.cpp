@@ -26,7 +26,8 @@ ActionChunk ExecutedPlan::Execute(const Arms& last, const ActionChunk& chunk, do
   executed.targets.resize(periods, executed.targets.empty() ? last : Arms(executed.targets.back()));
 
   const std::size_t size = chunk.targets.size();
-  const std::size_t from = std::min(gone_on, size - 1), to = std::min(size, from + static_cast<std::size_t>(chunk_size_));
+  const std::size_t from = std::min(gone_on, size - 1),
+                    to = std::min(size, from + static_cast<std::size_t>(chunk_size_));
   const auto at = [&](std::size_t k) { return chunk.targets.begin() + static_cast<std::ptrdiff_t>(k); };
   executed.targets.insert(executed.targets.end(), at(from), at(to));
   executed.ends_recording = chunk.ends_recording && to == size;

@@ -29,7 +29,8 @@ std::string WhyFar(const ArmState& at, const ArmState& to, const Arms& observed)
   if ((to_m / 1000 - from_m).norm() < kLongestFirstStep_m) return "; it would fit if it were in millimetres";
   if (to_m.norm() < kLongestFirstStep_m / 2) return "; it would fit if it were a delta to that, not an absolute target";
   for (const ArmState& other : observed) {
-    if (&other != &at && Distance_m(other, to) < kLongestFirstStep_m) return "; it would fit the other arm: are the arms swapped?";
+    if (&other != &at && Distance_m(other, to) < kLongestFirstStep_m)
+      return "; it would fit the other arm: are the arms swapped?";
   }
   return "; is it in another frame?";
 }
@@ -50,24 +51,31 @@ double Fastest_m_s(const ActionChunk& chunk, std::size_t arm, double period_s) {
   return fastest_m_s;
 }
 
-void Look(const Arms& observed, std::size_t arm, const ActionChunk& chunk, const Task& task, std::vector<Suspicion>& found) {
+void Look(const Arms& observed, std::size_t arm, const ActionChunk& chunk, const Task& task,
+          std::vector<Suspicion>& found) {
   const ArmState &at = observed[arm], &to = chunk.targets.front()[arm];
   const auto suspect = [&](bool is_certain, const std::string& sentence) {
     found.push_back({task.arms[arm] + " arm: " + sentence, is_certain});
   };
   const double step_m = Distance_m(at, to), turn_rad = RotationBetween(at.base_from_gripper, to.base_from_gripper);
   if (step_m > kLongestFirstStep_m)
-    suspect(true, fmt::format("the first target is {:.3g} m from where the arm is{}", step_m, WhyFar(at, to, observed)));
+    suspect(true,
+            fmt::format("the first target is {:.3g} m from where the arm is{}", step_m, WhyFar(at, to, observed)));
   if (turn_rad > kLargestFirstTurn_rad)
-    suspect(true, fmt::format("the first target is turned by {:.2f} rad from how the hand is{}", turn_rad, WhyTurned(at, to)));
+    suspect(true, fmt::format("the first target is turned by {:.2f} rad from how the hand is{}", turn_rad,
+                              WhyTurned(at, to)));
   if (to.closure < 0 || to.closure > 1) {
-    suspect(true, fmt::format("the first closure is {:.4g}, wanted 0 (open) … 1 (closed): is it in degrees or a vendor's unit?", to.closure));
+    suspect(true, fmt::format(
+                      "the first closure is {:.4g}, wanted 0 (open) … 1 (closed): is it in degrees or a vendor's unit?",
+                      to.closure));
   } else if (std::abs(to.closure - at.closure) > kSuddenClosure) {
-    suspect(false, fmt::format("the hand's closure is {:.2f} and its first target {:.2f}: is it reversed?", at.closure, to.closure));
+    suspect(false, fmt::format("the hand's closure is {:.2f} and its first target {:.2f}: is it reversed?", at.closure,
+                               to.closure));
   }
   const double fastest_m_s = Fastest_m_s(chunk, arm, task.period_s);
   if (fastest_m_s > kFastestTarget_m_s) {
-    suspect(true, fmt::format("its targets are up to {:.3g} m apart, which is {:.3g} m/s at a period of {} s: are they for another period?",
+    suspect(true, fmt::format("its targets are up to {:.3g} m apart, which is {:.3g} m/s at a period of {} s: are they "
+                              "for another period?",
                               fastest_m_s * task.period_s, fastest_m_s, task.period_s));
   }
 }
@@ -79,7 +87,8 @@ std::vector<Suspicion> StartSuspicions(const Arms& observed, const ActionChunk& 
   for (const Arms& target : chunk.targets) {
     if (target.size() != observed.size()) return found;  // a malformed chunk: its episode says so
   }
-  for (std::size_t arm = 0; !chunk.targets.empty() && arm < observed.size(); ++arm) Look(observed, arm, chunk, task, found);
+  for (std::size_t arm = 0; !chunk.targets.empty() && arm < observed.size(); ++arm)
+    Look(observed, arm, chunk, task, found);
   return found;
 }
 

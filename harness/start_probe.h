@@ -27,8 +27,8 @@ inline constexpr double kSuddenClosure = 0.5;
 /// @param observed  where the arms are; @param chunk  finite, with these arms.
 std::vector<Suspicion> StartSuspicions(const Arms& observed, const ActionChunk& chunk, const Task& task);
 
-/// Begins `job` on both sides, in scene 0, asks for one chunk and looks at it; nothing is executed or kept. A policy that
-/// gives none is not suspicious: its episodes will say why.
+/// Begins `job` on both sides, in scene 0, asks for one chunk and looks at it; nothing is executed or kept. A policy
+/// that gives none is not suspicious: its episodes will say why.
 std::vector<Suspicion> ProbeStart(Policy& policy, World& world, const Job& job);
 
 }  // namespace evac

@@ -61,9 +61,8 @@ void LcmGreeting::RefuseTwoPolicies(const PolicySpec& harness,
 void LcmGreeting::ThrowNobodyAnswers(double wait_s) const {
   const auto found = counters.find("undecodable_replies");
   const std::string hint =
-      found == counters.end()
-          ? ""
-          : fmt::format("; {} answers came in another version of the message types", found->second);
+      found == counters.end() ? ""
+                              : fmt::format("; {} answers came in another version of the message types", found->second);
   throw InvalidInput(
       "no policy answered within {} s on {} with token {}{}. One that runs elsewhere joins with these as "
       "EVAC_LCM_URL and EVAC_TOKEN, or as --url and --token",

@@ -20,7 +20,8 @@ using Clock = std::chrono::steady_clock;
 using Seconds = std::chrono::duration<double>;
 
 constexpr double kLongestWait_s = 0.1;  ///< between two looks at the deadlines
-constexpr double kLongestRepeat = 8;    ///< of repeat_after_s: on a bad network a request needs many sendings, not few late ones
+constexpr double kLongestRepeat =
+    8;  ///< of repeat_after_s: on a bad network a request needs many sendings, not few late ones
 
 Clock::time_point After(Clock::time_point from, double seconds) {
   return from + std::chrono::duration_cast<Clock::duration>(Seconds(seconds));
@@ -232,7 +233,8 @@ LcmPolicy::~LcmPolicy() {
 
 PolicySpec LcmPolicy::Handshake(const PolicySpec& harness, double wait_s) {
   const LcmPolicyOptions& options = impl_->options;
-  const LcmGreeting greeting{impl_->link, options.address, impl_->client, options.why_gone, options.interrupted, impl_->counters};
+  const LcmGreeting greeting{impl_->link,      options.address,     impl_->client,
+                             options.why_gone, options.interrupted, impl_->counters};
   const PolicySpec policy = FromWire(greeting.Await(harness, wait_s, impl_->declarations));
   if (!Compare(harness, policy).empty()) {
     throw InvalidInput("policy {}@{} does not fit this run:\n{}", policy.name, policy.checkpoint,

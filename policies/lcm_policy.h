@@ -15,11 +15,12 @@ namespace evac {
 
 struct LcmPolicyOptions {
   LcmAddress address{};
-  double deadline_s = 20;       ///< from a request's first sending to giving it up as policy_timeout
-  double start_s = 0;           ///< for an episode's start, if longer: a process that was restarted may have much to load
-  double repeat_after_s = 0.5;  ///< before the first repeat of what was not answered; doubles with each, up to eightfold
-  bool raw_images = false;      ///< exact pixels instead of JPEG; for tests
-  int jpeg_quality = 95;        ///< 0 … 100
+  double deadline_s = 20;  ///< from a request's first sending to giving it up as policy_timeout
+  double start_s = 0;      ///< for an episode's start, if longer: a process that was restarted may have much to load
+  double repeat_after_s =
+      0.5;                  ///< before the first repeat of what was not answered; doubles with each, up to eightfold
+  bool raw_images = false;  ///< exact pixels instead of JPEG; for tests
+  int jpeg_quality = 95;    ///< 0 … 100
   Pacing pacing{};
   /// Asked while waiting: why nobody will ever answer (PolicyProcess::WhyGone), so that nobody waits for the deadline.
   std::function<std::optional<std::string>()> why_gone{};

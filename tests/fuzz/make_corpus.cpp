@@ -13,8 +13,10 @@ namespace fs = std::filesystem;
 evac::Task SomeTask() {
   evac::Task task;
   task.id = "take_bottle";
-  task.cameras.push_back({.name = "head", .width_px = 8, .height_px = 8, .fx_px = 8, .fy_px = 8, .cx_px = 4, .cy_px = 4});
-  task.rubric.stages.push_back({.name = "reach", .all_of = {{.kind = "distance", .a = "gripper", .b = "bottle", .below = 0.2}}});
+  task.cameras.push_back(
+      {.name = "head", .width_px = 8, .height_px = 8, .fx_px = 8, .fy_px = 8, .cx_px = 4, .cy_px = 4});
+  task.rubric.stages.push_back(
+      {.name = "reach", .all_of = {{.kind = "distance", .a = "gripper", .b = "bottle", .below = 0.2}}});
   return task;
 }
 
@@ -25,13 +27,15 @@ void MakeStoreSeeds(const fs::path& folder) {
   };
   const evac::Task task = SomeTask();
   const cv::Mat image(8, 8, CV_8UC3, cv::Scalar(10, 120, 200));
-  evac::Episode episode{.key = {{task.id, "1-0000", "hold", "a", 1}, "real"}, .stop = evac::StopReason::kStill, .stop_reason = "still"};
+  evac::Episode episode{
+      .key = {{task.id, "1-0000", "hold", "a", 1}, "real"}, .stop = evac::StopReason::kStill, .stop_reason = "still"};
   episode.observations.assign(2, {.images = {}, .arms = evac::Arms(1)});
   episode.commands.assign(1, evac::Arms(1));
   const evac::PrivilegedTrack track(2, {.bodies = {{"bottle"}, {"table"}}, .contacts = {{"bottle", "table", 1}}});
   const fs::path run = folder / "run";
   {
-    evac::Store store = evac::Store::CreateOrContinue(run, {.suite_text = "suite: t", .suite_hash = "h", .suite_path = "", .evac_version = "0"});
+    evac::Store store = evac::Store::CreateOrContinue(
+        run, {.suite_text = "suite: t", .suite_hash = "h", .suite_path = "", .evac_version = "0"});
     store.AddTask(task);
     store.AddWorld({.name = "real", .type = "mujoco", .is_real = true, .profile_hash = ""});
     store.AddPolicy({"hold", "a", "{}"});
@@ -55,7 +59,8 @@ void MakePageSeeds(const fs::path& folder) {
   for (const char* suite : {"apps/configs/demo.yaml", "apps/configs/agibot_replay.yaml", "tests/system/faults.yaml"})
     evac::WriteText(folder / fs::path(suite).filename(), "1" + evac::ReadFile(root / suite));
   for (const auto& page : fs::directory_iterator(root / "worldmodel/sim/scenes")) {
-    if (page.path().extension() == ".yaml") evac::WriteText(folder / page.path().filename(), "0" + evac::ReadFile(page.path()));
+    if (page.path().extension() == ".yaml")
+      evac::WriteText(folder / page.path().filename(), "0" + evac::ReadFile(page.path()));
   }
 }
 

@@ -25,7 +25,8 @@ class Scratch {
 
   const std::filesystem::path& folder() const { return folder_; }
   void Write(const std::string& name, const std::uint8_t* data, std::size_t size) const {
-    std::ofstream(folder_ / name, std::ios::binary).write(reinterpret_cast<const char*>(data), static_cast<std::streamsize>(size));
+    std::ofstream(folder_ / name, std::ios::binary)
+        .write(reinterpret_cast<const char*>(data), static_cast<std::streamsize>(size));
   }
 
  private:

@@ -32,7 +32,8 @@ TEST(StartProbe, SwappedArmsAreSeenOnBoth) {
   const ActionChunk chunk{.targets = {At(-0.3, 0.3)}};
   const auto found = StartSuspicions(At(0.3, -0.3), chunk, TwoArms());
   ASSERT_EQ(found.size(), 2u);
-  EXPECT_THAT(found[0].sentence, testing::AllOf(HasSubstr("left arm"), HasSubstr("0.6 m"), HasSubstr("are the arms swapped?")));
+  EXPECT_THAT(found[0].sentence,
+              testing::AllOf(HasSubstr("left arm"), HasSubstr("0.6 m"), HasSubstr("are the arms swapped?")));
   EXPECT_TRUE(found[0].is_certain);
 }
 

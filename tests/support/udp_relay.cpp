@@ -34,7 +34,8 @@ sockaddr_in Address(const char* host, int port) {
 /// One port's ear and mouth. What the mouth says comes back to the ear: it is known by its source port.
 class Side {
  public:
-  explicit Side(int port) : ear_(::socket(AF_INET, SOCK_DGRAM, 0)), mouth_(::socket(AF_INET, SOCK_DGRAM, 0)), to_(Address(kGroup, port)) {
+  explicit Side(int port)
+      : ear_(::socket(AF_INET, SOCK_DGRAM, 0)), mouth_(::socket(AF_INET, SOCK_DGRAM, 0)), to_(Address(kGroup, port)) {
     const int yes = 1, buffer_bytes = 4 << 20;
     ::setsockopt(ear_, SOL_SOCKET, SO_REUSEADDR, &yes, sizeof yes);
     ::setsockopt(ear_, SOL_SOCKET, SO_RCVBUF, &buffer_bytes, sizeof buffer_bytes);
@@ -66,7 +67,8 @@ class Side {
     std::vector<std::uint8_t> datagram(65536);
     sockaddr_in from{};
     socklen_t size = sizeof from;
-    const ssize_t bytes = ::recvfrom(ear_, datagram.data(), datagram.size(), MSG_DONTWAIT, reinterpret_cast<sockaddr*>(&from), &size);
+    const ssize_t bytes =
+        ::recvfrom(ear_, datagram.data(), datagram.size(), MSG_DONTWAIT, reinterpret_cast<sockaddr*>(&from), &size);
     datagram.resize(bytes > 0 && from.sin_port != own_port_ ? static_cast<std::size_t>(bytes) : 0);
     return datagram;
   }
@@ -103,8 +105,8 @@ struct UdpRelay::Impl {
     const bool is_doubled = dice.Uniform() < options.duplication;
     counts.doubled += is_doubled;
     for (int i = 0; i < 1 + is_doubled; ++i) {
-      const auto due = Clock::now() + std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(
-                                          options.longest_delay_s * dice.Uniform()));
+      const auto due = Clock::now() + std::chrono::duration_cast<Clock::duration>(
+                                          std::chrono::duration<double>(options.longest_delay_s * dice.Uniform()));
       counts.overtaken += !waiting.empty() && due < waiting.rbegin()->first;
       ++counts.passed;
       waiting.insert({due, {&to, datagram}});

@@ -26,7 +26,9 @@ class UdpRelay {
 
   /// Stops it first.
   Counts Stop();
-  static std::string Url(int port) { return "udpm://239.255.76.67:" + std::to_string(port) + "?ttl=0&recv_buf_size=4194304"; }
+  static std::string Url(int port) {
+    return "udpm://239.255.76.67:" + std::to_string(port) + "?ttl=0&recv_buf_size=4194304";
+  }
 
  private:
   struct Impl;

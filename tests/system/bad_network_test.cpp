@@ -22,15 +22,17 @@ using testing::HasSubstr;
 
 /// `evac run` with a policy that is reached through `policy_url`, of two episodes that depend on every image.
 CommandResult RunJoining(const std::filesystem::path& run, const std::string& url) {
-  return RunCommand(RunWords(kFaults, run,
-                             {fmt::format("policies.0={{name: visual_pick, join: {{url: \"{}\", token: relay}}}}", url),
-                              "initial_states.count=2", "lanes=2", "transport={deadline_s: 120, repeat_after_s: 0.05}"}));
+  return RunCommand(
+      RunWords(kFaults, run,
+               {fmt::format("policies.0={{name: visual_pick, join: {{url: \"{}\", token: relay}}}}", url),
+                "initial_states.count=2", "lanes=2", "transport={deadline_s: 120, repeat_after_s: 0.05}"}));
 }
 
 class ServedElsewhere {
  public:
   ServedElsewhere(const std::string& url, const std::filesystem::path& log)
-      : pid_(StartCommand({Binary("evac-policy"), "visual_pick", "--url", url, "--token", "relay", "--chunk-size", "8"}, log)) {}
+      : pid_(StartCommand({Binary("evac-policy"), "visual_pick", "--url", url, "--token", "relay", "--chunk-size", "8"},
+                          log)) {}
   ~ServedElsewhere() {
     ::kill(pid_, SIGTERM);
     ::waitpid(pid_, nullptr, 0);
@@ -45,7 +47,8 @@ class BadNetwork : public testing::TestWithParam<int> {};
 TEST_P(BadNetwork, LossReorderingDuplicationAndDelayChangeNothingButTheCountersWhichAreShown) {
   const TempFolder folder;
   SplitMix64 random(static_cast<std::uint64_t>(::getpid()));
-  const int port_a = 30000 + static_cast<int>(random.Below(1000)) * 2, port_b = port_a + 1;  // no run of ours uses these
+  const int port_a = 30000 + static_cast<int>(random.Below(1000)) * 2,
+            port_b = port_a + 1;  // no run of ours uses these
   const double share = GetParam() / 100.0;
   UdpRelay relay({port_a, port_b, share, share, 0.02, 7});
   const ServedElsewhere policy(UdpRelay::Url(port_b), folder / "policy.log");

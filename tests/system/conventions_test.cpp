@@ -18,42 +18,47 @@ TEST(Conventions, WhatIsDeclaredOtherwiseIsRefusedAtTheHandshakeWithBothDeclarat
   const TempFolder folder;
   const CommandResult result = RunCommand(RunWords(
       kFaults, folder / "run",
-      {"policies.0.command=[faulty-policy, --declare, quaternion_order=wxyz, --declare, action_space=delta, --declare, image_format=BGR, "
+      {"policies.0.command=[faulty-policy, --declare, quaternion_order=wxyz, --declare, action_space=delta, --declare, "
+       "image_format=BGR, "
        "--declare, gripper_open=1, --declare, gripper_closed=0, --declare, period_s=0.0333, --declare, arms=left]"}));
   EXPECT_EQ(result.exit_code, 2);
   EXPECT_THAT(result.err, HasSubstr("does not fit this run"));
-  for (const char* row : {"\\* quaternion_order +xyzw +wxyz", "\\* action_space +absolute +delta", "\\* image_format +RGB +BGR",
-                          "\\* gripper +0 open … 1 closed +1 open … 0 closed", "\\* period +0.1 s +0.0333 s", "\\* arms +right +left"})
+  for (const char* row :
+       {"\\* quaternion_order +xyzw +wxyz", "\\* action_space +absolute +delta", "\\* image_format +RGB +BGR",
+        "\\* gripper +0 open … 1 closed +1 open … 0 closed", "\\* period +0.1 s +0.0333 s", "\\* arms +right +left"})
     EXPECT_THAT(result.err, testing::ContainsRegex(row));
   EXPECT_EQ(List(folder / "run"), "[]\n");
 }
 
 /// Undeclared, each of them by one of five policies of one run.
-const std::vector<std::pair<std::string, std::string>> kUndeclared = {{"wxyz", "it would fit if its quaternion were w x y z"},
-                                                                      {"delta", "it would fit if it were a delta"},
-                                                                      {"millimetres", "it would fit if it were in millimetres"},
-                                                                      {"degrees", "the first closure is 57.3"},
-                                                                      {"other_period", "are they for another period?"},
-                                                                      {"reversed", "is it reversed?"}};
+const std::vector<std::pair<std::string, std::string>> kUndeclared = {
+    {"wxyz", "it would fit if its quaternion were w x y z"},   {"delta", "it would fit if it were a delta"},
+    {"millimetres", "it would fit if it were in millimetres"}, {"degrees", "the first closure is 57.3"},
+    {"other_period", "are they for another period?"},          {"reversed", "is it reversed?"}};
 
 CommandResult RunUndeclared(const std::filesystem::path& run, const std::string& probe) {
   std::string policies;
   for (const auto& [fault, said] : kUndeclared)
-    policies += fmt::format("{}{{name: {}, command: [faulty-policy, --fault, {}]}}", policies.empty() ? "" : ", ", fault, fault);
-  return RunCommand(RunWords(kFaults, run, {"policies=[" + policies + "]", "initial_states.count=1", "policy={start_probe: " + probe + "}"}));
+    policies += fmt::format("{}{{name: {}, command: [faulty-policy, --fault, {}]}}", policies.empty() ? "" : ", ",
+                            fault, fault);
+  return RunCommand(RunWords(
+      kFaults, run, {"policies=[" + policies + "]", "initial_states.count=1", "policy={start_probe: " + probe + "}"}));
 }
 
 TEST(Conventions, WhatIsNotDeclaredIsSeenInTheFirstChunkBeforeAnyEpisodeCounts) {
   const TempFolder folder;
   const CommandResult refused = RunUndeclared(folder / "refused", "refuse");
   EXPECT_EQ(refused.exit_code, 2);
-  EXPECT_THAT(refused.err, AllOf(HasSubstr("policy wxyz@default, task take_bottle, first chunk"), HasSubstr(kUndeclared[0].second)));
+  EXPECT_THAT(refused.err,
+              AllOf(HasSubstr("policy wxyz@default, task take_bottle, first chunk"), HasSubstr(kUndeclared[0].second)));
   EXPECT_EQ(List(folder / "refused"), "[]\n");
 
   const CommandResult warned = RunUndeclared(folder / "warned", "warn");
   EXPECT_EQ(warned.exit_code, 0) << warned.err;
   for (const auto& [fault, said] : kUndeclared)
-    EXPECT_THAT(warned.err, testing::ContainsRegex(fmt::format("warning: policy {}@default, task take_bottle, first chunk: .*{}", fault, said.substr(0, 15))));
+    EXPECT_THAT(warned.err,
+                testing::ContainsRegex(fmt::format("warning: policy {}@default, task take_bottle, first chunk: .*{}",
+                                                   fault, said.substr(0, 15))));
 }
 
 }  // namespace

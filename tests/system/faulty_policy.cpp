@@ -3,7 +3,8 @@
 ///
 ///   faulty-policy [--fault NAME[@SEED]]… [--while FILE] [--late-s S] [--declare FIELD=VALUE]…
 ///
-/// A fault with a seed is the one of the episode with that seed; without, of all episodes. Without a fault it wanders a little for four chunks, a function of seed and request, and then rests.
+/// A fault with a seed is the one of the episode with that seed; without, of all episodes. Without a fault it wanders a
+/// little for four chunks, a function of seed and request, and then rests.
 #include <fmt/format.h>
 #include <signal.h>
 #include <unistd.h>
@@ -51,7 +52,8 @@ Options Parse(int argc, char** argv) {
     const std::string name = argv[i], value = argv[i + 1];
     const std::size_t at = value.find('@');
     if (name == "--fault" && at == std::string::npos) options.everywhere = value;
-    if (name == "--fault" && at != std::string::npos) options.by_seed[std::stoull(value.substr(at + 1))] = value.substr(0, at);
+    if (name == "--fault" && at != std::string::npos)
+      options.by_seed[std::stoull(value.substr(at + 1))] = value.substr(0, at);
     if (name == "--while") options.only_while = value;
     if (name == "--late-s") options.late_s = std::stod(value);
     if (name == "--declare") Declare(value, options.spec);
@@ -102,7 +104,8 @@ class FaultyPolicy {
   }
   /// Wrong from the first answer on.
   static bool IsOfConvention(const std::string& f) {
-    return f == "wxyz" || f == "delta" || f == "degrees" || f == "millimetres" || f == "other_period" || f == "reversed";
+    return f == "wxyz" || f == "delta" || f == "degrees" || f == "millimetres" || f == "other_period" ||
+           f == "reversed";
   }
 
   void Answer(const observation_t& asked) {
@@ -125,7 +128,8 @@ class FaultyPolicy {
   void Wander(const observation_t& asked, chunk_t& reply) {
     SplitMix64 random(SeedFor(seeds_.at(asked.episode), static_cast<std::uint64_t>(asked.request)));
     const double reach_m = asked.request < kMovingRequests ? 0.02 : 0;
-    const double to_m[] = {reach_m * random.Uniform(-1, 1), reach_m * random.Uniform(-1, 1), reach_m * random.Uniform()};
+    const double to_m[] = {reach_m * random.Uniform(-1, 1), reach_m * random.Uniform(-1, 1),
+                           reach_m * random.Uniform()};
     reply.num_targets = kChunk;
     reply.num_arms = asked.num_arms;
     for (int k = 1; k <= kChunk; ++k) {

@@ -57,7 +57,9 @@ TEST_P(Interrupted, StopsWithinTwoSecondsLeavesNothingRunningAndGoesOnWhereItWas
   const std::filesystem::path videos = folder / "run/videos/real/take_bottle/faulty@default";
   int terminal = -1;
   const pid_t pid = StartOnTerminal(
-      RunWords(kFaults, folder / "run", {"policies.0.command=[" + command + "]", "transport.deadline_s=60", "initial_states.count=3"}), terminal);
+      RunWords(kFaults, folder / "run",
+               {"policies.0.command=[" + command + "]", "transport.deadline_s=60", "initial_states.count=3"}),
+      terminal);
   ::fcntl(terminal, F_SETFL, O_NONBLOCK);
   std::string said(4096, '\0');
   ASSERT_TRUE(WaitUntil([&] {
@@ -65,7 +67,8 @@ TEST_P(Interrupted, StopsWithinTwoSecondsLeavesNothingRunningAndGoesOnWhereItWas
     }
     return std::filesystem::exists(videos / (hangs ? "3-0000-s1.mp4.tmp" : "3-0001-s1.mp4.tmp"));
   }));
-  if (hangs) std::this_thread::sleep_for(std::chrono::seconds(2));  // until it has come to the request that it never answers
+  if (hangs)
+    std::this_thread::sleep_for(std::chrono::seconds(2));  // until it has come to the request that it never answers
   const auto before = Clock::now();
   const bool is_ctrl_c = GetParam().signal == SIGINT;
   EXPECT_EQ(is_ctrl_c ? ::write(terminal, "\x03", 1) : 1, 1);  // reaches all of the terminal's processes

@@ -28,9 +28,11 @@ TEST(Latency, WithSecondsTheWorldMovesOnTheSameForAnyNumberOfLanesAndTheReportSa
   ASSERT_EQ(RunCommand(RunWords(kFaults, folder / "three", {slow, "lanes=3"})).exit_code, 0);
   EXPECT_EQ(List(folder / "one"), List(folder / "three"));
   for (const Episode& episode : Episodes(folder / "one")) {
-    EXPECT_EQ(episode.commands.size(), static_cast<std::size_t>(episode.chunks) * (4 + 8)) << "0.35 s are four periods of 0.1 s";
+    EXPECT_EQ(episode.commands.size(), static_cast<std::size_t>(episode.chunks) * (4 + 8))
+        << "0.35 s are four periods of 0.1 s";
     for (int k = 1; k < 4; ++k)
-      EXPECT_EQ(episode.commands[k][0].base_from_gripper.matrix(), episode.commands[0][0].base_from_gripper.matrix()) << "it holds";
+      EXPECT_EQ(episode.commands[k][0].base_from_gripper.matrix(), episode.commands[0][0].base_from_gripper.matrix())
+          << "it holds";
     EXPECT_EQ(episode.observations.size(), episode.commands.size() + 1);
   }
   ASSERT_EQ(RunCommand({Binary("evac"), "report", (folder / "one").string()}).exit_code, 0);
@@ -39,22 +41,26 @@ TEST(Latency, WithSecondsTheWorldMovesOnTheSameForAnyNumberOfLanesAndTheReportSa
 
 TEST(Latency, MeasuredWantsOneLaneAndCountsTheTimeThatThePolicyTook) {
   const TempFolder folder;
-  const CommandResult refused = RunCommand(RunWords(kFaults, folder / "run", {"policy={latency: measured}", "lanes=2"}));
+  const CommandResult refused =
+      RunCommand(RunWords(kFaults, folder / "run", {"policy={latency: measured}", "lanes=2"}));
   EXPECT_EQ(refused.exit_code, 2);
   EXPECT_THAT(refused.err, HasSubstr("lanes: 1"));
 
-  const CommandResult measured = RunCommand(RunWords(
-      kFaults, folder / "run",
-      {"policy={latency: measured}", "policies.0.command=[faulty-policy, --fault, late, --late-s, \"0.5\"]", "transport.deadline_s=20", "initial_states.count=1"}));
+  const CommandResult measured = RunCommand(
+      RunWords(kFaults, folder / "run",
+               {"policy={latency: measured}", "policies.0.command=[faulty-policy, --fault, late, --late-s, \"0.5\"]",
+                "transport.deadline_s=20", "initial_states.count=1"}));
   ASSERT_EQ(measured.exit_code, 0) << measured.err;
   for (const Episode& episode : Episodes(folder / "run"))
-    EXPECT_GE(episode.commands.size(), static_cast<std::size_t>(episode.chunks) * 8 + 5) << "half a second at one request is five periods";
+    EXPECT_GE(episode.commands.size(), static_cast<std::size_t>(episode.chunks) * 8 + 5)
+        << "half a second at one request is five periods";
 }
 
 TEST(Latency, WhatIsNoLatencyIsRefused) {
   const TempFolder folder;
   for (const char* latency : {"-1", "soon", "0", "61"}) {
-    const CommandResult refused = RunCommand(RunWords(kFaults, folder / "run", {"policy={latency: " + std::string(latency) + "}"}));
+    const CommandResult refused =
+        RunCommand(RunWords(kFaults, folder / "run", {"policy={latency: " + std::string(latency) + "}"}));
     EXPECT_EQ(refused.exit_code, 2);
     EXPECT_THAT(refused.err, HasSubstr("policy.latency")) << latency;
   }

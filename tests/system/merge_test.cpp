@@ -54,7 +54,8 @@ TEST(Merge, ShardsJoinedAreTheRunThatWasNeverSplit) {
   ASSERT_EQ(merged.exit_code, 0) << merged.err;
   EXPECT_EQ(List(folder / "merged"), List(runs / "whole"));
   EXPECT_EQ(RunCommand({Binary("evac"), "report", (folder / "merged").string()}).exit_code, 0);
-  const Store store = Store::Open(folder / "merged", Store::Mode::kReadOnly), whole = Store::Open(runs / "whole", Store::Mode::kReadOnly);
+  const Store store = Store::Open(folder / "merged", Store::Mode::kReadOnly),
+              whole = Store::Open(runs / "whole", Store::Mode::kReadOnly);
   EXPECT_EQ(store.InitialScenes(), whole.InitialScenes());
   for (Episode episode : store.Episodes()) {
     EXPECT_TRUE(fs::exists(folder / "merged" / episode.video));
@@ -106,7 +107,8 @@ TEST(Merge, DuplicatesThatDisagreeAreNamedAndAFailedOneYields) {
   AddOther(runs / "whole", folder / "other", false);
   const CommandResult refused = Merge({runs / "whole", folder / "other"}, folder / "merged");
   EXPECT_EQ(refused.exit_code, 2);
-  EXPECT_THAT(refused.err, AllOf(HasSubstr("real/take_bottle/faulty@default/3-0001-s1 in "), HasSubstr((folder / "other").string())));
+  EXPECT_THAT(refused.err, AllOf(HasSubstr("real/take_bottle/faulty@default/3-0001-s1 in "),
+                                 HasSubstr((folder / "other").string())));
   EXPECT_FALSE(fs::exists(folder / "merged"));
 
   AddOther(runs / "whole", folder / "failed", true);
@@ -128,7 +130,8 @@ TEST(Merge, AVideoThatIsNotTheStoredOneIsRefused) {
 
 TEST(Merge, AShardIsWhichOfHowMany) {
   const TempFolder folder;
-  for (const char* shard : {"3/2", "0/2", "half", "1/2x"}) EXPECT_EQ(RunShard(folder / "run", shard).exit_code, 2) << shard;
+  for (const char* shard : {"3/2", "0/2", "half", "1/2x"})
+    EXPECT_EQ(RunShard(folder / "run", shard).exit_code, 2) << shard;
 }
 
 }  // namespace

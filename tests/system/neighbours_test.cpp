@@ -40,10 +40,13 @@ TEST(Neighbours, AStrayPolicyAtTheAddressThatASuiteJoinsIsRefusedByName) {
   const Mark mark(folder.path().string());
   const std::string token = "t" + std::to_string(::getpid());
   std::vector<pid_t> policies;
-  for (const char* log : {"mine", "yesterdays"}) policies.push_back(StartCommand({Binary("evac-policy"), "hold", "--chunk-size", "8", "--token", token}, folder / log));
+  for (const char* log : {"mine", "yesterdays"})
+    policies.push_back(
+        StartCommand({Binary("evac-policy"), "hold", "--chunk-size", "8", "--token", token}, folder / log));
   const CommandResult result = RunCommand(RunWords(
       kFaults, folder / "run",
-      {"policies.0={name: hold, join: {url: \"udpm://239.255.76.67:7667?ttl=0&recv_buf_size=4194304\", token: " + token + "}}"}));
+      {"policies.0={name: hold, join: {url: \"udpm://239.255.76.67:7667?ttl=0&recv_buf_size=4194304\", token: " +
+       token + "}}"}));
   EXPECT_EQ(result.exit_code, 2);
   EXPECT_THAT(result.err, testing::HasSubstr("2 policies answer on"));
   KillAll(policies);

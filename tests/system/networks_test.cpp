@@ -22,11 +22,12 @@ CommandResult Shell(const std::string& commands) { return RunCommand({"/bin/sh",
 class TwoMachines {
  public:
   TwoMachines() : here_(fmt::format("evac{}a", ::getpid())), there_(fmt::format("evac{}b", ::getpid())) {
-    const CommandResult made = Shell(fmt::format(
-        "ip netns add {0}; ip netns add {1}; ip -n {0} link add cable type veth peer name cable netns {1}\n"
-        "for n in {0}:10.77.0.1 {1}:10.77.0.2; do ip -n ${{n%%:*}} addr add ${{n#*:}}/24 dev cable; ip -n ${{n%%:*}} link set lo up; "
-        "ip -n ${{n%%:*}} link set cable up; ip -n ${{n%%:*}} route add 224.0.0.0/4 dev cable; done",
-        here_, there_));
+    const CommandResult made = Shell(
+        fmt::format("ip netns add {0}; ip netns add {1}; ip -n {0} link add cable type veth peer name cable netns {1}\n"
+                    "for n in {0}:10.77.0.1 {1}:10.77.0.2; do ip -n ${{n%%:*}} addr add ${{n#*:}}/24 dev cable; ip -n "
+                    "${{n%%:*}} link set lo up; "
+                    "ip -n ${{n%%:*}} link set cable up; ip -n ${{n%%:*}} route add 224.0.0.0/4 dev cable; done",
+                    here_, there_));
     why_not_ = made.exit_code == 0 ? "" : made.err;
   }
   ~TwoMachines() { Shell(fmt::format("ip netns del {} || true; ip netns del {} || true", here_, there_)); }
@@ -47,8 +48,8 @@ std::string Url(int ttl) { return fmt::format("udpm://239.255.76.67:7733?ttl={}&
 
 std::vector<std::string> Joining(const std::filesystem::path& run, int ttl) {
   return RunWords(kFaults, run,
-                  {fmt::format("policies.0={{name: visual_pick, join: {{url: \"{}\", token: there}}}}", Url(ttl)), "initial_states.count=1",
-                   "transport={deadline_s: 60, start_s: 20}"});
+                  {fmt::format("policies.0={{name: visual_pick, join: {{url: \"{}\", token: there}}}}", Url(ttl)),
+                   "initial_states.count=1", "transport={deadline_s: 60, start_s: 20}"});
 }
 
 TEST(Networks, APolicyOnAnotherMachineIsJoinedByUrlAndTtlAndTheRunIsTheSameAsOnOne) {
@@ -56,7 +57,8 @@ TEST(Networks, APolicyOnAnotherMachineIsJoinedByUrlAndTtlAndTheRunIsTheSameAsOnO
   const TwoMachines machines;
   if (!machines.why_not().empty()) GTEST_SKIP() << "two network namespaces need root: " << machines.why_not();
   const auto policy = [&](int ttl) {
-    return std::vector<std::string>{Binary("evac-policy"), "visual_pick", "--url", Url(ttl), "--token", "there", "--chunk-size", "8"};
+    return std::vector<std::string>{
+        Binary("evac-policy"), "visual_pick", "--url", Url(ttl), "--token", "there", "--chunk-size", "8"};
   };
   const pid_t there = StartCommand(machines.There(policy(1)), folder / "there.log");
   const CommandResult across = RunCommand(machines.Here(Joining(folder / "across", 1)));

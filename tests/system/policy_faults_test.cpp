@@ -51,9 +51,11 @@ TEST(PolicyFaults, EachFailsItsOwnEpisodeWithTheReasonTheOthersGoOnAndRetryFaile
   std::ofstream(folder / "sick") << "yes";
   std::string command = "faulty-policy, --while, " + (folder / "sick").string();
   for (std::size_t i = 0; i < kFaultsByEpisode.size(); ++i) {
-    if (!kFaultsByEpisode[i].name.empty()) command += fmt::format(", --fault, {}@{}", kFaultsByEpisode[i].name, SeedOfEpisode(i));
+    if (!kFaultsByEpisode[i].name.empty())
+      command += fmt::format(", --fault, {}@{}", kFaultsByEpisode[i].name, SeedOfEpisode(i));
   }
-  const CommandResult sick = RunCommand(RunWords(kFaults, folder / "run", {"policies.0.command=[" + command + "]", count}));
+  const CommandResult sick =
+      RunCommand(RunWords(kFaults, folder / "run", {"policies.0.command=[" + command + "]", count}));
   EXPECT_EQ(sick.exit_code, 0) << sick.err;
   const auto episodes = nlohmann::json::parse(List(folder / "run"));
   ASSERT_EQ(episodes.size(), kFaultsByEpisode.size());
@@ -73,9 +75,9 @@ TEST(PolicyFaults, EachFailsItsOwnEpisodeWithTheReasonTheOthersGoOnAndRetryFaile
 
 TEST(PolicyFaults, WhenNothingWorksTheErrorBudgetEndsTheRunWithCodeFourSayingSo) {
   const TempFolder folder;
-  const CommandResult result =
-      RunCommand(RunWords(kFaults, folder / "run",
-                          {"policies.0.command=[faulty-policy, --fault, error]", "initial_states.count=12", "error_budget=0.25"}));
+  const CommandResult result = RunCommand(
+      RunWords(kFaults, folder / "run",
+               {"policies.0.command=[faulty-policy, --fault, error]", "initial_states.count=12", "error_budget=0.25"}));
   EXPECT_EQ(result.exit_code, 4);
   EXPECT_THAT(result.err, HasSubstr("the error budget is spent: 4 episodes failed, 3 of 12 may"));
   EXPECT_THAT(result.err, HasSubstr("CUDA out of memory"));

@@ -20,7 +20,9 @@ namespace evac::system_test {
 /// While it lives, everything that the test starts carries the mark.
 class Mark {
  public:
-  explicit Mark(const std::string& mark) : entry_("EVAC_TEST_MARK=" + mark) { ::setenv("EVAC_TEST_MARK", mark.c_str(), 1); }
+  explicit Mark(const std::string& mark) : entry_("EVAC_TEST_MARK=" + mark) {
+    ::setenv("EVAC_TEST_MARK", mark.c_str(), 1);
+  }
   ~Mark() { ::unsetenv("EVAC_TEST_MARK"); }
 
   /// Those whose program's name is `program`; empty: all. Zombies have no environment and do not count.
@@ -39,7 +41,9 @@ class Mark {
  private:
   /// Lines, or entries of an environment: whether one of them is this.
   struct Contents : std::string {
-    bool contains(const std::string& entry) const { return (std::string(1, '\0') + *this).find('\0' + entry + '\0') != npos; }
+    bool contains(const std::string& entry) const {
+      return (std::string(1, '\0') + *this).find('\0' + entry + '\0') != npos;
+    }
   };
   static Contents Text(const std::filesystem::path& path) {
     std::ostringstream text;

@@ -99,7 +99,8 @@ TEST(Resume, AfterThePolicyOrBothWereKilledTheTablesAndVideosAreThoseOfAnUninter
   ASSERT_EQ(RunCommand(RunWords(kFaults, folder / "whole", {"initial_states.count=4"})).exit_code, 0);
   const int kills = std::getenv("EVAC_LONG") ? 20 : 3;
   for (const char* killed : {"policy", "both"}) {
-    EXPECT_EQ(ListAfterKilling(folder / killed, killed == std::string("both"), kills), List(folder / "whole")) << killed;
+    EXPECT_EQ(ListAfterKilling(folder / killed, killed == std::string("both"), kills), List(folder / "whole"))
+        << killed;
     EXPECT_EQ(Videos(folder / killed), Videos(folder / "whole")) << killed;
   }
 }
@@ -107,8 +108,11 @@ TEST(Resume, AfterThePolicyOrBothWereKilledTheTablesAndVideosAreThoseOfAnUninter
 TEST(Resume, ARunIsNotContinuedWithAnotherSuite) {
   const TempFolder folder;
   const fs::path run = folder / "run";
-  ASSERT_EQ(RunCommand({Binary("evac"), "run", kSuite, "--out", run.string(), "--set", "initial_states.count=1"}).exit_code, 0);
-  const CommandResult other = RunCommand({Binary("evac"), "run", kSuite, "--out", run.string(), "--set", "initial_states.count=1", "--set", "seeds=[5]"});
+  ASSERT_EQ(
+      RunCommand({Binary("evac"), "run", kSuite, "--out", run.string(), "--set", "initial_states.count=1"}).exit_code,
+      0);
+  const CommandResult other = RunCommand(
+      {Binary("evac"), "run", kSuite, "--out", run.string(), "--set", "initial_states.count=1", "--set", "seeds=[5]"});
   EXPECT_EQ(other.exit_code, 2);
   EXPECT_NE(other.err.find("suite"), std::string::npos) << other.err;
 }

@@ -36,7 +36,9 @@ class SmallDisk {
     if (is_there_) ::umount2(at_.c_str(), MNT_DETACH);
   }
   bool is_there() const { return is_there_; }
-  bool Remount(unsigned long flags, const char* options) { return ::mount("tmpfs", at_.c_str(), "tmpfs", MS_REMOUNT | flags, options) == 0; }
+  bool Remount(unsigned long flags, const char* options) {
+    return ::mount("tmpfs", at_.c_str(), "tmpfs", MS_REMOUNT | flags, options) == 0;
+  }
 
  private:
   fs::path at_;
@@ -68,7 +70,8 @@ TEST(Storage, AFullDiskEndsTheRunWithOneMessageAndNoEpisodeIsBlamedForIt) {
   }
   ASSERT_TRUE(disk.Remount(0, "size=64m"));  // room again
   const pid_t goes_on = StartCommand(RunWords(kFaults, run, {"initial_states.count=200", "lanes=2"}), folder / "log");
-  EXPECT_TRUE(WaitUntil([&] { return Store::Open(run, Store::Mode::kReadOnly).Episodes().size() > stored.size() + 2; }));
+  EXPECT_TRUE(
+      WaitUntil([&] { return Store::Open(run, Store::Mode::kReadOnly).Episodes().size() > stored.size() + 2; }));
   ::kill(goes_on, SIGTERM);
   ::waitpid(goes_on, nullptr, 0);
 }
@@ -130,7 +133,7 @@ std::string Half(const std::string& bytes) { return bytes.substr(0, bytes.size()
 fs::path MakeRecording(const fs::path& folder, const std::string& file) {
   const bool is_example = file.ends_with(".png") || file.ends_with(".npy");
   if (!is_example) {
-    SyntheticClip(20).Write(OneFolder(folder));
+    SyntheticClip(10).Write(OneFolder(folder));
     return folder;
   }
   const fs::path shared = fs::path(EVAC_SHARED_DIR) / "data/agibot_examples/example0";
@@ -145,25 +148,27 @@ TEST_P(SpoiledRecording, EndsTheRunWithOneMessageThatNamesTheFile) {
   if (recording.empty()) GTEST_SKIP() << "the AgiBot examples are not here";
   const fs::path file = recording / GetParam().file;
   WriteText(file, GetParam().spoil(ReadFile(file)));
-  const CommandResult result =
-      RunCommand(RunWords(EVAC_SOURCE_DIR "/apps/configs/agibot_replay.yaml", folder / "run", {"recording=" + recording.string()}));
+  const CommandResult result = RunCommand(RunWords(EVAC_SOURCE_DIR "/apps/configs/agibot_replay.yaml", folder / "run",
+                                                   {"recording=" + recording.string()}));
   EXPECT_EQ(result.exit_code, 2) << result.err;
   EXPECT_THAT(result.err, AllOf(HasSubstr(GetParam().file), HasSubstr(GetParam().wanted)));
   EXPECT_EQ(Lines(result.err, "evac: "), 1) << result.err;
   EXPECT_EQ(fs::exists(folder / "run") ? List(folder / "run") : "[]\n", "[]\n");
 }
 
-INSTANTIATE_TEST_SUITE_P(
-    Each, SpoiledRecording,
-    testing::Values(Spoiled{"TruncatedPng", "frame.png", "", Half}, Spoiled{"TruncatedNpy", "action.npy", "", Half},
-                    Spoiled{"TruncatedH5", "proprio_stats.h5", "", Half}, Spoiled{"TruncatedMp4", "head_color.mp4", "", Half},
-                    Spoiled{"WrongExtrinsics", "head_extrinsic_params_aligned.json", "rotation",
-                            [](std::string page) {
-                              const std::size_t at = page.find("rotation_matrix");
-                              const std::size_t number = page.find_first_of("-0123456789", at);
-                              return page.replace(number, page.find_first_of(",]", number) - number, "7.5");
-                            }}),
-    [](const testing::TestParamInfo<Spoiled>& info) { return info.param.name; });
+INSTANTIATE_TEST_SUITE_P(Each, SpoiledRecording,
+                         testing::Values(Spoiled{"TruncatedPng", "frame.png", "", Half},
+                                         Spoiled{"TruncatedNpy", "action.npy", "", Half},
+                                         Spoiled{"TruncatedH5", "proprio_stats.h5", "", Half},
+                                         Spoiled{"TruncatedMp4", "head_color.mp4", "", Half},
+                                         Spoiled{"WrongExtrinsics", "head_extrinsic_params_aligned.json", "rotation",
+                                                 [](std::string page) {
+                                                   const std::size_t at = page.find("rotation_matrix");
+                                                   const std::size_t number = page.find_first_of("-0123456789", at);
+                                                   return page.replace(
+                                                       number, page.find_first_of(",]", number) - number, "7.5");
+                                                 }}),
+                         [](const testing::TestParamInfo<Spoiled>& info) { return info.param.name; });
 
 }  // namespace
 }  // namespace evac

@@ -32,22 +32,26 @@ std::string BlockOfPage(const std::string& language, const std::string& containi
 
 TEST(WrittenPolicies, TheOneInCppRuns) {  // the build made it of the page
   const TempFolder folder;
-  const CommandResult result = RunCommand(
-      RunWords(kFaults, folder / "run", {"policies.0={name: wander, checkpoint: v1, command: [wander]}", "initial_states.count=1", "still={enabled: false}"}));
+  const CommandResult result = RunCommand(RunWords(kFaults, folder / "run",
+                                                   {"policies.0={name: wander, checkpoint: v1, command: [wander]}",
+                                                    "initial_states.count=1", "still={enabled: false}"}));
   EXPECT_EQ(result.exit_code, 0) << result.err;
   EXPECT_EQ(nlohmann::json::parse(List(folder / "run"))[0]["stop"], "max_chunks");
 }
 
 TEST(WrittenPolicies, TheOneInPythonRunsItsTasksByThePagesOwnCommands) {
   const TempFolder folder;
-  for (const char* part : {"worldmodel", "policies"}) fs::create_directory_symlink(fs::path(EVAC_SOURCE_DIR) / part, folder / part);
+  for (const char* part : {"worldmodel", "policies"})
+    fs::create_directory_symlink(fs::path(EVAC_SOURCE_DIR) / part, folder / part);
   WriteText(folder / "wander/wander.py", BlockOfPage("python", "# wander.py"));
   WriteText(folder / "wander/wander.yaml", BlockOfPage("yaml", "# wander.yaml"));
   const std::string commands = BlockOfPage("bash", "pip install lcm");
-  const std::string path = fmt::format("export PATH={}:$PATH\ncd {}\n", fs::path(Binary("evac")).parent_path().string(), folder.path().string());
+  const std::string path = fmt::format("export PATH={}:$PATH\ncd {}\n", fs::path(Binary("evac")).parent_path().string(),
+                                       folder.path().string());
   const CommandResult tried = RunCommand({"/bin/bash", "-ec", path + commands.substr(0, commands.find("lcm-gen"))});
   if (tried.exit_code != 0) GTEST_SKIP() << "Python's LCM bindings cannot be had here: " << tried.err;
-  const CommandResult result = RunCommand({"/bin/bash", "-ec", path + "cd wander\n" + commands.substr(commands.find("lcm-gen"))});
+  const CommandResult result =
+      RunCommand({"/bin/bash", "-ec", path + "cd wander\n" + commands.substr(commands.find("lcm-gen"))});
   ASSERT_EQ(result.exit_code, 0) << result.err;
   const auto episodes = nlohmann::json::parse(List(folder / "wander/out"));
   EXPECT_EQ(episodes.size(), 4u) << "every task that comes with evac, once";
