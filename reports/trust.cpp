@@ -187,17 +187,21 @@ void AddBias(const Paired& paired, double confidence, TaskTrust& task) {
   task.bias.n = task.pairs.n();
   if (effective.pairs < task.pairs.n()) task.bias.method = fmt::format("Tango on {} effective pairs", effective.pairs);
   task.test = McNemarExact(effective.flips);
+  task.effective_pairs = effective.pairs;
 }
 
-/// From how many pairs on the bias's interval would no longer reach the margin it is nearest to.
-Defined<std::int64_t> MorePairs(const BothWorlds& pairs, const TrustOptions& options) {
+/// From how many pairs on the bias's interval would no longer reach the margin it is nearest to; a further pair is
+/// taken to tell as much as those there are.
+Defined<std::int64_t> MorePairs(const TaskTrust& task, const TrustOptions& options) {
+  const BothWorlds& pairs = task.pairs;
   if (pairs.n() == 0) return Undefined{"no pair to plan from"};
-  const double n = static_cast<double>(pairs.n());
+  const double n = static_cast<double>(pairs.n()), effective = static_cast<double>(task.effective_pairs);
   const double bias = static_cast<double>(pairs.only_model - pairs.only_real) / n;
   const double distance = std::abs(options.margin - std::abs(bias)), z = TwoSidedZ(options.confidence);
   if (distance < 0.005) return Undefined{"the bias seen is at the margin"};
-  const double variance = (static_cast<double>(pairs.discordant()) + 1) / (n + 1) - bias * bias;
-  const double wanted = std::ceil(z * z * variance / (distance * distance));
+  const double flips = static_cast<double>(pairs.discordant()) * effective / n;
+  const double variance = (flips + 1) / (effective + 1) - bias * bias;
+  const double wanted = std::ceil(z * z * variance / (distance * distance) * n / effective);
   return std::max<std::int64_t>(1, static_cast<std::int64_t>(wanted) - pairs.n());
 }
 
@@ -207,7 +211,7 @@ void Decide(const TrustOptions& options, TaskTrust& task) {
     if (-options.margin <= low && high <= options.margin) task.trust = Trust::kYes;
     if (low > options.margin || high < -options.margin) task.trust = Trust::kNo;
   }
-  if (task.trust == Trust::kUnknown) task.more = MorePairs(task.pairs, options);
+  if (task.trust == Trust::kUnknown) task.more = MorePairs(task, options);
 }
 
 TaskTrust TrustTask(const std::string& name, const ByState& real, const ByState& model, const TrustInput& input,

@@ -57,13 +57,14 @@ struct PredictedRate {
 
 struct TaskTrust {
   std::string task;
-  BothWorlds pairs;               ///< over all policies
-  Estimate real, model;           ///< rates over the pairs
-  Estimate bias;                  ///< model - real over the pairs, Tango
-  McNemar test;                   ///< of "no bias"
-  ConfusionStatistics agreement;  ///< the model as judge of what the robot would do: kappa
-  Estimate same;                  ///< share of pairs with one outcome
-  Estimate correlation;           ///< Pearson over policies, undefined below kMinTrustPolicies
+  std::int64_t effective_pairs = 0;  ///< what `pairs` tell as much as: repeats and shared states considered
+  BothWorlds pairs;                  ///< over all policies
+  Estimate real, model;              ///< rates over the pairs
+  Estimate bias;                     ///< model - real over the pairs, Tango
+  McNemar test;                      ///< of "no bias"
+  ConfusionStatistics agreement;     ///< the model as judge of what the robot would do: kappa
+  Estimate same;                     ///< share of pairs with one outcome
+  Estimate correlation;              ///< Pearson over policies, undefined below kMinTrustPolicies
   Trust trust = Trust::kUnknown;
   Defined<std::int64_t> more = Undefined{"decided"};  ///< further pairs that would decide, if the bias is that seen
   std::vector<PredictedRate> policies;

@@ -93,6 +93,7 @@ Json PolicyJson(const PredictedRate& rate) {
 Json TaskJson(const TaskTrust& task, const TrustReport& report) {
   Json json = {{"task", task.task}, {"trust", Name(task.trust)}, {"statement", TrustStatement(task, report)}};
   json["n"] = task.pairs.n();
+  json["effective_pairs"] = task.effective_pairs;
   json["pairs"] = {{"both", task.pairs.both},
                    {"real_only", task.pairs.only_real},
                    {"model_only", task.pairs.only_model},

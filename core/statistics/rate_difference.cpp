@@ -111,7 +111,7 @@ PairedOutcomes EffectivePairs(std::span<const PairedOutcomes> clusters) {
   const double design_effect = spread > 0 ? std::max(1.0, groups / (groups - 1) * residuals / spread) : n / groups;
   const auto shrunk = [&](std::int64_t count) { return std::llround(static_cast<double>(count) / design_effect); };
   const Flips flips{shrunk(total.flips.only_first), shrunk(total.flips.only_second)};
-  return {flips, std::max<std::int64_t>(shrunk(total.pairs), flips.only_first + flips.only_second)};
+  return {flips, std::max<std::int64_t>({1, shrunk(total.pairs), flips.only_first + flips.only_second})};
 }
 
 Estimate BonettPriceDifference(const PairedOutcomes& outcomes, double confidence) {

@@ -1,0 +1,145 @@
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <fstream>
+#include <nlohmann/json.hpp>
+
+#include "apps/commands.h"
+#include "core/store.h"
+#include "tests/core/store_samples.h"
+#include "tests/support/temp_folder.h"
+
+namespace evac {
+namespace {
+
+using namespace samples;
+using testing::HasSubstr;
+
+/// A run with two checkpoints in two worlds: "good" always succeeds, "poor" never, and sim agrees with real.
+class Deciding : public testing::Test {
+ protected:
+  Deciding() {
+    Store store = Store::CreateOrContinue(Run(), SomeRun());
+    Declare(store);
+    store.AddPolicy({"visual_pick", "poor", "{}"});
+    for (int state = 0; state < 10; ++state) {
+      for (const char* checkpoint : {"good", "poor"}) {
+        for (const char* world : {"real", "sim"}) Add(store, state, checkpoint, world);
+      }
+    }
+  }
+
+  static void Add(Store& store, int state, const std::string& checkpoint, const std::string& world) {
+    EpisodeKey key = Key(1, world);
+    key.pair.initial_state = "41-000" + std::to_string(state);
+    key.pair.checkpoint = checkpoint;
+    EpisodeRecord record;
+    record.episode.key = key;
+    record.episode.stop = StopReason::kStill;
+    store.Add(record);
+    Verdict verdict;
+    verdict.episode_id = key.Id();
+    verdict.judge = "oracle";
+    verdict.label = checkpoint == "good" ? Label::kSuccess : Label::kFailure;
+    store.AddVerdict(verdict);
+  }
+
+  std::string Run() const { return (folder_ / "run").string(); }
+
+  /// What the command prints; its exceptions come through.
+  std::string Print(void (*add)(CLI::App&, ExitCode&), std::vector<std::string> words) const {
+    CLI::App app;
+    ExitCode exit_code = ExitCode::kInternal;
+    add(app, exit_code);
+    std::reverse(words.begin(), words.end());  // as CLI11 wants them
+    testing::internal::CaptureStdout();
+    try {
+      app.parse(words);
+    } catch (...) {
+      testing::internal::GetCapturedStdout();
+      throw;
+    }
+    EXPECT_EQ(exit_code, ExitCode::kOk);
+    return testing::internal::GetCapturedStdout();
+  }
+
+  std::string Compare(std::vector<std::string> options) const {
+    options.insert(options.begin(), {"compare", "visual_pick@good", "visual_pick@poor", "--run", Run()});
+    return Print(AddCompare, options);
+  }
+
+  std::string Csv(const std::string& rows) const {
+    const std::filesystem::path file = folder_ / "trials.csv";
+    std::ofstream(file) << "task,initial_state,policy,checkpoint,outcome,video\n" << rows;
+    return file.string();
+  }
+
+  const TempFolder folder_;
+};
+
+TEST_F(Deciding, CompareNamesTheBetterPolicyInEveryWorld) {
+  const std::string text = Compare({});
+  EXPECT_THAT(text, HasSubstr("World real, judge oracle. visual_pick@good is better"));
+  EXPECT_THAT(text, HasSubstr("World sim, judge oracle. visual_pick@good is better"));
+  const auto json = nlohmann::json::parse(Compare({"--world", "sim", "--json"}));
+  ASSERT_EQ(json.at("worlds").size(), 1u);
+  EXPECT_EQ(json.at("worlds").at(0).at("winner"), "first");
+}
+
+TEST_F(Deciding, ComparedRunsMayBeFoldersOfTheirOwn) {
+  const std::string a = Run() + ":visual_pick@good", b = Run() + ":visual_pick@poor";
+  EXPECT_THAT(Print(AddCompare, {"compare", a, b, "--world", "sim"}), HasSubstr("visual_pick@good is better"));
+  EXPECT_THROW(Print(AddCompare, {"compare", a, a}), Error) << "against itself";
+  EXPECT_THROW(Print(AddCompare, {"compare", Run(), b}), Error) << "a run with several policies";
+  EXPECT_THROW(Print(AddCompare, {"compare", "visual_pick@good", b}), Error) << "no folder";
+  EXPECT_THROW(Compare({"--world", "moon"}), Error);
+  EXPECT_THROW(Compare({"--judge", "nobody"}), Error);
+}
+
+TEST_F(Deciding, SequentialLooksAreKeptAndTheSameDataAreNoNewLook) {
+  Compare({"--world", "sim", "--sequential"});
+  const auto again = nlohmann::json::parse(Compare({"--world", "sim", "--sequential", "--json"}));
+  const auto bet = again.at("worlds").at(0).at("sequential").at(0);
+  EXPECT_EQ(bet.at("looks"), 1);
+  EXPECT_GT(bet.at("e_value").get<double>(), 20);
+  EXPECT_EQ(Store::Open(Run(), Store::Mode::kReadOnly).Looks().size(), 1u);
+}
+
+TEST_F(Deciding, ImportedTrialsAreWhatAWorldIsHeldAgainst) {
+  EXPECT_THAT(Print(AddTrust, {"trust", Run()}), HasSubstr("Held against the world real"));
+  std::ofstream(folder_ / "clip.mp4") << "video";
+  const std::string csv =
+      Csv("take_bottle,41-0000,visual_pick,good,success,clip.mp4\n"
+          "take_bottle,41-0001,visual_pick,good,failure,\n");
+  EXPECT_THAT(Print(AddImportReal, {"import-real", csv, "--run", Run()}), HasSubstr("2 real trials imported"));
+  EXPECT_THAT(Print(AddImportReal, {"import-real", csv, "--run", Run()}), HasSubstr("2 there already"));
+  const Store store = Store::Open(Run(), Store::Mode::kReadOnly);
+  ASSERT_EQ(store.RealTrials().size(), 2u);
+  EXPECT_TRUE(std::filesystem::is_regular_file(store.folder() / store.RealTrials()[0].video));
+  const auto task =
+      nlohmann::json::parse(Print(AddTrust, {"trust", Run(), "--json"})).at("worlds").at(0).at("tasks").at(0);
+  EXPECT_EQ(task.at("n"), 2);
+  EXPECT_EQ(task.at("pairs").at("model_only"), 1);
+  EXPECT_EQ(task.at("policies").at(0).at("further_imagined").at("trials"), 8);
+}
+
+TEST_F(Deciding, AWrongFileImportsNothing) {
+  EXPECT_THROW(Print(AddImportReal, {"import-real", Csv("take_bottle,41-0000,visual_pick,good,success,missing.mp4\n"),
+                                     "--run", Run()}),
+               Error);
+  EXPECT_THROW(Print(AddImportReal, {"import-real",
+                                     Csv("take_bottle,41-0000,visual_pick,good,success,\n"
+                                         "take_bottle,41-0000,visual_pick,good,perhaps,\n"),
+                                     "--run", Run()}),
+               Error);
+  EXPECT_TRUE(Store::Open(Run(), Store::Mode::kReadOnly).RealTrials().empty());
+}
+
+TEST_F(Deciding, APlanNeedsNoRun) {
+  EXPECT_THAT(Print(AddPlan, {"plan", "--rate", "0.28", "--difference", "0.08"}), HasSubstr("533 episodes of each"));
+  EXPECT_EQ(nlohmann::json::parse(Print(AddPlan, {"plan", "--json"})).at("options").at("trials"), 40);
+  EXPECT_THROW(Print(AddPlan, {"plan", "--rate", "2"}), Error);
+}
+
+}  // namespace
+}  // namespace evac
