@@ -40,6 +40,14 @@ class Descriptor {
   int file_;
 };
 
+std::size_t ClaimedBytes(const HeaderEntry& entry, const std::string& file) {
+  try {
+    return entry.ByteCount();
+  } catch (const TensorError& error) {
+    throw TensorError(file + ": " + error.what());
+  }
+}
+
 void SyncFolderOf(const fs::path& path) {
   const fs::path folder = path.parent_path().empty() ? fs::path(".") : path.parent_path();
   const Descriptor file(::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));
@@ -121,9 +129,9 @@ void TensorFile::ReadHeader() {
   std::size_t at = 0;
   for (HeaderEntry& entry : header.entries) {
     if (entry.begin != at || entry.end < entry.begin || entry.end > data.size() ||
-        entry.end - entry.begin != entry.ByteCount()) {
+        entry.end - entry.begin != ClaimedBytes(entry, name_)) {
       throw TensorError(name_ + ": tensor '" + entry.name + "' claims bytes " + std::to_string(entry.begin) + " to " +
-                        std::to_string(entry.end) + ", wanted " + std::to_string(entry.ByteCount()) +
+                        std::to_string(entry.end) + ", wanted " + std::to_string(ClaimedBytes(entry, name_)) +
                         " bytes from byte " + std::to_string(at) + " of " + std::to_string(data.size()));
     }
     at = entry.end;

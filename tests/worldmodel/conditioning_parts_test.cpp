@@ -125,7 +125,7 @@ TEST(RayMap, EachRayIsTheOneThatAnIndependentProjectionSendsBack) {
 }
 
 TEST(ActionDelta, AnglesGoTheShortWayRound) {
-  const auto yawed = [](double yaw) { return PoseAt({}, Eigen::Quaterniond(Eigen::AngleAxisd(yaw, Eigen::Vector3d::UnitZ()))); };
+  const auto yawed = [](double yaw) { return PoseAt(Eigen::Vector3d::Zero(), Eigen::Quaterniond(Eigen::AngleAxisd(yaw, Eigen::Vector3d::UnitZ()))); };
   const ActionDelta delta = DeltaBetween({yawed(3.1), yawed(0)}, {yawed(-3.1), yawed(0.2)});
   EXPECT_NEAR(delta[5], 2 * kPi - 6.2, 1e-12);
   EXPECT_NEAR(delta[12], 0.2, 1e-12);
@@ -166,7 +166,8 @@ TEST(ChunkPlan, EveryDeltaIsUsedOnceInItsOwnChunk) {
     EXPECT_THAT(plan.rows, SizeIs(8));
     EXPECT_THAT(plan.deltas, SizeIs(4));
     for (const auto& delta : plan.deltas) {
-      if (delta) EXPECT_EQ(*delta, next++);
+      if (!delta) continue;
+      EXPECT_EQ(*delta, next++);
     }
   }
   EXPECT_EQ(next, 14u);

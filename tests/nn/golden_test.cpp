@@ -1,0 +1,80 @@
+#include <gtest/gtest.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <array>
+#include <cstdio>
+#include <filesystem>
+#include <fstream>
+#include <string>
+
+#include "core/tensor_file.h"
+
+namespace evac {
+namespace {
+
+namespace fs = std::filesystem;
+
+struct Answer {
+  std::string output;
+  int exit_code = -1;
+};
+
+Answer RunCheck(const fs::path& folder) {
+  const std::string command = std::string(EVAC_BIN_DIR) + "/evac_golden_check '" + folder.string() + "' 2>&1";
+  Answer answer;
+  FILE* pipe = ::popen(command.c_str(), "r");
+  std::array<char, 4096> buffer{};
+  while (std::size_t count = std::fread(buffer.data(), 1, buffer.size(), pipe))
+    answer.output.append(buffer.data(), count);
+  answer.exit_code = WEXITSTATUS(::pclose(pipe));
+  return answer;
+}
+
+const fs::path kGolden = fs::path(EVAC_SHARED_DIR) / "data/evac_golden";
+
+TEST(GoldenCheck, EveryFileOfTheReferenceAgrees) {
+  if (!fs::exists(kGolden)) GTEST_SKIP() << kGolden << " is not there";
+  const Answer answer = RunCheck(kGolden);
+  EXPECT_EQ(answer.exit_code, 0) << answer.output;
+  EXPECT_NE(answer.output.find("19 passed, 0 failed, 0 skipped\n"), std::string::npos) << answer.output;
+}
+
+class OddFolder : public testing::Test {
+ protected:
+  void SetUp() override { fs::create_directories(folder_); }
+  void TearDown() override { fs::remove_all(folder_); }
+  fs::path folder_ = fs::temp_directory_path() / ("golden_check_" + std::to_string(::getpid()));
+};
+
+TEST_F(OddFolder, AFileOfAnUnknownKindIsSkippedAndThatIsNoSuccess) {
+  const float number = 1;
+  const TensorView tensor{{"something", TensorType::kF32, {1}}, std::as_bytes(std::span(&number, 1))};
+  WriteTensorFile(folder_ / "odd.safetensors", std::span(&tensor, 1), {});
+  const Answer answer = RunCheck(folder_);
+  EXPECT_EQ(answer.exit_code, 1);
+  EXPECT_NE(answer.output.find("0 passed, 0 failed, 1 skipped\n"), std::string::npos) << answer.output;
+}
+
+TEST_F(OddFolder, AChangedNumberFails) {
+  if (!fs::exists(kGolden)) GTEST_SKIP() << kGolden << " is not there";
+  const TensorFile file = TensorFile::Open(kGolden / "raymaps.safetensors");
+  std::vector<TensorView> tensors = file.tensors();
+  std::vector<std::byte> changed(tensors.back().bytes.begin(), tensors.back().bytes.end());
+  changed[changed.size() - 2] ^= std::byte{0x40};
+  tensors.back().bytes = changed;
+  WriteTensorFile(folder_ / "raymaps.safetensors", tensors, file.metadata());
+  const Answer answer = RunCheck(folder_);
+  EXPECT_EQ(answer.exit_code, 1);
+  EXPECT_NE(answer.output.find("0 passed, 1 failed, 0 skipped\n"), std::string::npos) << answer.output;
+}
+
+TEST_F(OddFolder, ATruncatedFileFailsByName) {
+  std::ofstream(folder_ / "cut.safetensors") << "short";
+  const Answer answer = RunCheck(folder_);
+  EXPECT_EQ(answer.exit_code, 1);
+  EXPECT_NE(answer.output.find("cut.safetensors: cut off"), std::string::npos) << answer.output;
+}
+
+}  // namespace
+}  // namespace evac

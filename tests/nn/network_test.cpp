@@ -1,0 +1,145 @@
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "tests/nn/support.h"
+#include "worldmodel/nn/attention.h"
+#include "worldmodel/nn/imagine.h"
+
+namespace evac::nn {
+namespace {
+
+using testing::HasSubstr;
+using testing::ThrowsMessage;
+
+class Network : public testing::Test {
+ protected:
+  Network() : model_(weights_, TinyConfig()) {}
+
+  /// One call of the denoiser for some scenes and views, from the seeds of its rows.
+  Tensor Denoised(const std::vector<std::uint64_t>& row_seeds, std::int64_t views) const {
+    std::vector<Tensor> x, tokens;
+    for (const std::uint64_t seed : row_seeds) {
+      x.push_back(Noise({1, 19, 5, 8, 12}, seed));
+      tokens.push_back(Noise({1, 7, 32}, 1000 + seed / 10 * 10));  // the ten seeds of a scene share their actions
+    }
+    const auto scenes = static_cast<std::int64_t>(row_seeds.size()) / views;
+    const auto constant = [](std::int64_t count, std::int64_t value) { return at::full({count}, value, at::kLong); };
+    const PreparedContext context =
+        model_.unet().Prepare({at::cat(tokens, 0), constant(scenes, 2), constant(scenes, 11), views});
+    return model_.unet()({at::cat(x, 0), constant(scenes * views, 481), views, 2}, context);
+  }
+
+  at::NoGradGuard no_gradients_;
+  HashWeights weights_;
+  EvacModel model_;
+};
+
+TEST_F(Network, PermutingViewsPermutesItsAnswers) {
+  const Tensor straight = Denoised({10, 11, 12}, 3), turned = Denoised({12, 10, 11}, 3);
+  EXPECT_LT(LargestDifference(turned, at::stack({straight[2], straight[0], straight[1]})), 2e-5);
+  EXPECT_GT(LargestDifference(turned, straight), 1e-2) << "views that all answer alike would pass too";
+}
+
+TEST_F(Network, ViewsSeeEachOther) {
+  EXPECT_GT(LargestDifference(Denoised({10, 11}, 2)[0], Denoised({10, 13}, 2)[0]), 1e-4);
+}
+
+TEST_F(Network, ThreeScenesTogetherAreThreeAlone) {
+  const Tensor together = Denoised({10, 20, 30}, 1);
+  for (const int i : {0, 1, 2}) {
+    const Tensor alone = Denoised({static_cast<std::uint64_t>(10 * (i + 1))}, 1)[0];
+    EXPECT_LT(LargestDifference(together[i], alone), 5e-6) << i;
+  }
+}
+
+TEST_F(Network, AnswersTheSameBitsTwice) { EXPECT_TRUE(Denoised({10, 20}, 1).equal(Denoised({10, 20}, 1))); }
+
+TEST_F(Network, TheOrderOfActionsIsInvisibleToIt) {
+  const Tensor deltas = Noise({1, 3, 14}, 3);
+  const Tensor turned = deltas.index_select(1, at::tensor({2, 0, 1}));
+  EXPECT_LT(LargestDifference(model_.ActionTokens(deltas), model_.ActionTokens(turned)), 1e-5);
+}
+
+TEST_F(Network, TheCodecTakesAwayItsStrideAndGivesItBack) {
+  const Tensor images = Noise({3, 3, 16, 24}, 1);
+  const Tensor latents = EncodeImages(model_, images, {});
+  EXPECT_EQ(latents.sizes(), (at::IntArrayRef{3, 4, 8, 12}));
+  EXPECT_EQ(DecodeLatents(model_, latents).sizes(), images.sizes());
+}
+
+ChunkRequest Request(std::int64_t scenes) {
+  const std::int64_t rows = scenes;
+  return {Noise({rows, 4, 2, 8, 12}, 1), Noise({rows, 3, 16, 24}, 2),   Noise({rows, 4, 3, 8, 12}, 3),
+          Noise({rows, 3, 5, 8, 12}, 4), Noise({rows, 3, 5, 8, 12}, 5), Noise({scenes, 3, 14}, 6)};
+}
+
+TEST_F(Network, GuidanceLeavesActionsMapsAndRaysAndTakesTheImageAway) {
+  const ChunkRequest request = Request(2);
+  const Conditioning with = Condition(model_, request), without = Unconditioned(model_, request, with);
+  EXPECT_TRUE(with.concat.pose_map.equal(without.concat.pose_map));
+  EXPECT_TRUE(with.concat.direction.equal(without.concat.direction));
+  EXPECT_TRUE(with.tokens.narrow(1, 4, 3).equal(without.tokens.narrow(1, 4, 3)));
+  EXPECT_FALSE(with.tokens.narrow(1, 0, 4).equal(without.tokens.narrow(1, 0, 4)));
+  EXPECT_EQ(without.concat.mask.narrow(2, 2, 3).abs().sum().item<double>(), 0);
+  EXPECT_TRUE(without.concat.image.narrow(2, 0, 2).equal(request.memory));
+  EXPECT_EQ(with.concat.pose_map.narrow(2, 0, 2).abs().sum().item<double>(), 0);
+}
+
+TEST_F(Network, AChunkStartsWithItsMemoryUntouched) {
+  const ChunkRequest request = Request(1);
+  for (const Solver solver : {Solver::kDdim, Solver::kDpmSolver}) {
+    ImagineOptions options;
+    options.solver = solver;
+    options.steps = 3;
+    const Tensor latents = ImagineChunk(model_, request,
+                                        {Noise({1, 4, 3, 8, 12}, 7),
+                                         [] {
+                                           return Noise({1, 4, 5, 8, 12}, 8);
+                                         }},
+                                        options);
+    EXPECT_EQ(latents.sizes(), (at::IntArrayRef{1, 4, 5, 8, 12}));
+    EXPECT_TRUE(latents.narrow(2, 0, 2).equal(request.memory));
+    EXPECT_TRUE(latents.isfinite().all().item<bool>());
+  }
+}
+
+TEST(Attention, TiledIsPlain) {
+  const at::NoGradGuard no_gradients;
+  for (const auto& [length, context, heads, width] :
+       {std::array<std::int64_t, 4>{1, 1, 1, 8}, {7, 3, 2, 32}, {130, 257, 3, 48}, {600, 600, 2, 128}}) {
+    const Tensor q = Noise({2, length, width}, 1) * 3, k = Noise({2, context, width}, 2),
+                 v = Noise({2, context, width}, 3);
+    EXPECT_LT(LargestDifference(Attention(q, k, v, heads), PlainAttention(q, k, v, heads)), 1e-5) << length;
+  }
+}
+
+TEST(Attention, OverTimeIsAttentionOfEachPixel) {
+  const at::NoGradGuard no_gradients;
+  const Tensor q = Noise({2, 5, 3, 32}, 1), k = Noise({2, 5, 3, 32}, 2), v = Noise({2, 5, 3, 32}, 3);
+  const Tensor all = TemporalAttention(q, k, v, 2);
+  for (const std::int64_t pixel : {0, 1, 2}) {
+    const Tensor one = PlainAttention(q.select(2, pixel), k.select(2, pixel), v.select(2, pixel), 2);
+    EXPECT_LT(LargestDifference(all.select(2, pixel), one), 2e-6);
+  }
+}
+
+TEST(CausalConv, SeesNothingOfTheFuture) {
+  HashWeights weights;
+  const CausalConv conv(Scope(weights, "conv"), 32);
+  const Tensor x = Noise({1, 6, 4, 32}, 1);
+  Tensor changed = x.clone();
+  changed.narrow(1, 4, 2).add_(1);
+  const Tensor before = conv(x), after = conv(changed);
+  EXPECT_TRUE(before.narrow(1, 0, 4).equal(after.narrow(1, 0, 4)));
+  EXPECT_FALSE(before[0][4].equal(after[0][4]));
+}
+
+TEST(ModelConfig, ImageSidesThatTheLevelsDoNotDivideAreRefusedByName) {
+  ModelConfig config = TinyConfig();
+  config.image_width_px = 26;
+  EXPECT_THAT([&] { config.Check(); },
+              ThrowsMessage<TensorError>(HasSubstr("image width is 26, wanted a multiple of 4")));
+}
+
+}  // namespace
+}  // namespace evac::nn
