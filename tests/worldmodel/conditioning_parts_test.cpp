@@ -26,7 +26,8 @@ GripperPose PoseAt(const Eigen::Vector3d& xyz_m, const Eigen::Quaterniond& rotat
 Eigen::Isometry3d BaseFromCamera() {
   Eigen::Isometry3d pose = Eigen::Isometry3d::Identity();
   pose.translation() = Eigen::Vector3d(0.4, -0.1, 0.2);
-  pose.linear() = (Eigen::AngleAxisd(0.3, Eigen::Vector3d::UnitY()) * Eigen::AngleAxisd(-0.2, Eigen::Vector3d::UnitX())).toRotationMatrix();
+  pose.linear() = (Eigen::AngleAxisd(0.3, Eigen::Vector3d::UnitY()) * Eigen::AngleAxisd(-0.2, Eigen::Vector3d::UnitX()))
+                      .toRotationMatrix();
   return pose;
 }
 
@@ -86,7 +87,8 @@ TEST(PoseMap, AGripperBehindTheCameraIsDrawnOnlyWithTheQuirkDrawBehindCamera) {
 
 TEST(PoseMap, AnAxisThatEndsInTheCameraPlaneNeitherThrowsNorVanishes) {
   for (const double z : {-0.13, -0.23, -0.33, -0.2299999, 0.1, 1e30}) {
-    const DrawnGripper gripper = Drawn(Side::kLeft, PoseAt({0, 0, z}, Eigen::Quaterniond(Eigen::AngleAxisd(kPi / 2, Eigen::Vector3d::UnitX()))));
+    const DrawnGripper gripper =
+        Drawn(Side::kLeft, PoseAt({0, 0, z}, Eigen::Quaterniond(Eigen::AngleAxisd(kPi / 2, Eigen::Vector3d::UnitX()))));
     for (const bool behind : {false, true}) {
       PoseMapOptions options;
       options.draw_behind_camera = behind;
@@ -116,7 +118,8 @@ TEST(RayMap, EachRayIsTheOneThatAnIndependentProjectionSendsBack) {
   EXPECT_TRUE(rays.origin.cast<double>().isApprox(base_from_camera.translation(), 1e-6));
   for (const auto& [x, y] : {std::pair(0, 0), std::pair(63, 39), std::pair(17, 30)}) {
     Eigen::Vector3d direction;
-    for (int axis = 0; axis < 3; ++axis) direction[axis] = rays.direction[static_cast<std::size_t>((axis * 40 + y) * 64 + x)];
+    for (int axis = 0; axis < 3; ++axis)
+      direction[axis] = rays.direction[static_cast<std::size_t>((axis * 40 + y) * 64 + x)];
     EXPECT_NEAR(direction.norm(), 1, 1e-6);
     const Eigen::Vector3d in_camera = base_from_camera.inverse() * (base_from_camera.translation() + 2 * direction);
     EXPECT_NEAR(30 * in_camera.x() / in_camera.z() + 32, x + 0.5, 1e-4);
@@ -125,7 +128,9 @@ TEST(RayMap, EachRayIsTheOneThatAnIndependentProjectionSendsBack) {
 }
 
 TEST(ActionDelta, AnglesGoTheShortWayRound) {
-  const auto yawed = [](double yaw) { return PoseAt(Eigen::Vector3d::Zero(), Eigen::Quaterniond(Eigen::AngleAxisd(yaw, Eigen::Vector3d::UnitZ()))); };
+  const auto yawed = [](double yaw) {
+    return PoseAt(Eigen::Vector3d::Zero(), Eigen::Quaterniond(Eigen::AngleAxisd(yaw, Eigen::Vector3d::UnitZ())));
+  };
   const ActionDelta delta = DeltaBetween({yawed(3.1), yawed(0)}, {yawed(-3.1), yawed(0.2)});
   EXPECT_NEAR(delta[5], 2 * kPi - 6.2, 1e-12);
   EXPECT_NEAR(delta[12], 0.2, 1e-12);
@@ -133,9 +138,11 @@ TEST(ActionDelta, AnglesGoTheShortWayRound) {
 }
 
 TEST(ActionDelta, RollPitchYawRebuildTheRotationAlsoAtGimbalLock) {
-  for (const Eigen::Vector3d& angles : {Eigen::Vector3d(0.3, -0.7, 2.5), Eigen::Vector3d(-3, 1.5, -3), Eigen::Vector3d(0.4, kPi / 2, 0)}) {
+  for (const Eigen::Vector3d& angles :
+       {Eigen::Vector3d(0.3, -0.7, 2.5), Eigen::Vector3d(-3, 1.5, -3), Eigen::Vector3d(0.4, kPi / 2, 0)}) {
     const auto rebuilt = [](const Eigen::Vector3d& rpy) {
-      return Eigen::Quaterniond(Eigen::AngleAxisd(rpy[2], Eigen::Vector3d::UnitZ()) * Eigen::AngleAxisd(rpy[1], Eigen::Vector3d::UnitY()) *
+      return Eigen::Quaterniond(Eigen::AngleAxisd(rpy[2], Eigen::Vector3d::UnitZ()) *
+                                Eigen::AngleAxisd(rpy[1], Eigen::Vector3d::UnitY()) *
                                 Eigen::AngleAxisd(rpy[0], Eigen::Vector3d::UnitX()));
     };
     EXPECT_LT(rebuilt(RollPitchYaw(rebuilt(angles))).angularDistance(rebuilt(angles)), 1e-6);
@@ -143,7 +150,8 @@ TEST(ActionDelta, RollPitchYawRebuildTheRotationAlsoAtGimbalLock) {
 }
 
 TEST(ActionStatistics, TheAgiBotPageHoldsTheBuiltInNumbers) {
-  const ActionStatistics page = ReadActionStatistics(std::filesystem::path(EVAC_SOURCE_DIR) / "apps/configs/robots/agibotworld.yaml");
+  const ActionStatistics page =
+      ReadActionStatistics(std::filesystem::path(EVAC_SOURCE_DIR) / "apps/configs/robots/agibotworld.yaml");
   EXPECT_EQ(page.robot, AgiBotWorldStatistics().robot);
   EXPECT_EQ(page.mean, AgiBotWorldStatistics().mean);
   EXPECT_EQ(page.deviation, AgiBotWorldStatistics().deviation);
@@ -178,7 +186,8 @@ TEST(ChunkPlan, DeltasComeLateAndOneTooManyOnlyWithTheQuirkDeltaWindow) {
   EXPECT_THAT(quirk.deltas, ElementsAre(7, 8, 9, 10, 11));
   EXPECT_THAT(PlanChunk(18, 1, {4, 4, false}).deltas, ElementsAre(4, 5, 6, 7));
   EXPECT_THAT(PlanChunk(18, 2, {4, 4, true}).deltas, SizeIs(3)) << "rows suffice, deltas do not: nothing is filled up";
-  EXPECT_THAT(PlanChunk(18, 3, {4, 4, true}).deltas, ElementsAre(std::nullopt, std::nullopt, std::nullopt, std::nullopt));
+  EXPECT_THAT(PlanChunk(18, 3, {4, 4, true}).deltas,
+              ElementsAre(std::nullopt, std::nullopt, std::nullopt, std::nullopt));
 }
 
 }  // namespace
