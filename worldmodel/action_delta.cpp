@@ -22,8 +22,8 @@ double Wrapped(double angle) {
 BothGrippers GrippersOf(const Arms& arms) {
   if (arms.empty() || arms.size() > 2) throw InvalidInput("{} arms, wanted one or two", arms.size());
   const auto pose = [](const ArmState& arm) {
-    return GripperPose{arm.base_from_gripper.translation(), Eigen::Quaterniond(arm.base_from_gripper.linear()).normalized(),
-                       arm.closure};
+    return GripperPose{arm.base_from_gripper.translation(),
+                       Eigen::Quaterniond(arm.base_from_gripper.linear()).normalized(), arm.closure};
   };
   BothGrippers both;
   if (arms.size() == 2) both[0] = pose(arms.front());
@@ -42,7 +42,8 @@ ActionDelta DeltaBetween(const BothGrippers& before, const BothGrippers& after) 
   ActionDelta delta{};
   for (std::size_t arm = 0; arm < 2; ++arm) {
     const Eigen::Vector3d moved = after[arm].xyz_m - before[arm].xyz_m;
-    const Eigen::Vector3d turned = RollPitchYaw(after[arm].base_from_gripper) - RollPitchYaw(before[arm].base_from_gripper);
+    const Eigen::Vector3d turned =
+        RollPitchYaw(after[arm].base_from_gripper) - RollPitchYaw(before[arm].base_from_gripper);
     for (int i = 0; i < 3; ++i) {
       delta[7 * arm + static_cast<std::size_t>(i)] = moved[i];
       delta[7 * arm + 3 + static_cast<std::size_t>(i)] = Wrapped(turned[i]);

@@ -6,8 +6,8 @@
 
 namespace evac {
 
-/// Mean and standard deviation of a robot's motion from one frame to the next at 30 Hz: left xyz (metres), left roll pitch
-/// yaw (radians), then right.
+/// Mean and standard deviation of a robot's motion from one frame to the next at 30 Hz: left xyz (metres), left roll
+/// pitch yaw (radians), then right.
 struct ActionStatistics {
   std::string robot;
   std::array<double, 12> mean{}, deviation{};

@@ -7,7 +7,8 @@
 namespace evac {
 
 std::vector<std::size_t> SparseMemory(std::size_t frames, std::size_t memory) {
-  if (frames == 0 || memory == 0) throw InvalidInput("a memory of {} out of {} frames, wanted at least 1", memory, frames);
+  if (frames == 0 || memory == 0)
+    throw InvalidInput("a memory of {} out of {} frames, wanted at least 1", memory, frames);
   std::vector<std::size_t> picked;
   for (std::size_t j = 0; j + 1 < memory; ++j) picked.push_back(frames * j / (memory - 1));
   picked.push_back(frames - 1);
@@ -15,7 +16,8 @@ std::vector<std::size_t> SparseMemory(std::size_t frames, std::size_t memory) {
 }
 
 std::size_t ChunkCount(std::size_t rows, const ChunkPlanOptions& options) {
-  if (rows <= options.memory) throw InvalidInput("{} rows of actions, wanted more than the memory of {}", rows, options.memory);
+  if (rows <= options.memory)
+    throw InvalidInput("{} rows of actions, wanted more than the memory of {}", rows, options.memory);
   return (rows - options.memory + options.chunk - 1) / options.chunk;
 }
 

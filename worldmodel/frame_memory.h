@@ -13,8 +13,8 @@ namespace evac {
 /// @returns `memory` indices, newest last; for fewer frames than that some are repeated
 std::vector<std::size_t> SparseMemory(std::size_t frames, std::size_t memory);
 
-/// What one chunk of a long imagination is made of. Rows are those of the action file: row N - 1 is the pose in the last frame
-/// that was given, row N the first to be imagined; frame f shows row f.
+/// What one chunk of a long imagination is made of. Rows are those of the action file: row N - 1 is the pose in the
+/// last frame that was given, row N the first to be imagined; frame f shows row f.
 struct ChunkPlan {
   std::vector<std::size_t> memory;  ///< N frames, of those given and imagined so far
   std::vector<std::size_t> rows;    ///< T rows, for maps and rays: the memory's, then the chunk's; the last is repeated
@@ -24,8 +24,8 @@ struct ChunkPlan {
 struct ChunkPlanOptions {
   std::size_t chunk = 16;  ///< K
   std::size_t memory = 4;  ///< N
-  /// Quirk delta_window: from the second chunk on the reference takes its deltas N - 1 rows too late and one too many, as far as
-  /// there are any, and fills up with entries that say nothing only where it also runs out of rows.
+  /// Quirk delta_window: from the second chunk on the reference takes its deltas N - 1 rows too late and one too many,
+  /// as far as there are any, and fills up with entries that say nothing only where it also runs out of rows.
   bool delta_window = false;
 };
 

@@ -8,8 +8,8 @@
 namespace evac {
 namespace {
 
-constexpr double kTurn = 0.5236;         // radians about the tool axis
-constexpr float kToolLength_m = 0.23F;   // from the flange to where the fingers meet
+constexpr double kTurn = 0.5236;        // radians about the tool axis
+constexpr float kToolLength_m = 0.23F;  // from the flange to where the fingers meet
 constexpr float kAxisLength_m = 0.1F;
 constexpr float kClosedGripper = 120.0F;
 constexpr float kNear_m = 1e-3F;
@@ -89,7 +89,8 @@ std::vector<Placed> Visible(std::span<const DrawnGripper> grippers, const PoseMa
     if (!options.draw_behind_camera && !(placed.origin[2] >= kNear_m)) continue;
     placed.at = Project(placed.origin, view.intrinsics);
     if (!IsInside(placed.at, view)) continue;
-    const Eigen::Vector3f ends[3] = {point(kAxisLength_m, 0, 0), point(0, kAxisLength_m, 0), point(0, 0, kAxisLength_m)};
+    const Eigen::Vector3f ends[3] = {point(kAxisLength_m, 0, 0), point(0, kAxisLength_m, 0),
+                                     point(0, 0, kAxisLength_m)};
     for (int axis = 0; axis < 3; ++axis)
       placed.ends[axis] = options.draw_behind_camera ? ends[axis] : InFront(placed.origin, ends[axis]);
     visible.push_back(placed);
@@ -101,7 +102,8 @@ std::vector<Placed> Visible(std::span<const DrawnGripper> grippers, const PoseMa
 
 DrawnGripper Drawn(Side side, const GripperPose& pose) {
   const double turn = side == Side::kLeft ? -kTurn : kTurn;
-  const Eigen::Quaterniond turned = pose.base_from_gripper * Eigen::Quaterniond(Eigen::AngleAxisd(turn, Eigen::Vector3d::UnitZ()));
+  const Eigen::Quaterniond turned =
+      pose.base_from_gripper * Eigen::Quaterniond(Eigen::AngleAxisd(turn, Eigen::Vector3d::UnitZ()));
   return {side, pose.xyz_m.cast<float>(), turned.coeffs().cast<float>(),
           static_cast<float>(pose.closure * static_cast<double>(kClosedGripper))};
 }
@@ -130,7 +132,8 @@ std::array<std::uint8_t, 3> ClosureColour(Side side, float closure) {
       if (side == Side::kRight && i == 8 && channel == 2) return kDarkestRedBlue;
       return static_cast<double>(kAnchors[static_cast<int>(side)][i] >> (16 - 8 * channel) & 0xff) / 255;
     };
-    const double mixed = index + 1 == kColours ? value(8) : part * (value(anchor) - value(anchor - 1)) + value(anchor - 1);
+    const double mixed =
+        index + 1 == kColours ? value(8) : part * (value(anchor) - value(anchor - 1)) + value(anchor - 1);
     colour[static_cast<std::size_t>(channel)] = static_cast<std::uint8_t>(mixed * 255);
   }
   return colour;

@@ -38,13 +38,13 @@ struct PoseMapOptions {
   static PoseMapOptions ForHeight(int height_px);
 };
 
-/// Discs first (left, right), then the axes x, y, z of both. A gripper whose origin is out of the picture is not drawn; one behind the
-/// camera neither; an axis whose end is behind it ends at the picture's near side.
+/// Discs first (left, right), then the axes x, y, z of both. A gripper whose origin is out of the picture is not drawn;
+/// one behind the camera neither; an axis whose end is behind it ends at the picture's near side.
 /// @returns [height_px, width_px, 3] RGB, 50 where nothing is drawn
 cv::Mat DrawPoseMap(std::span<const DrawnGripper> grippers, const PoseMapView& view, const PoseMapOptions& options);
 
-/// RGB of a closure, as drawn: matplotlib's Greens (left) or Reds (right), light open, dark closed. Outside [0, 1]: the ends;
-/// not a number: black.
+/// RGB of a closure, as drawn: matplotlib's Greens (left) or Reds (right), light open, dark closed. Outside [0, 1]: the
+/// ends; not a number: black.
 std::array<std::uint8_t, 3> ClosureColour(Side side, float closure);
 
 }  // namespace evac

@@ -7,8 +7,8 @@ namespace evac {
 
 /// The camera as the network reads it: for each latent pixel the ray through its centre (EVAC, Sec. 3.2; spec 3).
 struct RayMap {
-  int height = 0, width = 0;      ///< latent pixels
-  std::vector<float> direction;   ///< [3, height, width]: unit length, base frame
+  int height = 0, width = 0;        ///< latent pixels
+  std::vector<float> direction;     ///< [3, height, width]: unit length, base frame
   Eigen::Vector3f origin{0, 0, 0};  ///< the same for every pixel: the camera, metres, base frame
 };
 

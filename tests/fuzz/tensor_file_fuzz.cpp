@@ -8,7 +8,8 @@
 /// Any bytes are a file of tensors that lie within it and whose header can be written and read again, or a TensorError.
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   try {
-    const evac::TensorFile file = evac::TensorFile::Parse(std::string(reinterpret_cast<const char*>(data), size), "fuzz");
+    const evac::TensorFile file =
+        evac::TensorFile::Parse(std::string(reinterpret_cast<const char*>(data), size), "fuzz");
     std::size_t bytes = 0;
     unsigned sum = 0;
     for (const evac::TensorView& tensor : file.tensors()) {

@@ -42,7 +42,8 @@ Tensor TemporalAttention(const Tensor& q, const Tensor& k, const Tensor& v, std:
   const std::int64_t n = q.size(0), t = q.size(1), l = q.size(2), c = q.size(3);
   if (CanUseKernels(q) && CanUseKernels(k) && CanUseKernels(v)) {
     Tensor y = at::empty(q.sizes(), q.options());
-    kernels::TemporalAttention({n, t, l, c, heads}, q.data_ptr<float>(), k.data_ptr<float>(), v.data_ptr<float>(), y.data_ptr<float>());
+    kernels::TemporalAttention({n, t, l, c, heads}, q.data_ptr<float>(), k.data_ptr<float>(), v.data_ptr<float>(),
+                               y.data_ptr<float>());
     return y;
   }
   const auto by_pixel = [&](const Tensor& x) { return x.transpose(1, 2).reshape({n * l, t, c}); };

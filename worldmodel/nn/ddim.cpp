@@ -23,7 +23,8 @@ struct Moved {
 Moved Take(const DdimStep& step, const Tensor& x_t, const Tensor& v, const DrawNoise& noise) {
   const Tensor eps = NoiseFrom(x_t, v, step.alpha_bar);
   const Tensor x0 = CleanFrom(x_t, v, step.alpha_bar) * (step.scale_previous / step.scale);
-  // In float, as the reference has it: from pure noise nothing is left at eta 1, and the root of the rounding is no longer small.
+  // In float, as the reference has it: from pure noise nothing is left at eta 1, and the root of the rounding is no
+  // longer small.
   const auto sigma = static_cast<float>(step.sigma);
   const float left = std::max(0.0F, 1.0F - static_cast<float>(step.alpha_bar_previous) - sigma * sigma);
   Tensor x = x0 * std::sqrt(step.alpha_bar_previous) + eps * static_cast<double>(std::sqrt(left));
@@ -35,7 +36,8 @@ Moved Take(const DdimStep& step, const Tensor& x_t, const Tensor& v, const DrawN
 
 std::vector<DdimStep> DdimTable(const NoiseSchedule& schedule, const DdimOptions& options) {
   if (options.steps < 1 || options.steps > schedule.steps())
-    throw TensorError(std::to_string(options.steps) + " sampler steps, wanted 1 to " + std::to_string(schedule.steps()));
+    throw TensorError(std::to_string(options.steps) + " sampler steps, wanted 1 to " +
+                      std::to_string(schedule.steps()));
   if (!(options.eta >= 0 && options.eta <= 1))
     throw TensorError("eta is " + std::to_string(options.eta) + ", wanted 0 to 1");
   std::vector<DdimStep> table;

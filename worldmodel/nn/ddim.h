@@ -10,8 +10,8 @@ namespace evac::nn {
 struct DdimOptions {
   std::int64_t steps = 27;
   double eta = 1;  ///< 0: deterministic
-  /// Quirk residual_noise: the reference's last step stops at step 0's noise and at the scale of the step before it, so that
-  /// what it answers is .97 of a clean latent with .03 of noise; without it the last step ends clean.
+  /// Quirk residual_noise: the reference's last step stops at step 0's noise and at the scale of the step before it, so
+  /// that what it answers is .97 of a clean latent with .03 of noise; without it the last step ends clean.
   bool end_at_first_step = false;
 };
 

@@ -12,7 +12,8 @@ template <typename Function>
 Tensor PerRow(const Tensor& steps, std::int64_t dims, Function value) {
   const Tensor cpu = steps.to(at::kCPU, at::kLong).contiguous();
   std::vector<float> values;
-  for (std::int64_t i = 0; i < cpu.numel(); ++i) values.push_back(static_cast<float>(value(cpu.data_ptr<std::int64_t>()[i])));
+  for (std::int64_t i = 0; i < cpu.numel(); ++i)
+    values.push_back(static_cast<float>(value(cpu.data_ptr<std::int64_t>()[i])));
   std::vector<std::int64_t> shape(static_cast<std::size_t>(dims), 1);
   shape[0] = cpu.numel();
   return at::tensor(values).reshape(shape).to(steps.device());
@@ -54,9 +55,8 @@ Tensor DenoiserInput(const Tensor& x, const Concat& concat) {
 
 Tensor DiffusionLoss(const UNet& unet, const NoiseSchedule& schedule, const DiffusionBatch& batch) {
   const std::int64_t chunk = batch.latents.size(2) - batch.memory;
-  const Tensor latents = batch.teacher_forcing
-                             ? WithNoisyMemory(schedule, batch.latents, *batch.teacher_forcing)
-                             : batch.latents;
+  const Tensor latents =
+      batch.teacher_forcing ? WithNoisyMemory(schedule, batch.latents, *batch.teacher_forcing) : batch.latents;
   Concat concat = batch.concat;
   concat.image = ImageCondition(latents.narrow(2, 0, batch.memory), chunk, concat.mask);
   const Tensor t = batch.t.repeat_interleave(batch.context.views, 0);  // [BV]

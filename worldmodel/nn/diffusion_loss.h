@@ -24,18 +24,18 @@ Tensor DenoiserInput(const Tensor& x, const Concat& concat);
 
 /// Noise on the memory in training, so that the network bears with its own mistakes later.
 struct TeacherForcing {
-  Tensor angle;                ///< [BV, N] in [-1.57, 1.57]: below 0 no noise
-  std::int64_t divisor = 3;    ///< 3 … 20
-  Tensor noise;                ///< [BV N, z, h, w]
+  Tensor angle;              ///< [BV, N] in [-1.57, 1.57]: below 0 no noise
+  std::int64_t divisor = 3;  ///< 3 … 20
+  Tensor noise;              ///< [BV N, z, h, w]
 };
 
 struct DiffusionBatch {
-  Tensor latents;              ///< [BV, z, T, h, w], clean
-  Concat concat;               ///< `image` is worked out here
+  Tensor latents;  ///< [BV, z, T, h, w], clean
+  Concat concat;   ///< `image` is worked out here
   UNet::Context context;
-  Tensor t;                    ///< [B] integers
-  Tensor noise;                ///< [BV, z, T, h, w]
-  std::int64_t memory = 0;     ///< N
+  Tensor t;                 ///< [B] integers
+  Tensor noise;             ///< [BV, z, T, h, w]
+  std::int64_t memory = 0;  ///< N
   std::optional<TeacherForcing> teacher_forcing;
 };
 

@@ -25,7 +25,7 @@ struct Estimate {
 /// How far the straight line through the last two estimates is to be followed: the factor on (x0 - the one before).
 double Extrapolation(double before, double now, double next) {
   if (before > 0) return 0.5 * std::log(next / now) / std::log(now / before);  // in log SNR (Lu et al., Alg. 2)
-  return 0.5 * (next - now) / now;                                             // from pure noise, where that is infinite
+  return 0.5 * (next - now) / now;  // from pure noise, where that is infinite
 }
 
 }  // namespace

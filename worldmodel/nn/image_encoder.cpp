@@ -28,11 +28,12 @@ std::vector<float> BlurKernel(double factor) {
 Tensor BlurAlong(const Tensor& images, const std::vector<float>& kernel, bool along_width) {
   const auto size = static_cast<std::int64_t>(kernel.size());
   const std::int64_t n = images.size(0), c = images.size(1), h = images.size(2), w = images.size(3), pad = size / 2;
-  const std::vector<std::int64_t> shape = along_width ? std::vector<std::int64_t>{1, 1, 1, size}
-                                                      : std::vector<std::int64_t>{1, 1, size, 1};
+  const std::vector<std::int64_t> shape =
+      along_width ? std::vector<std::int64_t>{1, 1, 1, size} : std::vector<std::int64_t>{1, 1, size, 1};
   const Tensor weight = at::tensor(kernel).reshape(shape).to(images.options());
-  const Tensor padded = at::reflection_pad2d(images.reshape({n * c, 1, h, w}),
-                                             along_width ? at::IntArrayRef{pad, pad, 0, 0} : at::IntArrayRef{0, 0, pad, pad});
+  const Tensor padded =
+      at::reflection_pad2d(images.reshape({n * c, 1, h, w}),
+                           along_width ? at::IntArrayRef{pad, pad, 0, 0} : at::IntArrayRef{0, 0, pad, pad});
   return at::conv2d(padded, weight).reshape({n, c, h, w});
 }
 
@@ -70,7 +71,8 @@ ImageEncoder::ImageEncoder(const Scope& at, const ImageEncoderConfig& config)
   at.Take("proj", {config.width, config.embed_dim});
   patch_weight_ = at.Take("conv1.weight", {config.width, 3, config.patch_px, config.patch_px});
   norm_.emplace_back(at / "ln_pre", config.width);
-  for (std::int64_t i = 0; i < config.layers; ++i) blocks_.emplace_back(at / "transformer" / "resblocks" / i, config.width);
+  for (std::int64_t i = 0; i < config.layers; ++i)
+    blocks_.emplace_back(at / "transformer" / "resblocks" / i, config.width);
   LayerNorm(at / "ln_post", config.width);
 }
 

@@ -61,7 +61,8 @@ Conditioning Unconditioned(const EvacModel& model, const ChunkRequest& request, 
   const Tensor& mask = conditioning.concat.mask;
   without.concat.mask = at::cat({mask.narrow(2, 0, memory), at::zeros_like(mask.narrow(2, memory, chunk))}, 2);
   without.concat.image = ImageCondition(request.memory, chunk, without.concat.mask);
-  without.tokens = model.ContextTokens(model.ImageTokens(at::zeros_like(request.image)), model.ActionTokens(request.deltas));
+  without.tokens =
+      model.ContextTokens(model.ImageTokens(at::zeros_like(request.image)), model.ActionTokens(request.deltas));
   return without;
 }
 
@@ -86,7 +87,8 @@ Tensor ImagineChunk(const EvacModel& model, const ChunkRequest& request, const C
     const Conditioning without = Unconditioned(model, request, conditioning);
     denoise = Guided(denoise, MakeDenoise(model, without), options.guidance, options.guidance_rescale);
   }
-  const SampleStart start{at::cat({request.memory, noise.start}, 2), request.memory.size(2), !options.memory_not_scaled};
+  const SampleStart start{at::cat({request.memory, noise.start}, 2), request.memory.size(2),
+                          !options.memory_not_scaled};
   if (options.solver == Solver::kDpmSolver) return SampleDpmSolver(model.schedule(), options.steps, start, denoise);
   const DdimOptions ddim{options.steps, options.eta, options.residual_noise};
   return SampleDdim(model.schedule(), ddim, start, denoise, noise.step);

@@ -6,7 +6,8 @@
 #include "worldmodel/nn/diffusion_loss.h"
 #include "worldmodel/nn/evac_model.h"
 
-/// One chunk of imagination: conditioning, then denoising. Tensors in, latents out; whose robot it is, is known elsewhere.
+/// One chunk of imagination: conditioning, then denoising. Tensors in, latents out; whose robot it is, is known
+/// elsewhere.
 namespace evac::nn {
 
 enum class Solver { kDdim, kDpmSolver };
@@ -23,12 +24,12 @@ struct ImagineOptions {
 
 /// What is known before a chunk, of B scenes with V views each.
 struct ChunkRequest {
-  Tensor memory;      ///< [BV, z, N, h, w] latents, newest last
-  Tensor image;       ///< [BV, 3, H, W] in [-1, 1]: the oldest of the memory, for the image encoder
-  Tensor pose_maps;   ///< [BV, z, K, h, w] latents of the maps of the frames to imagine: EncodePoseMaps
-  Tensor direction;   ///< [BV, 3, T, h, w]
-  Tensor origin;      ///< [BV, 3, T, h, w]
-  Tensor deltas;      ///< [B, any, 14], normalised
+  Tensor memory;     ///< [BV, z, N, h, w] latents, newest last
+  Tensor image;      ///< [BV, 3, H, W] in [-1, 1]: the oldest of the memory, for the image encoder
+  Tensor pose_maps;  ///< [BV, z, K, h, w] latents of the maps of the frames to imagine: EncodePoseMaps
+  Tensor direction;  ///< [BV, 3, T, h, w]
+  Tensor origin;     ///< [BV, 3, T, h, w]
+  Tensor deltas;     ///< [B, any, 14], normalised
 };
 
 /// Everything random, drawn by the caller.

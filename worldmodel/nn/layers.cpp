@@ -54,7 +54,7 @@ CausalConv::CausalConv(const Scope& at, std::int64_t channels)
 
 Tensor CausalConv::operator()(const Tensor& x) const {
   const Tensor first = x.narrow(1, 0, 1);
-  const Tensor padded = at::cat({first, first, x}, 1);                             // [N, T + 2, L, C]
+  const Tensor padded = at::cat({first, first, x}, 1);                                 // [N, T + 2, L, C]
   const Tensor y = at::conv2d(padded.permute({0, 3, 1, 2}), weight.flatten(3), bias);  // kernel (3, 1)
   return y.permute({0, 2, 3, 1}).contiguous();
 }
@@ -71,7 +71,8 @@ Tensor GroupNorm::operator()(const Tensor& x, Activation activation) const {
   Tensor y = at::empty(x.sizes(), x.options());
   const std::int64_t channels = x.size(-1);
   const kernels::NormShape shape{x.size(0), x.numel() / x.size(0) / channels, channels, kGroups, epsilon_};
-  kernels::GroupNorm(shape, x.data_ptr<float>(), weight.data_ptr<float>(), bias.data_ptr<float>(), silu, y.data_ptr<float>());
+  kernels::GroupNorm(shape, x.data_ptr<float>(), weight.data_ptr<float>(), bias.data_ptr<float>(), silu,
+                     y.data_ptr<float>());
   return y;
 }
 

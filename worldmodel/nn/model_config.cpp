@@ -20,7 +20,8 @@ void RequirePositive(std::initializer_list<std::pair<const char*, std::int64_t>>
 void CheckLevels(const char* name, const std::vector<std::int64_t>& multipliers) {
   Require(!multipliers.empty() && multipliers.size() <= 8, name, static_cast<std::int64_t>(multipliers.size()),
           "1 to 8 levels");
-  for (const std::int64_t multiplier : multipliers) Require(multiplier > 0 && multiplier < 1024, name, multiplier, "positive");
+  for (const std::int64_t multiplier : multipliers)
+    Require(multiplier > 0 && multiplier < 1024, name, multiplier, "positive");
 }
 
 void CheckUNet(const UNetConfig& unet) {

@@ -9,12 +9,13 @@ namespace evac::nn {
 
 /// The denoiser (EVAC, Sec. 3; a latent video UNet after DynamiCrafter).
 struct UNetConfig {
-  std::int64_t in_channels = 19;  ///< 4 noisy latent, 4 image latent, 1 mask, 4 pose map latent, 3 ray direction, 3 ray origin
+  std::int64_t in_channels =
+      19;  ///< 4 noisy latent, 4 image latent, 1 mask, 4 pose map latent, 3 ray direction, 3 ray origin
   std::int64_t out_channels = 4;
-  std::int64_t model_channels = 320;  ///< a multiple of 32: the groups of every normalisation
-  std::vector<std::int64_t> channel_mult = {1, 2, 4, 4};           ///< one per level, finest first
-  std::int64_t num_res_blocks = 2;                                 ///< per level
-  std::vector<std::int64_t> attention_resolutions = {4, 2, 1};     ///< downsampling factors with transformers
+  std::int64_t model_channels = 320;                            ///< a multiple of 32: the groups of every normalisation
+  std::vector<std::int64_t> channel_mult = {1, 2, 4, 4};        ///< one per level, finest first
+  std::int64_t num_res_blocks = 2;                              ///< per level
+  std::vector<std::int64_t> attention_resolutions = {4, 2, 1};  ///< downsampling factors with transformers
   std::int64_t num_head_channels = 64;
   std::int64_t transformer_depth = 1;
   std::int64_t context_dim = 1024;
@@ -74,17 +75,17 @@ struct ScheduleConfig {
 struct ModelConfig {
   UNetConfig unet;
   VaeConfig vae;
-  ResamplerConfig action_resampler;                                       ///< 14 numbers per step → 16 tokens
+  ResamplerConfig action_resampler;                                        ///< 14 numbers per step → 16 tokens
   ResamplerConfig image_resampler{.embedding_dim = 1280, .queries = 256};  ///< CLIP's tokens → 256 tokens
   ImageEncoderConfig image_encoder;
   ScheduleConfig schedule;
-  std::int64_t chunk = 16;      ///< K: frames imagined at once
-  std::int64_t memory = 4;      ///< N: frames remembered
-  std::int64_t views = 1;       ///< V
+  std::int64_t chunk = 16;  ///< K: frames imagined at once
+  std::int64_t memory = 4;  ///< N: frames remembered
+  std::int64_t views = 1;   ///< V
   std::int64_t image_height_px = 320;
   std::int64_t image_width_px = 512;
-  std::int64_t fps = 2;         ///< a constant of the released model
-  std::int64_t domain = 11;     ///< AgiBot World's row in the table of robots
+  std::int64_t fps = 2;      ///< a constant of the released model
+  std::int64_t domain = 11;  ///< AgiBot World's row in the table of robots
 
   std::int64_t Frames() const { return memory + chunk; }
   std::int64_t LatentHeight() const { return image_height_px / vae.Stride(); }

@@ -10,7 +10,8 @@ std::vector<double> SquareRootSpaced(double start, double end, std::int64_t step
   std::vector<double> betas;
   const double from = std::sqrt(start), to = std::sqrt(end);
   for (std::int64_t i = 0; i < steps; ++i) {
-    const double root = steps == 1 ? from : from + (to - from) * static_cast<double>(i) / static_cast<double>(steps - 1);
+    const double root =
+        steps == 1 ? from : from + (to - from) * static_cast<double>(i) / static_cast<double>(steps - 1);
     betas.push_back(root * root);
   }
   return betas;
@@ -97,12 +98,13 @@ std::vector<NoiseSchedule::Buffer> NoiseSchedule::PosteriorBuffers() const {
   const std::size_t n = bar.size();
   const auto before = [&](std::size_t i) { return i == 0 ? 1 : bar[i - 1]; };
   const auto variance = [&](std::size_t i) { return betas_[i] * (1 - before(i)) / (1 - bar[i]); };
-  return {
-      {"posterior_variance", Floats(n, variance)},
-      {"posterior_log_variance_clipped", Floats(n, [&](std::size_t i) { return std::log(std::max(variance(i), 1e-20)); })},
-      {"posterior_mean_coef1", Floats(n, [&](std::size_t i) { return betas_[i] * std::sqrt(before(i)) / (1 - bar[i]); })},
-      {"posterior_mean_coef2",
-       Floats(n, [&](std::size_t i) { return (1 - before(i)) * std::sqrt(1 - betas_[i]) / (1 - bar[i]); })}};
+  return {{"posterior_variance", Floats(n, variance)},
+          {"posterior_log_variance_clipped",
+           Floats(n, [&](std::size_t i) { return std::log(std::max(variance(i), 1e-20)); })},
+          {"posterior_mean_coef1",
+           Floats(n, [&](std::size_t i) { return betas_[i] * std::sqrt(before(i)) / (1 - bar[i]); })},
+          {"posterior_mean_coef2",
+           Floats(n, [&](std::size_t i) { return (1 - before(i)) * std::sqrt(1 - betas_[i]) / (1 - bar[i]); })}};
 }
 
 Tensor VelocityFrom(const Tensor& x0, const Tensor& noise, double alpha_bar) {

@@ -23,7 +23,9 @@ class Scope {
   Scope(ParameterSource& source, std::string prefix) : source_(&source), prefix_(std::move(prefix)) {}
   Scope operator/(const std::string& name) const { return {*source_, prefix_.empty() ? name : prefix_ + "." + name}; }
   Scope operator/(std::int64_t index) const { return *this / std::to_string(index); }
-  Tensor Take(const std::string& name, at::IntArrayRef shape) const { return source_->Take((*this / name).prefix_, shape); }
+  Tensor Take(const std::string& name, at::IntArrayRef shape) const {
+    return source_->Take((*this / name).prefix_, shape);
+  }
 
  private:
   ParameterSource* source_;

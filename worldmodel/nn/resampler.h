@@ -7,8 +7,8 @@
 
 namespace evac::nn {
 
-/// A Perceiver resampler (Flamingo, Sec. 2.2; spec 5): learned queries read any number of inputs. It knows no positions: the order
-/// of the inputs is invisible to it.
+/// A Perceiver resampler (Flamingo, Sec. 2.2; spec 5): learned queries read any number of inputs. It knows no
+/// positions: the order of the inputs is invisible to it.
 class Resampler {
  public:
   Resampler(const Scope& at, const ResamplerConfig& config);

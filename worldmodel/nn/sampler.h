@@ -23,7 +23,8 @@ struct SampleStart {
   bool scale_memory = true;  ///< as in training; the reference forgets it (quirk memory_not_scaled)
 };
 
-/// Classifier-free guidance: u + scale (c - u), then pulled towards c's spread by `rescale` (Lin et al. 2024, Sec. 3.4).
+/// Classifier-free guidance: u + scale (c - u), then pulled towards c's spread by `rescale` (Lin et al. 2024,
+/// Sec. 3.4).
 Denoise Guided(Denoise conditional, Denoise unconditional, double scale, double rescale);
 
 /// x with its memory frames as the network is to see them at step t.

@@ -79,7 +79,8 @@ std::vector<KeyValue> SpatialTransformer::Prepare(const Tensor& tokens) const {
   std::vector<KeyValue> context;
   for (const Layer& layer : layers_) {
     const bool image = sizes_.listens == Listens::kImage;
-    context.push_back({(image ? layer.image_k : layer.action_k)(tokens), (image ? layer.image_v : layer.action_v)(tokens)});
+    context.push_back(
+        {(image ? layer.image_k : layer.action_k)(tokens), (image ? layer.image_v : layer.action_v)(tokens)});
   }
   return context;
 }
@@ -92,7 +93,8 @@ Tensor SpatialTransformer::operator()(const Tensor& x, std::span<const KeyValue>
   for (std::size_t i = 0; i < layers_.size(); ++i) {
     const Layer& layer = layers_[i];
     const Tensor y = layer.norm1(tokens);
-    tokens = tokens + layer.self.Out(Attention(layer.self.Query(y), layer.self.Key(y), layer.self.Value(y), sizes_.heads));
+    tokens =
+        tokens + layer.self.Out(Attention(layer.self.Query(y), layer.self.Key(y), layer.self.Value(y), sizes_.heads));
     // The context is the same for every frame: all frames of a scene are one row of queries.
     const Tensor query = layer.cross_q(layer.norm2(tokens)).reshape({scenes, -1, c});
     const Tensor heard = Attention(query, context[i].key, context[i].value, sizes_.heads);

@@ -69,7 +69,8 @@ class SpatialTransformer {
   Linear out_;
 };
 
-/// Attention of every pixel to itself over time, twice. It knows no positions: order comes from the causal convolutions.
+/// Attention of every pixel to itself over time, twice. It knows no positions: order comes from the causal
+/// convolutions.
 class TemporalTransformer {
  public:
   struct Sizes {

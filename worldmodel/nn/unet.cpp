@@ -23,7 +23,8 @@ Tensor AsReference(const Tensor& rows, const FrameLayout& layout, bool spatial, 
   const std::int64_t c = x.size(1), h = x.size(2), w = x.size(3);
   const Tensor apart = x.reshape({layout.scenes, layout.views, layout.frames, c, h, w});
   if (temporal) return apart.permute({0, 3, 1, 2, 4, 5}).contiguous();
-  if (spatial) return apart.permute({0, 2, 3, 1, 4, 5}).reshape({layout.scenes * layout.frames, c, layout.views * h, w});
+  if (spatial)
+    return apart.permute({0, 2, 3, 1, 4, 5}).reshape({layout.scenes * layout.frames, c, layout.views * h, w});
   return x.contiguous();
 }
 
@@ -55,10 +56,10 @@ UNet::UNet(const Scope& at, const UNetConfig& config)
       fps_embedding_(at / "fps_embedding", config.model_channels, 4 * config.model_channels),
       width_(config.model_channels) {
   MakeInput(at / "input_blocks");
-  init_attention_.emplace(at / "init_attn" / "0",
-                          TemporalTransformer::Sizes{config.model_channels,
-                                                     config.init_attention_heads * config.num_head_channels,
-                                                     config.init_attention_heads, config.transformer_depth, true});
+  init_attention_.emplace(
+      at / "init_attn" / "0",
+      TemporalTransformer::Sizes{config.model_channels, config.init_attention_heads * config.num_head_channels,
+                                 config.init_attention_heads, config.transformer_depth, true});
   MakeMiddle(at / "middle_block");
   MakeOutput(at / "output_blocks");
   out_norm_.emplace(at / "out" / "0", config.model_channels, kOutEpsilon);
@@ -74,8 +75,8 @@ void UNet::AddTransformers(Block& block, const Scope& at, std::int64_t channels)
   const std::int64_t heads = channels / config_.num_head_channels, depth = config_.transformer_depth;
   const Listens listens = listens_.size() % 2 == 0 ? Listens::kActions : Listens::kImage;
   const auto place = static_cast<std::int64_t>(block.size());
-  block.push_back(Transformer{
-      SpatialTransformer(at / place, {channels, heads, depth, config_.context_dim, listens}), listens_.size()});
+  block.push_back(Transformer{SpatialTransformer(at / place, {channels, heads, depth, config_.context_dim, listens}),
+                              listens_.size()});
   block.push_back(TemporalTransformer(at / (place + 1), {channels, channels, heads, depth, false}));
   listens_.push_back(listens);
 }
@@ -153,7 +154,9 @@ PreparedContext UNet::Prepare(const Context& context) const {
 
 Tensor UNet::Embedding(const Input& input, const Tensor& constant) const {
   const std::int64_t rows = input.x.size(0), frames = input.x.size(2);
-  const auto embed = [&](const Tensor& t) { return time_embed_(SinusoidEmbedding(t, config_.model_channels)).unsqueeze(1); };
+  const auto embed = [&](const Tensor& t) {
+    return time_embed_(SinusoidEmbedding(t, config_.model_channels)).unsqueeze(1);
+  };
   const std::int64_t width = constant.size(1);
   const Tensor memory = embed(at::zeros({rows}, input.t.options())).expand({rows, input.memory, width});
   const Tensor chunk = embed(input.t).expand({rows, frames - input.memory, width});
@@ -180,8 +183,8 @@ Tensor UNet::operator()(const Input& input, const PreparedContext& context, cons
   CheckShape("denoiser input", input.x, {-1, config_.in_channels, -1, -1, -1});
   CheckShape("diffusion steps", input.t, {input.x.size(0)});
   const std::int64_t frames = input.x.size(2);
-  const Pass pass{context, {input.x.size(0) / input.views, input.views, frames}, Embedding(input, context.embedding),
-                  observer};
+  const Pass pass{
+      context, {input.x.size(0) / input.views, input.views, frames}, Embedding(input, context.embedding), observer};
   std::vector<Tensor> skips;
   Tensor h = ToRows(input.x);
   for (std::size_t i = 0; i < input_blocks_.size(); ++i) {

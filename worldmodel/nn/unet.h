@@ -33,8 +33,8 @@ class UNet {
   PreparedContext Prepare(const Context& context) const;
 
   struct Input {
-    Tensor x;                 ///< [BV, in_channels, T, h, w]
-    Tensor t;                 ///< [BV] integers: diffusion steps of the frames to imagine; memory frames are at 0
+    Tensor x;  ///< [BV, in_channels, T, h, w]
+    Tensor t;  ///< [BV] integers: diffusion steps of the frames to imagine; memory frames are at 0
     std::int64_t views = 1;
     std::int64_t memory = 0;  ///< N: frames that are clean
   };
