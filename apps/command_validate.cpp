@@ -6,7 +6,6 @@
 #include "apps/factory.h"
 #include "core/error.h"
 #include "harness/scheduler.h"
-#include "judges/oracle_judge.h"
 
 namespace evac {
 namespace {
@@ -15,13 +14,6 @@ struct ValidateArguments {
   std::string suite;
   std::vector<std::string> assignments;
 };
-
-/// It can start, and has the bodies that the rubric names (worlds without physics have none and are not asked).
-void CheckStart(World& world, const Task& task, const InitialState& initial) {
-  const PrivilegedFrame frame = world.Reset(0, task, initial, 0).privileged;
-  if (frame.bodies.empty()) return;
-  if (const auto wrong = WhatIsWrong(task.rubric, frame)) throw InvalidInput("{}: field rubric: {}", task.page_path, *wrong);
-}
 
 /// Everything that can be known to be wrong before the first episode, short of starting the policies.
 ExitCode Validate(const ValidateArguments& arguments) {

@@ -127,7 +127,7 @@ class Evaluation {
   /// A task page that the world cannot start from ends the run here, once, and not in every episode.
   std::unique_ptr<World> MakeCheckedWorld(const SuiteWorld& suite_world) {
     std::unique_ptr<World> world = MakeWorld(suite_world, suite_);
-    for (const Task& task : suite_.tasks) world->Reset(0, task, suite_.initial_states.front(), 0);
+    for (const Task& task : suite_.tasks) CheckStart(*world, task, suite_.initial_states.front());
     return world;
   }
 

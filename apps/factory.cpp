@@ -88,6 +88,12 @@ void CheckRubrics(const Suite& suite) {
   }
 }
 
+void CheckStart(World& world, const Task& task, const InitialState& initial) {
+  const PrivilegedFrame frame = world.Reset(0, task, initial, 0).privileged;
+  if (frame.bodies.empty()) return;
+  if (const auto wrong = WhatIsWrong(task.rubric, frame)) throw InvalidInput("{}: field rubric: {}", task.page_path, *wrong);
+}
+
 void Declare(const Suite& suite, Store& store) {
   CheckRubrics(suite);
   for (const Task& task : suite.tasks) store.AddTask(task);

@@ -23,6 +23,10 @@ void FillInRecordedTask(Suite& suite);
 /// @throws InvalidInput naming task, stage and condition if the oracle could not judge by a rubric.
 void CheckRubrics(const Suite& suite);
 
+/// The world can start the task, and has the bodies that its rubric names (worlds without physics have none and are not
+/// asked). @throws InvalidInput naming page and body.
+void CheckStart(World& world, const Task& task, const InitialState& initial);
+
 /// Tasks and worlds, as the store keeps them; checks the rubrics first.
 void Declare(const Suite& suite, Store& store);
 

@@ -36,6 +36,10 @@ TEST(ScenePages, ARubricThatNamesABodyTheSceneHasNotIsRefusedBeforeTheFirstEpiso
       {Binary("evac"), "validate", kSmall, "--set", "tasks=[" + (folder / "scenes" / "take_ham.yaml").string() + "]"});
   EXPECT_EQ(result.exit_code, 2);
   EXPECT_THAT(result.err, AllOf(HasSubstr("take_ham.yaml"), HasSubstr("rubric"), HasSubstr("jam")));
+  const CommandResult run = RunCommand(
+      RunWords(kSmall, folder / "run", {"tasks=[" + (folder / "scenes" / "take_ham.yaml").string() + "]"}));
+  EXPECT_EQ(run.exit_code, 2);
+  EXPECT_THAT(run.err, AllOf(HasSubstr("take_ham.yaml"), HasSubstr("rubric"), HasSubstr("jam")));
 }
 
 }  // namespace
