@@ -46,6 +46,17 @@ struct Recording {
 ///   moves against its mount.
 Recording ReadRecording(const std::filesystem::path& folder, const RecordingOptions& options = {});
 
+/// A recording of the head camera alone, in files of any name.
+struct RecordingFiles {
+  std::filesystem::path frame;       ///< PNG: the first image
+  std::filesystem::path actions;     ///< .npy as in the example layout (0.1 s a step), or .h5 as in a clip (1/30 s)
+  std::filesystem::path extrinsics;  ///< .npy, or .json as in a clip
+  std::filesystem::path intrinsics;  ///< .npy, or .json as in a clip
+};
+
+/// @throws InvalidInput as ReadRecording; also for a file of another ending.
+Recording ReadRecordingFiles(const RecordingFiles& files, const RecordingOptions& options = {});
+
 /// One walk through a recording's images, front to back. Each has its own decoders: any number walk at once.
 class RecordedFrames {
  public:

@@ -1,4 +1,5 @@
 #include "core/error.h"
+#include "core/file.h"
 #include "core/npy.h"
 #include "core/recording_parts.h"
 
@@ -7,8 +8,9 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr double kExamplePeriod_s = 0.1;  // every third step of 30 Hz
-constexpr std::size_t kArmColumns = 8;    // x y z, quaternion x y z w, gripper
+constexpr double kExamplePeriod_s = 0.1;      // every third step of 30 Hz
+constexpr double kAgibotPeriod_s = 1.0 / 30;  // of an h5 file
+constexpr std::size_t kArmColumns = 8;        // x y z, quaternion x y z w, gripper
 
 /// A matrix of a known number of columns and, if `rows` is not 0, rows.
 NpyArray ReadMatrix(const fs::path& path, std::size_t rows, std::size_t columns) {
@@ -38,7 +40,6 @@ void ReadIntrinsics(const fs::path& path, Camera& camera) {
   camera.fy_px = matrix.At(1, 1);
   camera.cx_px = matrix.At(0, 2);
   camera.cy_px = matrix.At(1, 2);
-  CheckPinhole(camera, path.string());
 }
 
 std::vector<Arms> ReadActions(const fs::path& path) {
@@ -56,27 +57,64 @@ std::vector<Arms> ReadActions(const fs::path& path) {
   return steps;
 }
 
+/// Whether it is `.npy`. @throws InvalidInput unless it ends in that or in `other`.
+bool IsNpy(const fs::path& path, const char* other) {
+  const std::string ending = path.extension().string();
+  if (ending != ".npy" && ending != other) {
+    throw InvalidInput("{}: found the ending '{}', wanted .npy or {}", path.string(), ending, other);
+  }
+  return ending == ".npy";
+}
+
+Camera ReadHead(const RecordingFiles& files, const std::vector<Arms>& arms, const cv::Size& size_px,
+                const RecordingOptions& options) {
+  Camera head;
+  if (IsNpy(files.intrinsics, ".json")) {
+    ReadIntrinsics(files.intrinsics, head);
+  } else {
+    head = ParseIntrinsics(ReadFile(files.intrinsics), files.intrinsics.string());
+  }
+  head.name = "head";
+  head.width_px = size_px.width;
+  head.height_px = size_px.height;
+  CheckPinhole(head, files.intrinsics.string());
+  if (IsNpy(files.extrinsics, ".json")) {
+    head.mount_from_camera = ReadExtrinsics(files.extrinsics);
+  } else {
+    const std::string where = files.extrinsics.string();
+    const std::vector<Eigen::Isometry3d> poses = ParseExtrinsics(ReadFile(files.extrinsics), where);
+    head.mount_from_camera = FixedMount({Mount::kBase, poses, arms}, options, where);
+  }
+  return head;
+}
+
 }  // namespace
 
 Recording ReadExampleLayout(const fs::path& folder, const RecordingOptions& options) {
+  Recording recording = ReadRecordingFiles(
+      {folder / "frame.png", folder / "action.npy", folder / "extrinsics.npy", folder / "intrinsics.npy"}, options);
+  recording.id = folder.filename().string();
+  recording.source = fmt::format("{}: example layout, first frame of the head camera", folder.string());
+  return recording;
+}
+
+Recording ReadRecordingFiles(const RecordingFiles& files, const RecordingOptions& options) {
   if (!options.cameras.empty() && options.cameras != std::vector<std::string>{"head"}) {
-    throw InvalidInput("{}: camera {} was asked for; this recording has head alone", folder.string(),
+    throw InvalidInput("{}: camera {} was asked for; this recording has head alone", files.frame.string(),
                        options.cameras.back());
   }
+  const bool npy = IsNpy(files.actions, ".h5");
+  const std::vector<Arms> arms = npy ? ReadActions(files.actions) : ReadProprio(files.actions);
   Recording recording;
-  recording.id = folder.filename().string();
-  recording.arms = EveryNth(ReadActions(folder / "action.npy"), options.every_nth);
-  recording.first_images = {ReadPng(folder / "frame.png")};
-  Camera head;
-  head.name = "head";
-  head.width_px = recording.first_images[0].cols;
-  head.height_px = recording.first_images[0].rows;
-  ReadIntrinsics(folder / "intrinsics.npy", head);
-  head.mount_from_camera = ReadExtrinsics(folder / "extrinsics.npy");
-  recording.cameras = {head};
-  recording.period_s =
-      (options.recorded_period_s > 0 ? options.recorded_period_s : kExamplePeriod_s) * options.every_nth;
-  recording.source = fmt::format("{}: example layout, first frame of the head camera", folder.string());
+  recording.id = files.frame.parent_path().filename().string();
+  recording.first_images = {ReadPng(files.frame)};
+  recording.cameras = {ReadHead(files, arms, recording.first_images[0].size(), options)};
+  recording.arms = EveryNth(arms, options.every_nth);
+  const double found_period_s = npy ? kExamplePeriod_s : kAgibotPeriod_s;
+  recording.period_s = (options.recorded_period_s > 0 ? options.recorded_period_s : found_period_s) * options.every_nth;
+  recording.source = fmt::format("{}, {}", files.frame.string(), files.actions.string());
+  recording.every_nth = options.every_nth;
+  recording.arm_names = {"left", "right"};
   return recording;
 }
 

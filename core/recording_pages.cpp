@@ -1,5 +1,7 @@
 #include <cctype>
+#include <cstdlib>
 #include <nlohmann/json.hpp>
+#include <optional>
 
 #include "core/error.h"
 #include "core/recording_parts.h"
@@ -32,24 +34,44 @@ Eigen::Vector3d Vector3(const Json& list, const std::string& where) {
   return {Number(list[0], where), Number(list[1], where), Number(list[2], where)};
 }
 
-/// k1 … k6, p1, p2 and lists such as "distortion_coefficients": the names calibration tools use.
+/// k1 … k6, p1, p2, s1 … s4 and names such as "distortion_coefficients" or "D": those that calibration tools use.
 bool NamesDistortion(std::string name) {
   for (char& letter : name) letter = static_cast<char>(std::tolower(static_cast<unsigned char>(letter)));
-  if (name.size() == 2 && (name[0] == 'k' || name[0] == 'p') && name[1] >= '1' && name[1] <= '6') return true;
+  const bool numbered = name.size() == 2 && name[1] >= '1' && name[1] <= '6';
+  if (name == "d" || (numbered && (name[0] == 'k' || name[0] == 'p' || name[0] == 's'))) return true;
   return name.find("dist") != std::string::npos || name.find("coeff") != std::string::npos;
 }
 
-void RefuseDistortion(const Json& intrinsic, const std::string& file) {
-  for (const auto& [name, value] : intrinsic.items()) {
-    if (!NamesDistortion(name)) continue;
-    for (const Json& coefficient : value.is_array() ? value : Json::array({value})) {
-      if (coefficient.is_number() && coefficient.get<double>() != 0) {
-        throw InvalidInput(
-            "{}: intrinsic.{} holds {}, wanted 0: a distorted camera is no pinhole; undistort its images first, or "
-            "leave the camera out",
-            file, name, coefficient.get<double>());
-      }
+/// Anything in it that reads as a number other than 0, as text; or nothing.
+std::optional<std::string> NonZero(const Json& value) {
+  if (value.is_structured()) {
+    for (const Json& part : value) {
+      if (auto found = NonZero(part)) return found;
     }
+    return std::nullopt;
+  }
+  if (value.is_number() && value.get<double>() != 0) return value.dump();
+  if (!value.is_string()) return std::nullopt;
+  const auto& text = value.get_ref<const std::string&>();
+  char* end = nullptr;
+  const double number = std::strtod(text.c_str(), &end);
+  const bool is_number = !text.empty() && end == text.c_str() + text.size();
+  return is_number && number != 0 ? std::optional(text) : std::nullopt;
+}
+
+/// Looks at every field, however deep: distortion stands beside `intrinsic` as often as in it.
+void RefuseDistortion(const Json& object, const std::string& field, const std::string& file) {
+  for (const auto& [name, value] : object.items()) {
+    const std::string path = field.empty() || object.is_array() ? field + name : field + "." + name;
+    const std::optional<std::string> found =
+        object.is_object() && NamesDistortion(name) ? NonZero(value) : std::nullopt;
+    if (found) {
+      throw InvalidInput(
+          "{}: {} holds {}, wanted 0: a distorted camera is no pinhole; undistort its images first, or leave the "
+          "camera out",
+          file, path, *found);
+    }
+    if (value.is_structured()) RefuseDistortion(value, path, file);
   }
 }
 
@@ -66,7 +88,7 @@ Camera ParseIntrinsics(const std::string& json, const std::string& file) {
   camera.fy_px = number("fy");
   camera.cx_px = number("ppx");
   camera.cy_px = number("ppy");
-  RefuseDistortion(intrinsic, file);
+  RefuseDistortion(page, "", file);
   return camera;
 }
 

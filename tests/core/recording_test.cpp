@@ -252,6 +252,12 @@ TEST(Recording, CameraPagesAreCheckedFieldByField) {
               HasSubstr("intrinsic.k1 holds 0.1"));
   EXPECT_THAT(intrinsics(R"({"intrinsic": {"fx": 1, "fy": 1, "ppx": 1, "ppy": 1, "dist_coeffs": [0, 0.2]}})"),
               HasSubstr("0.2"));
+  EXPECT_THAT(intrinsics(R"({"intrinsic": {"fx": 1, "fy": 1, "ppx": 1, "ppy": 1, "distortion": {"k1": "-0.3"}}})"),
+              HasSubstr("intrinsic.distortion holds -0.3"));
+  EXPECT_THAT(intrinsics(R"({"intrinsic": {"fx": 1, "fy": 1, "ppx": 1, "ppy": 1}, "D": [[0, 0], [1e-3]]})"),
+              HasSubstr("D holds 0.001"));
+  EXPECT_THAT(intrinsics(R"({"intrinsic": {"fx": 1, "fy": 1, "ppx": 1, "ppy": 1}, "lens": [{"k2": 0.4}]})"),
+              HasSubstr("k2 holds 0.4"));
   EXPECT_THAT(intrinsics(R"({"intrinsic": {"fx": 1, "fy": "2", "ppx": 1, "ppy": 1}})"),
               HasSubstr("intrinsic.fy: found string"));
   EXPECT_THAT(intrinsics(R"({"intrinsic": {"fx": 1}})"), HasSubstr("field fy is missing"));
@@ -266,6 +272,30 @@ TEST(Recording, CameraPagesAreCheckedFieldByField) {
                    R"([{"extrinsic": {"rotation_matrix": [[1,0,0],[0,1,0],[0,0,-1]], "translation_vector": [0,0,0]}}])",
                    "page.json"),
                Error);
+}
+
+TEST(Recording, FourFilesOfAnyNameAreReadAsTheFoldersThatHoldThem) {
+  const TempFolder folder;
+  const fs::path example = folder / "pour", clip = folder / "clip";
+  WriteExample(example, Actions(5));
+  SyntheticClip(6).Write(OneFolder(clip));
+  const Recording by_name = ReadRecordingFiles({example / "frame.png", example / "action.npy",
+                                                example / "extrinsics.npy", example / "intrinsics.npy"});
+  EXPECT_EQ(by_name.period_s, 0.1);
+  EXPECT_EQ(by_name.arms.size(), 5u);
+  EXPECT_EQ(by_name.cameras[0].fy_px, 41);
+  const fs::path extrinsics = clip / "head_extrinsic_params_aligned.json";
+  const Recording mixed = ReadRecordingFiles(
+      {example / "frame.png", clip / "proprio_stats.h5", extrinsics, example / "intrinsics.npy"}, {.every_nth = 3});
+  EXPECT_EQ(mixed.period_s, 0.1);
+  EXPECT_EQ(mixed.arms.size(), 2u);
+  EXPECT_TRUE(mixed.cameras[0].mount_from_camera.isApprox(SyntheticClip::MountFromCamera(), 1e-9));
+  try {
+    ReadRecordingFiles({example / "frame.png", example / "frame.png", extrinsics, example / "intrinsics.npy"});
+    ADD_FAILURE() << "it was read";
+  } catch (const Error& error) {
+    EXPECT_THAT(error.what(), HasSubstr("found the ending '.png', wanted .npy or .h5"));
+  }
 }
 
 TEST(Recording, ItsTaskAcceptsEveryRecordedStep) {
