@@ -89,9 +89,13 @@ Tensor ImagineChunk(const EvacModel& model, const ChunkRequest& request, const C
   }
   const SampleStart start{at::cat({request.memory, noise.start}, 2), request.memory.size(2),
                           !options.memory_not_scaled};
-  if (options.solver == Solver::kDpmSolver) return SampleDpmSolver(model.schedule(), options.steps, start, denoise);
+  const StepObserver observer = [&](std::int64_t, const Tensor&, const Tensor&) {
+    if (options.on_step) options.on_step();
+  };
+  if (options.solver == Solver::kDpmSolver)
+    return SampleDpmSolver(model.schedule(), options.steps, start, denoise, &observer);
   const DdimOptions ddim{options.steps, options.eta, options.residual_noise};
-  return SampleDdim(model.schedule(), ddim, start, denoise, noise.step);
+  return SampleDdim(model.schedule(), ddim, start, denoise, noise.step, &observer);
 }
 
 }  // namespace evac::nn

@@ -5,22 +5,11 @@
 #include "worldmodel/nn/ddim.h"
 #include "worldmodel/nn/diffusion_loss.h"
 #include "worldmodel/nn/evac_model.h"
+#include "worldmodel/nn/imagine_options.h"
 
 /// One chunk of imagination: conditioning, then denoising. Tensors in, latents out; whose robot it is, is known
 /// elsewhere.
 namespace evac::nn {
-
-enum class Solver { kDdim, kDpmSolver };
-
-struct ImagineOptions {
-  Solver solver = Solver::kDdim;
-  std::int64_t steps = 27;
-  double eta = 1;       ///< of DDIM
-  double guidance = 1;  ///< 1: the unconditional half is not computed
-  double guidance_rescale = 0.7;
-  bool memory_not_scaled = false;  ///< quirk of the reference: see docs/evac_quirks.md
-  bool residual_noise = false;     ///< likewise
-};
 
 /// What is known before a chunk, of B scenes with V views each.
 struct ChunkRequest {

@@ -1,0 +1,72 @@
+#include "worldmodel/conditioning.h"
+
+#include <algorithm>
+
+#include "core/error.h"
+#include "core/geometry.h"
+#include "worldmodel/action_delta.h"
+
+namespace evac {
+namespace {
+
+Eigen::Matrix3f Intrinsics(const Camera& camera) {
+  Eigen::Matrix3d k;
+  k << camera.fx_px, 0, camera.cx_px, 0, camera.fy_px, camera.cy_px, 0, 0, 1;
+  return k.cast<float>();
+}
+
+std::vector<DrawnGripper> DrawnArms(const Arms& arms) {
+  const BothGrippers grippers = GrippersOf(arms);
+  std::vector<DrawnGripper> drawn;
+  if (arms.size() == 2) drawn.push_back(Drawn(Side::kLeft, grippers[0]));
+  drawn.push_back(Drawn(Side::kRight, grippers[1]));
+  return drawn;
+}
+
+std::vector<RayMap> Rays(const Arms& arms, std::span<const Camera> cameras, const nn::ModelConfig& config) {
+  const double latent = 1.0 / static_cast<double>(config.vae.Stride());
+  std::vector<RayMap> rays;
+  for (const Camera& camera : cameras) {
+    rays.push_back(MakeRayMap(ScaledIntrinsics(Intrinsics(camera), latent, latent),
+                              BaseFromCamera(camera, arms).matrix().cast<float>(),
+                              static_cast<int>(config.LatentHeight()), static_cast<int>(config.LatentWidth())));
+  }
+  return rays;
+}
+
+}  // namespace
+
+std::vector<cv::Mat> DrawPoseMaps(const Arms& arms, std::span<const Camera> cameras, const PoseMapOptions& options) {
+  const std::vector<DrawnGripper> drawn = DrawnArms(arms);
+  std::vector<cv::Mat> maps;
+  for (const Camera& camera : cameras) {
+    const Eigen::Matrix4f camera_from_base = BaseFromCamera(camera, arms).inverse().matrix().cast<float>();
+    const PoseMapView view{camera_from_base, Intrinsics(camera), camera.width_px, camera.height_px};
+    maps.push_back(DrawPoseMap(drawn, view, options));
+  }
+  return maps;
+}
+
+ChunkConditioning Condition(const ImaginedScene& scene, std::vector<std::size_t> memory, std::span<const Arms> targets,
+                            const nn::ModelConfig& config, const ConditioningOptions& options) {
+  const auto chunk = static_cast<std::size_t>(config.chunk);
+  if (targets.empty() || targets.size() > chunk)
+    throw InternalError("{} targets in a chunk, wanted 1 … {}", targets.size(), chunk);
+  ChunkConditioning conditioning;
+  for (const std::size_t frame : memory)
+    conditioning.rays.push_back(Rays(scene.frames.at(frame).arms, scene.cameras, config));
+  const Arms* before = &scene.frames.back().arms;
+  for (std::size_t k = 0; k < chunk; ++k) {
+    const Arms& arms = targets[std::min(k, targets.size() - 1)];
+    const ActionDelta delta = DeltaBetween(GrippersOf(*before), GrippersOf(arms));
+    conditioning.deltas.push_back(Normalised(delta, options.statistics, options.stride));
+    conditioning.pose_maps.push_back(DrawPoseMaps(arms, scene.cameras, options.pose_map));
+    conditioning.rays.push_back(Rays(arms, scene.cameras, config));
+    before = &arms;
+  }
+  conditioning.memory = std::move(memory);
+  conditioning.count = targets.size();
+  return conditioning;
+}
+
+}  // namespace evac

@@ -1,0 +1,60 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <opencv2/core.hpp>
+#include <span>
+#include <vector>
+
+#include "core/types.h"
+#include "worldmodel/action_statistics.h"
+#include "worldmodel/nn/model_config.h"
+#include "worldmodel/pose_map.h"
+#include "worldmodel/ray_map.h"
+
+/// What the network is told of one chunk (EVAC, Sec. 3.2; spec 2 to 4), in plain numbers: no tensors, nothing encoded.
+namespace evac {
+
+/// [frames][V]: RGB, the network's picture size unless said otherwise.
+using Pictures = std::vector<std::vector<cv::Mat>>;
+
+/// A frame as it is remembered: the network's own shorthand for the picture, and where the arms were.
+struct RememberedFrame {
+  std::vector<float> latent;  ///< [V, z, h, w], contiguous
+  Arms arms;                  ///< imagined frames: the commanded ones
+};
+
+/// One episode on its way. Frames are kept as latents: nothing that was encoded or imagined is encoded again.
+struct ImaginedScene {
+  std::vector<Camera> cameras;          ///< V; intrinsics and size of the network's picture
+  std::vector<RememberedFrame> frames;  ///< N times the first, then every frame that was executed; newest last
+  std::vector<cv::Mat> first, newest;   ///< [V] CV_32FC3 in [-1, 1]: what the image encoder may be shown
+  std::uint64_t seed = 0;               ///< of all noise of this episode
+};
+
+/// The network's reading of one step: 14 numbers, normalised (action_delta.h).
+using DeltaRow = std::array<float, 14>;
+
+struct ConditioningOptions {
+  ActionStatistics statistics = AgiBotWorldStatistics();
+  double stride = 3;  ///< frames of 30 Hz that one step spans: the statistics are per such frame
+  PoseMapOptions pose_map;
+};
+
+struct ChunkConditioning {
+  std::vector<std::size_t> memory;        ///< N indices of ImaginedScene::frames, newest last
+  std::vector<DeltaRow> deltas;           ///< [K]: from each frame to the next; to be replaced only by a quirk
+  Pictures pose_maps;                     ///< [K][V]: of the frames to imagine alone
+  std::vector<std::vector<RayMap>> rays;  ///< [N + K][V], latent pixels
+  std::size_t count = 0;                  ///< targets given, 1 … K: what lies beyond is padding
+};
+
+/// `targets` (1 … K; fewer are filled up: the arms rest at the last) after what `memory` shows. With one arm the other
+/// is absent from the maps, and its deltas are those of an open gripper that does not move.
+ChunkConditioning Condition(const ImaginedScene& scene, std::vector<std::size_t> memory, std::span<const Arms> targets,
+                            const nn::ModelConfig& config, const ConditioningOptions& options);
+
+/// The maps of the arms at one moment, one per camera.
+std::vector<cv::Mat> DrawPoseMaps(const Arms& arms, std::span<const Camera> cameras, const PoseMapOptions& options);
+
+}  // namespace evac
