@@ -56,6 +56,8 @@ class TensorFile {
   ~TensorFile();
 
   const std::string& name() const { return name_; }
+  /// All of the file, header and padding included; where every tensor's bytes lie.
+  std::span<const std::byte> bytes() const { return bytes_; }
   const TensorMetadata& metadata() const { return metadata_; }
   /// In the order of their bytes.
   const std::vector<TensorView>& tensors() const { return tensors_; }

@@ -1,0 +1,227 @@
+#include "worldmodel/nn/weights.h"
+
+#include <ATen/ops/equal.h>
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <fstream>
+#include <map>
+#include <optional>
+
+#include "tests/nn/support.h"
+#include "worldmodel/nn/weight_keys.h"
+
+namespace evac::nn {
+namespace {
+
+namespace fs = std::filesystem;
+using ::testing::AllOf;
+using ::testing::HasSubstr;
+
+std::string BytesOf(const fs::path& path) {
+  std::ifstream file(path, std::ios::binary);
+  return {std::istreambuf_iterator<char>(file), {}};
+}
+
+template <typename Function>
+std::string MessageOf(Function function) {
+  try {
+    function();
+  } catch (const TensorError& error) {
+    return error.what();
+  }
+  return "nothing was thrown";
+}
+
+class Weights : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    folder_ = fs::path(::testing::TempDir()) /
+              (std::string("weights_") + ::testing::UnitTest::GetInstance()->current_test_info()->name());
+    fs::remove_all(folder_);
+    fs::create_directories(folder_);
+  }
+  void TearDown() override { fs::remove_all(folder_); }
+
+  fs::path Saved(std::uint64_t seed = 1, const SaveOptions& options = {}) const {
+    const fs::path path = folder_ / ("seed" + std::to_string(seed) + ".safetensors");
+    RandomWeights weights(seed);
+    SaveWeights(path, weights, config_, options);
+    return path;
+  }
+  /// The saved file with its tensors changed.
+  fs::path Changed(const std::function<void(std::vector<TensorView>&)>& change) const {
+    const TensorFile file = TensorFile::Open(Saved());
+    std::vector<TensorView> tensors = file.tensors();
+    change(tensors);
+    WriteTensorFile(folder_ / "changed.safetensors", tensors, {});
+    return folder_ / "changed.safetensors";
+  }
+  std::string Refusal(const fs::path& path) const {
+    return MessageOf([&] { LoadModel(path, config_); });
+  }
+
+  fs::path folder_;
+  ModelConfig config_ = TinyConfig();
+};
+
+TensorView& Find(std::vector<TensorView>& tensors, const std::string& name) {
+  for (TensorView& tensor : tensors) {
+    if (tensor.name == name) return tensor;
+  }
+  throw TensorError("no " + name);
+}
+
+const char kOut[] = "model.diffusion_model.out.2.weight";
+
+TEST_F(Weights, SavedLoadedAndSavedAgainAreTheSameBytes) {
+  const fs::path first = Saved(), second = folder_ / "again.safetensors";
+  FileWeights source(first, config_, {.with_unread = true});
+  SaveWeights(second, source, config_);
+  EXPECT_EQ(BytesOf(first), BytesOf(second));
+}
+
+TEST_F(Weights, LieInTheFileInThePublishedOrder) {
+  const TensorFile file = TensorFile::Open(Saved());
+  const std::vector<ParameterShape> keys = CheckpointKeys(config_);
+  ASSERT_EQ(file.tensors().size(), keys.size());
+  for (std::size_t i = 0; i < keys.size(); ++i) EXPECT_EQ(file.tensors()[i].name, keys[i].key);
+}
+
+TEST_F(Weights, OfASeedAreTheSameAlwaysAndOfAnotherAreNot) {
+  const fs::path first = Saved(1);
+  const std::string bytes = BytesOf(first);
+  EXPECT_EQ(BytesOf(Saved(1)), bytes);
+  EXPECT_NE(BytesOf(Saved(2)), bytes);
+}
+
+TEST_F(Weights, AreTheNumbersThatTheNetworkComputesWith) {
+  const at::NoGradGuard no_grad;
+  const fs::path path = Saved(7);
+  RandomWeights drawn(7);
+  const EvacModel from_file = LoadModel(path, config_), from_seed(drawn, config_);
+  const Tensor latents = Noise({1, 4, 8, 12}, 3);
+  EXPECT_TRUE(at::equal(from_file.vae().Decode(latents), from_seed.vae().Decode(latents)));
+  const Tensor deltas = Noise({1, 3, 14}, 4);
+  EXPECT_TRUE(at::equal(from_file.ActionTokens(deltas), from_seed.ActionTokens(deltas)));
+}
+
+TEST_F(Weights, StayMappedAsLongAsATensorOfThemLives) {
+  std::optional<FileWeights> source(std::in_place, Saved(), config_);
+  const Tensor kept = source->Take(kOut, {4, 32, 3, 3});
+  RandomWeights drawn(1);
+  source.reset();
+  EXPECT_TRUE(at::equal(kept, drawn.Take(kOut, {4, 32, 3, 3})));
+  LetGo(kept);
+  EXPECT_TRUE(at::equal(kept, drawn.Take(kOut, {4, 32, 3, 3})));
+}
+
+TEST_F(Weights, OfARenamedKeyAreRefusedWithBothNames) {
+  const fs::path path = Changed([](auto& tensors) { Find(tensors, kOut).name = "model.diffusion_model.out.2.wait"; });
+  EXPECT_THAT(Refusal(path),
+              AllOf(HasSubstr("changed.safetensors"), HasSubstr("1 key is missing: " + std::string(kOut)),
+                    HasSubstr("1 key is not the network's: model.diffusion_model.out.2.wait")));
+}
+
+TEST_F(Weights, OfAnotherShapeAreRefusedWithBothShapes) {
+  const fs::path path = Changed([](auto& tensors) { Find(tensors, kOut).shape = {32, 4, 3, 3}; });
+  EXPECT_THAT(Refusal(path), HasSubstr("1 key does not fit: " + std::string(kOut) +
+                                       " is F32 [32, 4, 3, 3], wanted floats [4, 32, 3, 3]"));
+}
+
+TEST_F(Weights, OfAnotherNetworkAreRefusedWithTenNamesAndACount) {
+  const fs::path path = Changed([](auto& tensors) {
+    for (TensorView& tensor : tensors) tensor.name = "net." + tensor.name;
+  });
+  const std::string refusal = Refusal(path);
+  EXPECT_THAT(refusal, HasSubstr(" keys are missing: betas, alphas_cumprod"));
+  EXPECT_LT(refusal.size(), 2000u);
+}
+
+TEST_F(Weights, ThatNothingReadsMayBeAbsent) {
+  const fs::path path = Changed([&](auto& tensors) {
+    const std::set<std::string> dead = DeadKeys(CheckpointKeys(config_));
+    EXPECT_FALSE(dead.empty());
+    std::erase_if(tensors,
+                  [&](const TensorView& tensor) { return dead.contains(tensor.name) || IsClipLeftover(tensor.name); });
+  });
+  LoadReport report;
+  LoadModel(path, config_, {}, &report);
+  EXPECT_TRUE(report.ignored_keys.empty());
+}
+
+TEST_F(Weights, ThatNothingReadsAreNamedWhenTheyAreThere) {
+  LoadReport report;
+  LoadModel(Saved(), config_, {}, &report);
+  EXPECT_THAT(report.ignored_keys, ::testing::Contains("embedder.model.visual.proj"));
+  EXPECT_THAT(report.ignored_keys, ::testing::Contains(HasSubstr("attn2.to_k.weight")));
+  EXPECT_EQ(report.schedule, "");
+}
+
+TEST_F(Weights, DeadKeysAreThoseOfTheContextThatABlockDoesNotListenTo) {
+  const std::set<std::string> dead = DeadKeys(CheckpointKeys(ModelConfig{}));
+  const std::string first = "model.diffusion_model.input_blocks.1.1.transformer_blocks.0.attn2.to_",
+                    second = "model.diffusion_model.input_blocks.2.1.transformer_blocks.0.attn2.to_",
+                    middle = "model.diffusion_model.middle_block.1.transformer_blocks.0.attn2.to_";
+  EXPECT_EQ(dead.size(), 16u * 4);
+  for (const std::string& key : {first + "k_ip", second + "k_tp", middle + "v_ip", first + "k", middle + "v"})
+    EXPECT_TRUE(dead.contains(key + ".weight")) << key;
+  for (const std::string& key : {first + "k_tp", second + "k_ip", middle + "v_tp", first + "q"})
+    EXPECT_FALSE(dead.contains(key + ".weight")) << key;
+}
+
+TEST_F(Weights, WithAScheduleThatDoesNotEndInNoiseAreReported) {
+  std::vector<float> bar;
+  const fs::path path = Changed([&](auto& tensors) {
+    TensorView& tensor = Find(tensors, "alphas_cumprod");
+    bar.resize(tensor.bytes.size() / sizeof(float));
+    std::memcpy(bar.data(), tensor.bytes.data(), tensor.bytes.size());
+    bar.back() = 0.0047F;
+    tensor.bytes = std::as_bytes(std::span(bar));
+  });
+  LoadReport report;
+  const EvacModel model = LoadModel(path, config_, {}, &report);
+  EXPECT_THAT(report.schedule, AllOf(HasSubstr("alphas_cumprod[999] is 0.0047"), HasSubstr("configuration's is used")));
+  EXPECT_EQ(model.schedule().AlphaBar(999), 0);
+}
+
+TEST_F(Weights, WithAnotherScheduleAreRefused) {
+  const fs::path path = Saved();
+  config_.schedule.linear_end = 0.02;
+  EXPECT_THAT(Refusal(path), HasSubstr("the schedule is another than the configuration's"));
+}
+
+TEST_F(Weights, OfOtherTypesAreConverted) {
+  const fs::path bf16 = Saved(1, {.dtype = at::kBFloat16});
+  RandomWeights drawn(1);
+  const Tensor wanted = drawn.Take(kOut, {4, 32, 3, 3});
+  FileWeights as_float(bf16, config_), as_it_is(bf16, config_, {.dtype = at::kBFloat16});
+  EXPECT_TRUE(at::equal(as_float.Take(kOut, wanted.sizes()), wanted.to(at::kBFloat16).to(at::kFloat)));
+  EXPECT_EQ(as_it_is.Take(kOut, wanted.sizes()).scalar_type(), at::kBFloat16);
+}
+
+TEST_F(Weights, ForTrainingBeginAsTheRecipeSays) {
+  RandomWeights weights(1, RandomWeights::LastLayers::kZero);
+  RecordedWeights recorded(weights);
+  const EvacModel model(recorded, config_);
+  std::map<std::string, double> largest;
+  for (const auto& [key, tensor] : recorded.parameters()) largest[key] = tensor.abs().max().item<double>();
+  const std::string unet = "model.diffusion_model.";
+  for (const char* key : {"out.2.weight", "fps_embedding.2.weight", "input_blocks.1.0.out_layers.3.weight",
+                          "input_blocks.1.0.temopral_conv.conv4.3.weight", "middle_block.1.proj_out.weight",
+                          "middle_block.2.proj_out.weight"})
+    EXPECT_EQ(largest.at(unet + key), 0) << key;
+  EXPECT_GT(largest.at(unet + "time_embed.2.weight"), 0);
+  EXPECT_GT(largest.at("image_proj_model.proj_out.weight"), 0);
+}
+
+TEST_F(Weights, CutOffAnywhereEndInAMessage) {
+  const std::string whole = BytesOf(Saved());
+  for (const std::size_t size : {0UL, 7UL, 8UL, 100UL, whole.size() / 2, whole.size() - 1}) {
+    std::ofstream(folder_ / "cut.safetensors", std::ios::binary).write(whole.data(), static_cast<long>(size));
+    EXPECT_THAT(Refusal(folder_ / "cut.safetensors"), HasSubstr("cut.safetensors")) << size;
+  }
+}
+
+}  // namespace
+}  // namespace evac::nn

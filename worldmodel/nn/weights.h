@@ -1,0 +1,80 @@
+#pragma once
+
+#include <filesystem>
+#include <functional>
+
+#include "worldmodel/nn/evac_model.h"
+#include "worldmodel/nn/mapped_tensors.h"
+
+/// Checkpoints: from a file to a network and back, strictly. What is in a file and what the configuration asks for must
+/// be the same, key by key and shape by shape; a network that silently keeps random numbers imagines silently wrong.
+namespace evac::nn {
+
+struct LoadOptions {
+  at::ScalarType dtype = at::kFloat;  ///< of every parameter; the same as in the file: mapped, not copied
+  at::Device device = at::kCPU;
+  bool with_unread = false;  ///< also give what nothing reads, for copying a file: dead keys, leftovers of CLIP
+};
+
+struct LoadReport {
+  std::vector<std::string> ignored_keys;  ///< in the file, and nothing reads them
+  std::string schedule;                   ///< why the file's schedule is not used; empty: it is the configuration's own
+};
+
+/// The parameters of one file, as a network asks for them. Tensors keep the file mapped as long as they live.
+class FileWeights final : public ParameterSource {
+ public:
+  /// @param path  .safetensors
+  /// @throws TensorError naming the file: unreadable; missing, extra and misshapen keys (ten of each, and how many);
+  ///   a schedule that ends in pure noise like the configuration's, and is another.
+  FileWeights(const std::filesystem::path& path, const ModelConfig& config, const LoadOptions& options = {});
+
+  /// Undefined for a key that nothing reads, unless asked for with `with_unread`.
+  Tensor Take(const std::string& key, at::IntArrayRef shape) override;
+  bool Has(const std::string& key) const { return tensors_.file().Has(key); }
+  const TensorFile& file() const { return tensors_.file(); }
+  const LoadReport& report() const { return report_; }
+
+ private:
+  MappedTensors tensors_;
+  LoadOptions options_;
+  LoadReport report_;
+};
+
+/// The network of a file. Its schedule is the configuration's, always. Everything that nothing reads is left out.
+/// @throws TensorError as FileWeights.
+EvacModel LoadModel(const std::filesystem::path& weights, const ModelConfig& config, const LoadOptions& options = {},
+                    LoadReport* report = nullptr);
+
+/// Numbers for a network that was never trained: functions of (seed, key, index) alone, the same on every machine.
+/// Weights are uniform within ±1 / √fan-in as libtorch's layers begin, gains 1, offsets 0, tables and learned tokens
+/// uniform with variance 1 / width.
+class RandomWeights final : public ParameterSource {
+ public:
+  /// The layers that training starts from zero, so that every block begins as the identity: the last of each residual
+  /// block, temporal convolution and transformer, of the frame rate's embedding, of the denoiser.
+  enum class LastLayers { kDrawn, kZero };
+
+  /// @param last  kDrawn: like all others, so that every layer matters in a test; kZero: for training
+  explicit RandomWeights(std::uint64_t seed, LastLayers last = LastLayers::kDrawn) : seed_(seed), last_(last) {}
+  Tensor Take(const std::string& key, at::IntArrayRef shape) override;
+
+ private:
+  std::uint64_t seed_;
+  LastLayers last_;
+};
+
+struct SaveOptions {
+  at::ScalarType dtype = at::kFloat;  ///< of every parameter; the schedule stays float
+  TensorMetadata metadata = {{"format", "pt"}};
+  std::vector<std::string> without = {};                        ///< keys to leave out, which nothing reads
+  std::function<void(std::size_t, std::size_t)> progress = {};  ///< bytes done, bytes in all; after each tensor
+};
+
+/// Writes a checkpoint in the published order, one tensor in memory at a time: the file is there whole or not at all.
+/// The same parameters give the same bytes.
+/// @param source  is asked for every key of CheckpointKeys in order, but for the schedule, which is the configuration's
+void SaveWeights(const std::filesystem::path& path, ParameterSource& source, const ModelConfig& config,
+                 const SaveOptions& options = {});
+
+}  // namespace evac::nn
