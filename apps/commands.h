@@ -21,5 +21,6 @@ void AddImportReal(CLI::App& app, ExitCode& exit_code);
 void AddTrust(CLI::App& app, ExitCode& exit_code);
 void AddPlan(CLI::App& app, ExitCode& exit_code);
 void AddLs(CLI::App& app, ExitCode& exit_code);
+void AddImagine(CLI::App& app, ExitCode& exit_code);
 
 }  // namespace evac

@@ -26,6 +26,7 @@ int main(int argc, char** argv) {
     evac::AddValidate(app, exit_code);
     evac::AddDoctor(app, exit_code);
     evac::AddLs(app, exit_code);
+    evac::AddImagine(app, exit_code);
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
     return app.exit(error) == 0 ? 0 : static_cast<int>(evac::ExitCode::kInvalidInput);

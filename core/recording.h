@@ -32,6 +32,7 @@ struct Recording {
   std::vector<cv::Mat> first_images;   ///< CV_8UC3 RGB, in the order of `cameras`
   std::vector<std::filesystem::path> videos;  ///< in the order of `cameras`, or empty: there is only the first frame
   int every_nth = 1;                          ///< step k is frame k * every_nth of a video
+  std::vector<std::filesystem::path> files;   ///< all that were read
 };
 
 /// Reads a recording in one of three layouts, recognised by the files that are there:

@@ -53,6 +53,9 @@ fs::path VideoOf(const ClipFolders& folders, const std::string& camera) {
 fs::path IntrinsicsOf(const ClipFolders& folders, const std::string& camera) {
   return folders.pages / (camera + "_intrinsic_params.json");
 }
+fs::path ExtrinsicsOf(const ClipFolders& folders, const std::string& camera) {
+  return folders.pages / (camera + "_extrinsic_params_aligned.json");
+}
 
 /// The cameras asked for, or all that have a video; head always.
 std::vector<std::string> ChooseCameras(const ClipFolders& folders, const RecordingOptions& options) {
@@ -79,7 +82,7 @@ struct Context {
 
 Camera ReadCamera(const Context& context, const std::string& name, const cv::Mat& first) {
   const fs::path intrinsics = IntrinsicsOf(context.folders, name);
-  const fs::path extrinsics = context.folders.pages / (name + "_extrinsic_params_aligned.json");
+  const fs::path extrinsics = ExtrinsicsOf(context.folders, name);
   Camera camera = ParseIntrinsics(ReadFile(intrinsics), intrinsics.string());
   camera.name = name;
   camera.width_px = first.cols;
@@ -141,6 +144,12 @@ Recording ReadClipLayout(const ClipFolders& folders, const RecordingOptions& opt
     AddStillCamera(context, names, recording);
   }
   const double found_period_s = video_period_s > 0 ? Snapped(video_period_s) : kAgibotPeriod_s;
+  recording.files = recording.videos.empty() ? std::vector{folders.images / "frame.png"} : recording.videos;
+  recording.files.push_back(folders.proprio);
+  for (const std::string& name : names) {
+    recording.files.push_back(IntrinsicsOf(folders, name));
+    recording.files.push_back(ExtrinsicsOf(folders, name));
+  }
   recording.period_s = (options.recorded_period_s > 0 ? options.recorded_period_s : found_period_s) * options.every_nth;
   recording.arms = EveryNth(std::move(arms), options.every_nth);
   recording.source = fmt::format("{}: AgiBot World layout, {} cameras{}", folders.images.string(), names.size(),

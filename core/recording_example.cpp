@@ -114,6 +114,7 @@ Recording ReadRecordingFiles(const RecordingFiles& files, const RecordingOptions
   recording.period_s = (options.recorded_period_s > 0 ? options.recorded_period_s : found_period_s) * options.every_nth;
   recording.source = fmt::format("{}, {}", files.frame.string(), files.actions.string());
   recording.every_nth = options.every_nth;
+  recording.files = {files.frame, files.actions, files.extrinsics, files.intrinsics};
   recording.arm_names = {"left", "right"};
   return recording;
 }
