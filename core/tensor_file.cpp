@@ -56,7 +56,7 @@ void SyncFolderOf(const fs::path& path) {
 
 }  // namespace
 
-TensorFile TensorFile::Open(const fs::path& path) {
+void TensorFile::Map(const fs::path& path) {
   const Descriptor file(::open(path.c_str(), O_RDONLY | O_CLOEXEC));
   struct stat status {};
   if (file.get() < 0 || ::fstat(file.get(), &status) != 0) throw SystemError(path, "open");
@@ -65,19 +65,27 @@ TensorFile TensorFile::Open(const fs::path& path) {
   if (size < kLengthBytes) throw TensorError(path.string() + ": cut off within the safetensors header");
   void* mapping = ::mmap(nullptr, size, PROT_READ, MAP_PRIVATE, file.get(), 0);
   if (mapping == MAP_FAILED) throw SystemError(path, "map");
+  name_ = path.string();
+  mapping_ = mapping;
+  bytes_ = {static_cast<const std::byte*>(mapping), size};
+}
+
+void TensorFile::Own(std::string bytes, const std::string& name) {
+  name_ = name;
+  owned_ = std::make_unique<std::string>(std::move(bytes));
+  bytes_ = std::as_bytes(std::span(*owned_));
+}
+
+TensorFile TensorFile::Open(const fs::path& path) {
   TensorFile tensors;
-  tensors.name_ = path.string();
-  tensors.mapping_ = mapping;
-  tensors.bytes_ = {static_cast<const std::byte*>(mapping), size};
+  tensors.Map(path);
   tensors.ReadHeader();
   return tensors;
 }
 
 TensorFile TensorFile::Parse(std::string bytes, const std::string& name) {
   TensorFile tensors;
-  tensors.name_ = name;
-  tensors.owned_ = std::move(bytes);
-  tensors.bytes_ = std::as_bytes(std::span(tensors.owned_));
+  tensors.Own(std::move(bytes), name);
   tensors.ReadHeader();
   return tensors;
 }
@@ -88,19 +96,13 @@ TensorFile& TensorFile::operator=(TensorFile&& other) noexcept {
   if (this == &other) return *this;
   Unmap();
   name_ = std::move(other.name_);
-  const std::byte* before = other.bytes_.data();
   owned_ = std::move(other.owned_);
+  repacked_ = std::move(other.repacked_);
   bytes_ = std::exchange(other.bytes_, {});
   mapping_ = std::exchange(other.mapping_, nullptr);
   metadata_ = std::move(other.metadata_);
   tensors_ = std::move(other.tensors_);
   by_name_ = std::move(other.by_name_);
-  if (mapping_ == nullptr && before != nullptr) {  // a short string moves its bytes along
-    bytes_ = std::as_bytes(std::span(owned_));
-    for (TensorView& tensor : tensors_) {
-      tensor.bytes = bytes_.subspan(static_cast<std::size_t>(tensor.bytes.data() - before), tensor.bytes.size());
-    }
-  }
   return *this;
 }
 
@@ -150,7 +152,8 @@ const TensorView& TensorFile::Get(const std::string& tensor) const {
 }
 
 void TensorFile::LetGo(const TensorView& tensor) const {
-  if (mapping_ == nullptr || tensor.bytes.empty()) return;
+  const std::byte* first_byte = tensor.bytes.data();
+  if (mapping_ == nullptr || first_byte < bytes_.data() || first_byte >= bytes_.data() + bytes_.size()) return;
   const auto page = static_cast<std::size_t>(::sysconf(_SC_PAGESIZE));
   const auto offset = static_cast<std::size_t>(tensor.bytes.data() - bytes_.data());
   const std::size_t first = (offset + page - 1) / page * page, last = (offset + tensor.bytes.size()) / page * page;

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <map>
+#include <memory>
 #include <span>
 #include <stdexcept>
 #include <string>
@@ -50,13 +51,22 @@ class TensorFile {
   static TensorFile Open(const std::filesystem::path& path);
   /// The same from bytes in memory; `name` stands for the file in messages.
   static TensorFile Parse(std::string bytes, const std::string& name);
+  /// A file of torch.save: a zip of a pickle and its storages. Nothing of the pickle is executed: it is read by a list
+  /// of what a checkpoint needs (docs/weights.md). The tensors are those of its `state_dict` (Lightning), else of its
+  /// `module` without "_forward_module." (DeepSpeed), else of the whole, in their order there.
+  /// @throws TensorError naming the file and what in it is refused.
+  static TensorFile OpenTorch(const std::filesystem::path& path);
+  static TensorFile ParseTorch(std::string bytes, const std::string& name);
+  /// Either kind, told by the first bytes.
+  static TensorFile OpenCheckpoint(const std::filesystem::path& path);
 
   TensorFile(TensorFile&& other) noexcept;
   TensorFile& operator=(TensorFile&& other) noexcept;
   ~TensorFile();
 
   const std::string& name() const { return name_; }
-  /// All of the file, header and padding included; where every tensor's bytes lie.
+  /// All of the file, header and padding included; where the tensors' bytes lie, but for those of a .pt that were not
+  /// laid out row by row there.
   std::span<const std::byte> bytes() const { return bytes_; }
   const TensorMetadata& metadata() const { return metadata_; }
   /// In the order of their bytes.
@@ -69,11 +79,15 @@ class TensorFile {
 
  private:
   TensorFile() = default;
+  void Map(const std::filesystem::path& path);
+  void Own(std::string bytes, const std::string& name);
   void ReadHeader();
+  void ReadTorch();
   void Unmap();
 
   std::string name_;
-  std::string owned_;                 ///< the bytes of Parse
+  std::unique_ptr<std::string> owned_;  ///< the bytes of Parse, at one place for ever
+  std::vector<std::vector<std::byte>> repacked_;
   std::span<const std::byte> bytes_;  ///< all of the file
   void* mapping_ = nullptr;
   TensorMetadata metadata_;

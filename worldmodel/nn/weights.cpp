@@ -38,7 +38,7 @@ std::string CompareSchedule(const MappedTensors& tensors, const ModelConfig& con
 }  // namespace
 
 FileWeights::FileWeights(const std::filesystem::path& path, const ModelConfig& config, const LoadOptions& options)
-    : tensors_(TensorFile::Open(path)), options_(options) {
+    : tensors_(TensorFile::OpenCheckpoint(path)), options_(options) {
   KeyFit fit = CompareKeys(file(), config);
   if (!fit.Fits()) throw TensorError(file().name() + " does not fit the configuration: " + fit.Complaint());
   report_ = {std::move(fit.unread), CompareSchedule(tensors_, config)};

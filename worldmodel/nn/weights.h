@@ -24,7 +24,7 @@ struct LoadReport {
 /// The parameters of one file, as a network asks for them. Tensors keep the file mapped as long as they live.
 class FileWeights final : public ParameterSource {
  public:
-  /// @param path  .safetensors
+  /// @param path  .safetensors, or .pt/.ckpt of torch.save
   /// @throws TensorError naming the file: unreadable; missing, extra and misshapen keys (ten of each, and how many);
   ///   a schedule that ends in pure noise like the configuration's, and is another.
   FileWeights(const std::filesystem::path& path, const ModelConfig& config, const LoadOptions& options = {});
