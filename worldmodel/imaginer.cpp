@@ -8,6 +8,7 @@
 #include "core/error.h"
 #include "core/geometry.h"
 #include "core/seed.h"
+#include "worldmodel/chunk_key.h"
 #include "worldmodel/frame_memory.h"
 #include "worldmodel/nn/imagine.h"
 #include "worldmodel/nn/noise.h"
@@ -121,7 +122,11 @@ void CheckStart(const InitialScene& start, const nn::ModelConfig& config) {
 }  // namespace
 
 Imaginer::Imaginer(std::unique_ptr<const nn::EvacModel> model, ImaginerOptions options)
-    : model_(std::move(model)), options_(std::move(options)) {}
+    : model_(std::move(model)), options_(std::move(options)) {
+  if (!options_.cache) return;
+  if (options_.identity.empty()) throw InvalidInput("a chunk cache wants to know which network it is for");
+  cache_ = std::make_unique<ChunkCache>(*options_.cache);
+}
 Imaginer::Imaginer(Imaginer&&) noexcept = default;
 Imaginer& Imaginer::operator=(Imaginer&&) noexcept = default;
 Imaginer::~Imaginer() = default;
@@ -158,6 +163,22 @@ ChunkConditioning Imaginer::Condition(const ImaginedScene& scene, std::vector<st
 }
 
 ChunkLatents Imaginer::Denoise(const ImaginedScene& scene, const ChunkConditioning& conditioning) const {
+  if (!cache_) return DenoiseAnew(scene, conditioning);
+  const std::string key = ChunkKey(options_, scene, conditioning);
+  if (auto known = cache_->Find(key)) return {std::move(known->latents), key, std::move(known->pictures)};
+  ChunkLatents latents = DenoiseAnew(scene, conditioning);
+  latents.key = key;
+  return latents;
+}
+
+Pictures Imaginer::Decode(const ChunkLatents& latents) const {
+  if (!latents.pictures.empty()) return latents.pictures;
+  Pictures pictures = DecodeAnew(latents);
+  if (cache_ && !latents.key.empty()) cache_->Keep(latents.key, {latents.frames, pictures});
+  return pictures;
+}
+
+ChunkLatents Imaginer::DenoiseAnew(const ImaginedScene& scene, const ChunkConditioning& conditioning) const {
   const at::NoGradGuard no_gradients;
   const std::vector<std::int64_t> frame = LatentShape(config());  // [z, h, w]
   nn::ChunkRequest request;
@@ -184,12 +205,12 @@ ChunkLatents Imaginer::Denoise(const ImaginedScene& scene, const ChunkConditioni
   return latents;
 }
 
-Pictures Imaginer::Decode(const ChunkLatents& latents) const {
+Pictures Imaginer::DecodeAnew(const ChunkLatents& latents) const {
   const at::NoGradGuard no_gradients;
   Pictures pictures;
   for (const std::vector<float>& frame : latents.frames) {
-    const Tensor decoded =
-        nn::DecodeLatents(*model_, TensorOf(frame, With(LatentShape(config()), 0, config().views)));  // [V, 3, H, W]
+    const Tensor decoded = nn::DecodeLatents(
+        *model_, TensorOf(frame, With(LatentShape(config()), 0, config().views)).clone());  // [V, 3, H, W]
     if (!decoded.isfinite().all().item<bool>())
       throw InternalError("the codec answers finite latents with numbers that are not");
     const Tensor bytes = nn::ToBytes(decoded).permute({0, 2, 3, 1}).contiguous();

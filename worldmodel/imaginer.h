@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "worldmodel/chunk_cache.h"
 #include "worldmodel/conditioning.h"
 #include "worldmodel/nn/imagine_options.h"
 
@@ -22,11 +23,17 @@ struct ImaginerOptions {
   ConditioningOptions conditioning;
   /// Quirk decoded_start: from the second chunk on the image encoder sees the codec's version of the first frame.
   bool decoded_start = false;
+
+  /// What else decides the frames, for the cache: hashes of weights and configuration, device, number type, threads.
+  std::string identity;
+  std::optional<ChunkCacheOptions> cache;  ///< wants an identity
 };
 
 /// The frames of one chunk as latents.
 struct ChunkLatents {
   std::vector<std::vector<float>> frames;  ///< [count][V, z, h, w]
+  std::string key;                         ///< in the cache, if there is one
+  Pictures pictures = {};                  ///< what the cache knows them to decode to; else empty
 };
 
 /// The network at work: four steps make one chunk (EVAC, Sec. 3), for EvacWorld and for `evac imagine`.
@@ -44,6 +51,7 @@ struct ChunkLatents {
 /// camera's name, the number of frames before, the step and the element, so a scene's frames depend on nothing else.
 class Imaginer {
  public:
+  /// @throws InvalidInput for a cache without an identity, or whose folder cannot be made.
   Imaginer(std::unique_ptr<const nn::EvacModel> model, ImaginerOptions options);
   Imaginer(Imaginer&&) noexcept;
   Imaginer& operator=(Imaginer&&) noexcept;
@@ -64,9 +72,11 @@ class Imaginer {
   ChunkConditioning Condition(const ImaginedScene& scene, std::vector<std::size_t> memory,
                               std::span<const Arms> targets) const;
 
-  /// Encodes the maps, and denoises. @returns latents of the `conditioning.count` frames that were asked for
+  /// Encodes the maps, and denoises; or finds in the cache what comes of it. @returns latents of the
+  /// `conditioning.count` frames that were asked for
   ChunkLatents Denoise(const ImaginedScene& scene, const ChunkConditioning& conditioning) const;
 
+  /// To be called with finite latents (WhatIsWrong); then the cache keeps both.
   /// @returns [count][V] RGB, 8 bit, of the network's size. @throws InternalError if the codec's numbers are not
   /// finite.
   Pictures Decode(const ChunkLatents& latents) const;
@@ -76,8 +86,12 @@ class Imaginer {
               const Pictures& pictures) const;
 
  private:
+  ChunkLatents DenoiseAnew(const ImaginedScene& scene, const ChunkConditioning& conditioning) const;
+  Pictures DecodeAnew(const ChunkLatents& latents) const;
+
   std::unique_ptr<const nn::EvacModel> model_;
   ImaginerOptions options_;
+  std::unique_ptr<ChunkCache> cache_;  ///< or none
 };
 
 /// How the numbers went astray, as a sentence, or nothing.
