@@ -21,6 +21,7 @@ void AddImportReal(CLI::App& app, ExitCode& exit_code);
 void AddTrust(CLI::App& app, ExitCode& exit_code);
 void AddPlan(CLI::App& app, ExitCode& exit_code);
 void AddLs(CLI::App& app, ExitCode& exit_code);
+void AddWeights(CLI::App& app, ExitCode& exit_code);
 void AddImagine(CLI::App& app, ExitCode& exit_code);
 
 }  // namespace evac

@@ -3,6 +3,7 @@
 #include <cstdio>
 
 #include "apps/commands.h"
+#include "core/tensor_file.h"
 #include "core/version.h"
 
 int main(int argc, char** argv) {
@@ -26,6 +27,7 @@ int main(int argc, char** argv) {
     evac::AddValidate(app, exit_code);
     evac::AddDoctor(app, exit_code);
     evac::AddLs(app, exit_code);
+    evac::AddWeights(app, exit_code);
     evac::AddImagine(app, exit_code);
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
@@ -33,6 +35,9 @@ int main(int argc, char** argv) {
   } catch (const evac::Error& error) {
     std::fputs(fmt::format("evac: {}\n", error.what()).c_str(), stderr);
     return static_cast<int>(error.exit_code());
+  } catch (const evac::TensorError& error) {  // a file of weights that is none, or another network's
+    std::fputs(fmt::format("evac: {}\n", error.what()).c_str(), stderr);
+    return static_cast<int>(evac::ExitCode::kInvalidInput);
   } catch (const std::exception& error) {
     std::fputs(fmt::format("evac: internal error: {}\n", error.what()).c_str(), stderr);
     return static_cast<int>(evac::ExitCode::kInternal);

@@ -1,0 +1,144 @@
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <fstream>
+#include <nlohmann/json.hpp>
+
+#include "core/hash.h"
+#include "core/tensor_file.h"
+#include "tests/system/process_support.h"
+
+namespace evac {
+namespace {
+
+namespace fs = std::filesystem;
+using ::testing::HasSubstr;
+
+const char kTinyPage[] = R"(chunk: 3
+memory: 2
+image_height_px: 16
+image_width_px: 24
+unet: {model_channels: 32, channel_mult: [1, 2], num_res_blocks: 1, attention_resolutions: [1, 2], num_head_channels: 16,
+       context_dim: 32, init_attention_heads: 2}
+vae: {channels: 32, channel_mult: [1, 1], num_res_blocks: 1}
+action_resampler: {queries: 3, dim: 32, depth: 1, dim_head: 16, heads: 2, output_dim: 32}
+image_resampler: {embedding_dim: 32, queries: 4, dim: 32, depth: 1, dim_head: 16, heads: 2, output_dim: 32}
+image_encoder: {width: 32, layers: 1, head_width: 16, patch_px: 14, image_px: 28, embed_dim: 16, vocabulary: 8}
+)";
+
+class WeightsCommand : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    folder_ = fs::path(::testing::TempDir()) /
+              (std::string("weights_command_") + ::testing::UnitTest::GetInstance()->current_test_info()->name());
+    fs::remove_all(folder_);
+    fs::create_directories(folder_);
+    std::ofstream(folder_ / "tiny.yaml") << kTinyPage;
+  }
+  void TearDown() override { fs::remove_all(folder_); }
+
+  struct Answer {
+    int exit_code = -1;
+    std::string text;
+  };
+  /// `evac weights …` in the test's folder, both streams.
+  Answer Evac(const std::string& arguments) const {
+    const std::string log = (folder_ / "log").string();
+    const int status = std::system(
+        ("cd " + folder_.string() + " && " EVAC_BIN_DIR "/evac weights " + arguments + " >" + log + " 2>&1").c_str());
+    std::ostringstream text;
+    text << std::ifstream(log).rdbuf();
+    return {WEXITSTATUS(status), text.str()};
+  }
+  void Init(const std::string& file, const std::string& options = "") const {
+    const Answer answer = Evac("init " + file + " --config tiny.yaml " + options);
+    ASSERT_EQ(answer.exit_code, 0) << answer.text;
+  }
+  std::string Hash(const std::string& file) const { return Sha256HexOfFile(folder_ / file); }
+
+  fs::path folder_;
+};
+
+TEST_F(WeightsCommand, InitMakesTheSameFileOfASeedAndItFits) {
+  Init("a.safetensors", "--seed 7");
+  Init("b.safetensors", "--seed 7");
+  Init("c.safetensors", "--seed 8");
+  EXPECT_EQ(Hash("a.safetensors"), Hash("b.safetensors"));
+  EXPECT_NE(Hash("a.safetensors"), Hash("c.safetensors"));
+  const Answer answer = Evac("inspect a.safetensors --config tiny.yaml --json");
+  EXPECT_EQ(answer.exit_code, 0);
+  const auto json = nlohmann::json::parse(answer.text);
+  EXPECT_TRUE(json.at("fits"));
+  EXPECT_EQ(json.at("missing").size(), 0u);
+  EXPECT_EQ(json.at("list").size(), json.at("tensors"));
+}
+
+TEST_F(WeightsCommand, ConvertThereAndBackLosesNothing) {
+  Init("f32.safetensors");
+  EXPECT_EQ(Evac("convert f32.safetensors same.safetensors --config tiny.yaml").exit_code, 0);
+  EXPECT_EQ(Hash("f32.safetensors"), Hash("same.safetensors"));
+  EXPECT_EQ(Evac("convert f32.safetensors bf16.safetensors --config tiny.yaml --dtype bf16").exit_code, 0);
+  EXPECT_EQ(Evac("convert bf16.safetensors wide.safetensors --config tiny.yaml").exit_code, 0);
+  EXPECT_EQ(Evac("convert wide.safetensors again.safetensors --config tiny.yaml --dtype bf16").exit_code, 0);
+  EXPECT_EQ(Hash("bf16.safetensors"), Hash("again.safetensors"));
+}
+
+TEST_F(WeightsCommand, ConvertReadsWhatTorchSavedInEveryLayout) {
+  Init("f32.safetensors");
+  const std::string script = "python3 " EVAC_SOURCE_DIR "/tests/support/torch_checkpoint.py ";
+  if (std::system("python3 -c 0 2>/dev/null") != 0) GTEST_SKIP() << "there is no python3 to write checkpoints with";
+  for (const std::string layout : {"state_dict", "module", "plain"}) {
+    const std::string pt = layout + ".pt", out = layout + ".safetensors";
+    ASSERT_EQ(
+        std::system(
+            (script + (folder_ / "f32.safetensors").string() + " " + (folder_ / pt).string() + " " + layout).c_str()),
+        0);
+    const Answer answer = Evac("convert " + pt + " " + out + " --config tiny.yaml");
+    ASSERT_EQ(answer.exit_code, 0) << answer.text;
+    const TensorFile before = TensorFile::Open(folder_ / "f32.safetensors"), after = TensorFile::Open(folder_ / out);
+    ASSERT_EQ(before.tensors().size(), after.tensors().size());
+    for (const TensorView& tensor : before.tensors())
+      EXPECT_TRUE(std::ranges::equal(tensor.bytes, after.Get(tensor.name).bytes)) << layout << " " << tensor.name;
+  }
+}
+
+TEST_F(WeightsCommand, ARenamedKeyIsRefusedByConvertAndNamedByInspect) {
+  Init("f32.safetensors");
+  {
+    const TensorFile file = TensorFile::Open(folder_ / "f32.safetensors");
+    std::vector<TensorView> tensors = file.tensors();
+    tensors.back().name += "_renamed";
+    WriteTensorFile(folder_ / "renamed.safetensors", tensors, {});
+  }
+  const Answer inspected = Evac("inspect renamed.safetensors --config tiny.yaml");
+  EXPECT_EQ(inspected.exit_code, 1);
+  EXPECT_THAT(inspected.text, HasSubstr("1 key is missing: image_proj_model."));
+  const Answer converted = Evac("convert renamed.safetensors out.safetensors --config tiny.yaml");
+  EXPECT_EQ(converted.exit_code, 2);
+  EXPECT_THAT(converted.text, HasSubstr("_renamed"));
+  EXPECT_FALSE(fs::exists(folder_ / "out.safetensors"));
+}
+
+TEST_F(WeightsCommand, BadFilesEndInOneMessageAndExitCode2) {
+  Init("there.safetensors");
+  std::ofstream(folder_ / "text.safetensors") << "these are no tensors at all";
+  EXPECT_EQ(Evac("inspect text.safetensors").exit_code, 2);
+  EXPECT_EQ(Evac("inspect nowhere.safetensors").exit_code, 2);
+  EXPECT_THAT(Evac("init there.safetensors --config tiny.yaml").text, HasSubstr("is there already"));
+  const std::string hostile = EVAC_SOURCE_DIR "/tests/fuzz/corpus/checkpoint_fuzz/hostile";
+  const Answer answer = Evac("inspect " + hostile);
+  EXPECT_EQ(answer.exit_code, 2);
+  EXPECT_THAT(answer.text, HasSubstr("'posix.system'"));
+}
+
+TEST_F(WeightsCommand, LeanLeavesOutWhatNothingReadsAndStillFits) {
+  Init("f32.safetensors");
+  EXPECT_EQ(Evac("convert f32.safetensors lean.safetensors --config tiny.yaml --lean").exit_code, 0);
+  EXPECT_LT(fs::file_size(folder_ / "lean.safetensors"), fs::file_size(folder_ / "f32.safetensors"));
+  const Answer answer = Evac("inspect lean.safetensors --config tiny.yaml");
+  EXPECT_THAT(answer.text, HasSubstr("fits; 0 of its keys are read by nothing"));
+}
+
+}  // namespace
+}  // namespace evac
