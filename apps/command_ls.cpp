@@ -9,6 +9,9 @@
 
 #include "apps/commands.h"
 #include "core/store.h"
+#include "reports/tally.h"
+#include "reports/text_table.h"
+#include "reports/wording.h"
 
 namespace evac {
 namespace {
@@ -19,6 +22,8 @@ struct LsArguments {
   std::string run;
   bool json = false;
   bool failed = false;
+  bool rates = false;
+  std::string judge = "oracle";  ///< whose verdicts the rates count
   std::string world, task, policy;  ///< empty: all
 };
 
@@ -123,19 +128,6 @@ std::vector<Row> Rows(const std::vector<Listed>& list) {
   return rows;
 }
 
-void PrintAligned(const std::vector<Row>& rows) {
-  std::vector<std::size_t> widths(rows.front().size());
-  for (const Row& row : rows) {
-    for (std::size_t i = 0; i < row.size(); ++i) widths[i] = std::max(widths[i], row[i].size());
-  }
-  for (const Row& row : rows) {
-    std::string line;
-    for (std::size_t i = 0; i < row.size(); ++i)
-      line += fmt::format("{:{}}  ", row[i], i + 1 < row.size() ? widths[i] : 0);
-    fmt::print("{}\n", line.substr(0, line.find_last_not_of(' ') + 1));
-  }
-}
-
 /// What came over the wire that was no plain answer, or not at once: effort, no part of a result.
 void PrintWire(const std::map<std::string, Counters>& wire) {
   for (const auto& [policy, counters] : wire) {
@@ -148,7 +140,7 @@ void PrintWire(const std::map<std::string, Counters>& wire) {
 }
 
 void PrintTable(const std::vector<Listed>& list) {
-  PrintAligned(Rows(list));
+  fmt::print("{}", TextTable(Rows(list)));
   std::set<std::string> tasks, policies, worlds;
   std::size_t failed = 0, judged = 0;
   for (const auto& [episode, labels] : list) {
@@ -168,6 +160,27 @@ void PrintTable(const std::vector<Listed>& list) {
              counted(worlds.size(), "world", "worlds"), failed, judged);
 }
 
+/// Rates of a run of any length: counted while its rows are read.
+void PrintRates(const LsArguments& arguments) {
+  const Store store = Store::Open(arguments.run, Store::Mode::kReadOnly);
+  Check(arguments, store);
+  std::vector<Row> rows = {{"TASK", "POLICY", "WORLD", "EPISODES", "RATE", "NOT COUNTED"}};
+  for (const RateCell& cell : TallyRates(store, arguments.judge, SummaryOptions().confidence)) {
+    const std::string policy = cell.policy.substr(0, cell.policy.find('@'));
+    if ((!arguments.world.empty() && cell.world != arguments.world) ||
+        (!arguments.task.empty() && cell.task != arguments.task) ||
+        (!arguments.policy.empty() && policy != arguments.policy))
+      continue;
+    std::vector<std::string> apart;
+    for (const Outcome outcome : {Outcome::kCannotTell, Outcome::kInvalid, Outcome::kError, Outcome::kUnjudged})
+      if (cell.Of(outcome) > 0) apart.push_back(CountInWords(outcome, cell.Of(outcome)));
+    const std::int64_t counted = cell.Of(Outcome::kSuccess) + cell.Of(Outcome::kFailure);
+    rows.push_back({cell.task, cell.policy, cell.world, std::to_string(counted + cell.Apart()),
+                    PercentWithInterval(cell.rate), apart.empty() ? "-" : fmt::format("{}", fmt::join(apart, ", "))});
+  }
+  fmt::print("{}", TextTable(rows));
+}
+
 }  // namespace
 
 void AddLs(CLI::App& app, ExitCode& exit_code) {
@@ -176,6 +189,8 @@ void AddLs(CLI::App& app, ExitCode& exit_code) {
   command->add_option("RUN", arguments->run, "folder of a run")->required();
   command->add_flag("--json", arguments->json, "an array with one object per episode");
   command->add_flag("--failed", arguments->failed, "only episodes that failed (an error, not an unsuccessful attempt)");
+  const auto rates = command->add_flag("--rates", arguments->rates, "success rates with 95 % intervals instead of episodes");
+  command->add_option("--judge", arguments->judge, "whose verdicts the rates count")->needs(rates)->capture_default_str();
   command->add_option("--world", arguments->world, "only this world's");
   command->add_option("--task", arguments->task, "only this task's");
   command->add_option("--policy", arguments->policy, "only this policy's, with all its checkpoints");
@@ -183,8 +198,12 @@ void AddLs(CLI::App& app, ExitCode& exit_code) {
       "Examples:\n"
       "  evac ls out/demo --world sim\n"
       "  evac ls out/demo --failed\n"
+      "  evac ls out/demo --rates --task take_bottle\n"
       "  evac ls out/demo --json | jq '.[] | select(.verdicts.oracle == \"success\") | .video'");
+  rates->excludes("--json", "--failed");
   command->callback([arguments, &exit_code] {
+    exit_code = ExitCode::kOk;
+    if (arguments->rates) return PrintRates(*arguments);
     const Listing list = List(*arguments);
     if (arguments->json) {
       PrintJson(list.episodes);
@@ -192,7 +211,6 @@ void AddLs(CLI::App& app, ExitCode& exit_code) {
       PrintTable(list.episodes);
       PrintWire(list.wire);
     }
-    exit_code = ExitCode::kOk;
   });
 }
 

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <atomic>
 #include <csignal>
 #include <cstdio>
 #include <memory>
@@ -19,7 +20,9 @@
 namespace evac {
 namespace {
 
-volatile std::sig_atomic_t g_interrupted = 0;
+/// Set by a signal handler, which may run in any thread.
+std::atomic<bool> g_interrupted = false;
+static_assert(std::atomic<bool>::is_always_lock_free);
 
 constexpr int kInterrupts[] = {SIGINT, SIGTERM, SIGHUP};  ///< Ctrl-C, kill, the terminal is closed
 
@@ -28,10 +31,10 @@ constexpr int kInterrupts[] = {SIGINT, SIGTERM, SIGHUP};  ///< Ctrl-C, kill, the
 class CatchInterrupts {
  public:
   CatchInterrupts() {
-    g_interrupted = 0;
+    g_interrupted = false;
     for (const int signal : kInterrupts) {
       std::signal(signal, [](int caught) {
-        g_interrupted = 1;
+        g_interrupted = true;
         if (caught != SIGHUP) std::signal(caught, SIG_DFL);
       });
     }
@@ -47,7 +50,7 @@ void Tell(fmt::format_string<Args...> format, Args&&... args) {
   std::fputs(fmt::format(format, std::forward<Args>(args)...).c_str(), stderr);
 }
 
-bool IsInterrupted() { return g_interrupted != 0; }
+bool IsInterrupted() { return g_interrupted; }
 
 /// "12 repeats, 3 late_replies", or nothing where the wire was quiet.
 std::string Sentence(const Counters& counters) {

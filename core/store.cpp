@@ -55,6 +55,30 @@ void BeginOrDemandSame(sqlite::Connection& connection, const RunInfo& run, const
       folder.string(), stored->suite_hash, run.suite_hash);
 }
 
+/// The record's episode without its steps, its files named; the thumbnail is written.
+Episode WithFiles(const EpisodeRecord& record, const fs::path& folder) {
+  Episode episode = {.key = record.episode.key,
+                     .observations = {},
+                     .commands = {},
+                     .chunks = record.episode.chunks,
+                     .stop = record.episode.stop,
+                     .stop_reason = record.episode.stop_reason,
+                     .failure = record.episode.failure,
+                     .video = record.episode.video,
+                     .video_sha256 = record.episode.video_sha256,
+                     .thumbnail = record.episode.thumbnail};
+  if (record.video) {
+    episode.video = run_files::NameInside(folder, record.video->path);
+    episode.video_sha256 = record.video->sha256;
+  }
+  if (!record.thumbnail_jpeg.empty()) {
+    episode.thumbnail = run_files::ThumbnailName(episode.key);
+    MakeFolders((folder / episode.thumbnail).parent_path());
+    WriteFileAtomically(folder / episode.thumbnail, record.thumbnail_jpeg);
+  }
+  return episode;
+}
+
 }  // namespace
 
 Store::Store(std::unique_ptr<Database> database) : database_(std::move(database)) {}
@@ -123,24 +147,22 @@ std::vector<Task> Store::Tasks() const { return database_->Read(rows::SelectTask
 std::vector<WorldInfo> Store::Worlds() const { return database_->Read(rows::SelectWorlds); }
 std::vector<PolicyInfo> Store::Policies() const { return database_->Read(rows::SelectPolicies); }
 
-void Store::Add(const EpisodeRecord& record) {
-  Episode episode = record.episode;
-  const std::string id = episode.key.Id();
-  if (Has(episode.key))
-    throw InternalError("episode {} is in the store already", id);  // before its thumbnail is overwritten
-  if (record.video) {
-    episode.video = run_files::NameInside(folder(), record.video->path);
-    episode.video_sha256 = record.video->sha256;
-  }
-  if (!record.thumbnail_jpeg.empty()) {
-    episode.thumbnail = run_files::ThumbnailName(episode.key);
-    MakeFolders((folder() / episode.thumbnail).parent_path());
-    WriteFileAtomically(folder() / episode.thumbnail, record.thumbnail_jpeg);
+void Store::Add(const EpisodeRecord& record) { AddAll({&record, 1}); }
+
+void Store::AddAll(std::span<const EpisodeRecord> records) {
+  std::vector<Episode> episodes;
+  for (const EpisodeRecord& record : records) {
+    if (Has(record.episode.key))  // before its thumbnail is overwritten
+      throw InternalError("episode {} is in the store already", record.episode.key.Id());
+    episodes.push_back(WithFiles(record, folder()));
   }
   database_->Write([&](auto& connection) {
-    rows::InsertEpisode(connection, episode);
-    rows::InsertSteps(connection, episode);
-    if (!record.privileged.empty()) rows::InsertPrivileged(connection, id, record.privileged);
+    for (std::size_t i = 0; i < records.size(); ++i) {
+      rows::InsertEpisode(connection, episodes[i]);
+      rows::InsertSteps(connection, records[i].episode);
+      if (!records[i].privileged.empty())
+        rows::InsertPrivileged(connection, episodes[i].key.Id(), records[i].privileged);
+    }
   });
 }
 
@@ -164,6 +186,10 @@ void Store::RemoveFailed(const EpisodeKey& key) {
 
 std::vector<Episode> Store::Episodes() const { return database_->Read(rows::SelectEpisodes); }
 
+void Store::ForEachEnded(const std::string& judge, const std::function<void(const EndedEpisode&)>& see) const {
+  database_->Read([&](auto& connection) { rows::VisitEnded(connection, judge, see); });
+}
+
 void Store::LoadSteps(Episode& episode) const {
   database_->Read([&](auto& connection) { rows::SelectSteps(connection, episode); });
 }
@@ -182,8 +208,12 @@ std::optional<InitialScene> Store::LoadInitialScene(const std::string& task, con
 
 std::vector<PairKey> Store::InitialScenes() const { return database_->Read(rows::SelectInitialScenePairs); }
 
-void Store::AddVerdict(const Verdict& verdict) {
-  database_->Write([&](auto& connection) { rows::InsertVerdict(connection, verdict); });
+void Store::AddVerdict(const Verdict& verdict) { AddVerdicts({&verdict, 1}); }
+
+void Store::AddVerdicts(std::span<const Verdict> verdicts) {
+  database_->Write([&](auto& connection) {
+    for (const Verdict& verdict : verdicts) rows::InsertVerdict(connection, verdict);
+  });
 }
 
 std::vector<Verdict> Store::Verdicts() const { return database_->Read(rows::SelectVerdicts); }

@@ -2,10 +2,13 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <functional>
 #include <map>
 #include <memory>
 #include <optional>
+#include <span>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "core/types.h"
@@ -60,6 +63,13 @@ struct SequentialLook {
   bool operator==(const SequentialLook&) const = default;
 };
 
+/// How one episode ended, for one judge: what rates are counted from. Its texts live as long as the call that gets it.
+struct EndedEpisode {
+  std::string_view task, initial_state, policy, checkpoint, world;
+  bool failed = false;
+  std::optional<Label> label;  ///< the judge's current one; nothing: it gave none
+};
+
 /// How often the wire misbehaved, by name ("repeats", "stale_replies", …): counts of effort, no part of a result.
 using Counters = std::map<std::string, std::int64_t>;
 
@@ -100,12 +110,16 @@ class Store {
   /// @throws Error if the episode is there already, its video is not in the run's folder, or the disk is full (the
   /// store stays intact).
   void Add(const EpisodeRecord& record);
+  /// The same for many at once, all of them or none: an episode alone waits for the disk, a thousand wait once.
+  void AddAll(std::span<const EpisodeRecord> records);
   bool Has(const EpisodeKey& key) const;
   /// Removes a failed episode and its verdicts so that it can run again (`resume --retry-failed`).
   void RemoveFailed(const EpisodeKey& key);
 
   /// All episodes in pair-key order, then world: without observations and commands (see LoadSteps).
   std::vector<Episode> Episodes() const;
+  /// Each episode once, in no promised order, none of them kept: a million fit into no list that anybody wants.
+  void ForEachEnded(const std::string& judge, const std::function<void(const EndedEpisode&)>& see) const;
   /// Fills in observations (arms only, no images) and commands.
   void LoadSteps(Episode& episode) const;
   /// For the oracle judge alone; empty if the world had none.
@@ -119,6 +133,8 @@ class Store {
   std::vector<PairKey> InitialScenes() const;
 
   void AddVerdict(const Verdict& verdict);
+  /// All of them or none.
+  void AddVerdicts(std::span<const Verdict> verdicts);
   /// Every verdict ever given, oldest first.
   std::vector<Verdict> Verdicts() const;
   /// The current one per (episode id, judge): the last added.

@@ -92,6 +92,18 @@ std::optional<Episode> SelectEpisode(sqlite::Connection& connection, const std::
   return row.Step() ? std::optional(ReadEpisode(row)) : std::nullopt;
 }
 
+void VisitEnded(sqlite::Connection& connection, const std::string& judge,
+                const std::function<void(const EndedEpisode&)>& see) {
+  auto row = connection.Query(
+      "SELECT task, initial_state, policy, checkpoint, world, failed, "
+      "(SELECT label FROM verdicts WHERE judge = ? AND episode = episodes.id ORDER BY id DESC LIMIT 1) FROM episodes",
+      judge);
+  while (row.Step()) {
+    see({row.View(0), row.View(1), row.View(2), row.View(3), row.View(4), row.Integer(5) != 0,
+         row.IsNull(6) ? std::nullopt : std::optional(LabelFromName(row.Text(6)))});
+  }
+}
+
 void SelectSteps(sqlite::Connection& connection, Episode& episode) {
   auto row = connection.Query("SELECT observations, commands FROM steps WHERE episode = ?", episode.key.Id());
   if (!row.Step()) throw InternalError("episode {} is not in the store", episode.key.Id());

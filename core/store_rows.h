@@ -1,5 +1,6 @@
 #pragma once
 
+#include <functional>
 #include <map>
 #include <optional>
 #include <string>
@@ -30,6 +31,8 @@ void InsertPrivileged(sqlite::Connection& connection, const std::string& episode
 /// In pair-key order, then world.
 std::vector<Episode> SelectEpisodes(sqlite::Connection& connection);
 std::optional<Episode> SelectEpisode(sqlite::Connection& connection, const std::string& episode_id);
+void VisitEnded(sqlite::Connection& connection, const std::string& judge,
+                const std::function<void(const EndedEpisode&)>& see);
 void SelectSteps(sqlite::Connection& connection, Episode& episode);
 PrivilegedTrack SelectPrivileged(sqlite::Connection& connection, const std::string& episode_id);
 void DeleteFailedEpisode(sqlite::Connection& connection, const std::string& episode_id);

@@ -107,7 +107,12 @@ CREATE TRIGGER sequential_looks_stay BEFORE DELETE ON sequential_looks
 BEGIN SELECT RAISE(ABORT, 'looks are append-only'); END;
 )sql";
 
-constexpr const char* kSteps[] = {kVersion1, kVersion2};
+/// For rates over very many episodes: a judge's labels without reading its verdicts' texts.
+constexpr const char* kVersion3 = R"sql(
+CREATE INDEX verdicts_of_judge ON verdicts (judge, episode, id, label);
+)sql";
+
+constexpr const char* kSteps[] = {kVersion1, kVersion2, kVersion3};
 
 std::int64_t Pragma(sqlite::Connection& connection, const char* sql) {
   sqlite::Statement statement = connection.Query(sql);

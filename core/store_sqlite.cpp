@@ -52,10 +52,10 @@ bool Statement::IsNull(int column) const { return sqlite3_column_type(statement_
 std::int64_t Statement::Integer(int column) const { return sqlite3_column_int64(statement_.get(), column); }
 double Statement::Real(int column) const { return sqlite3_column_double(statement_.get(), column); }
 
-std::string Statement::Text(int column) const {
+std::string_view Statement::View(int column) const {
   const auto* bytes = static_cast<const char*>(sqlite3_column_blob(statement_.get(), column));
   const auto size = static_cast<std::size_t>(sqlite3_column_bytes(statement_.get(), column));
-  return bytes ? std::string(bytes, size) : std::string();
+  return bytes ? std::string_view(bytes, size) : std::string_view();
 }
 
 void Statement::Bind(int position, std::string_view text) {

@@ -34,7 +34,8 @@ class Statement {
   bool IsNull(int column) const;
   std::int64_t Integer(int column) const;
   double Real(int column) const;
-  std::string Text(int column) const;  ///< of TEXT or BLOB; "" for NULL
+  std::string_view View(int column) const;  ///< of TEXT or BLOB, until the next step; "" for NULL
+  std::string Text(int column) const { return std::string(View(column)); }
 
  private:
   void Bind(int position, std::string_view text);

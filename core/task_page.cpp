@@ -109,23 +109,6 @@ std::vector<Camera> ReadCameras(const Config& page) {
   return cameras;
 }
 
-StillRule ReadStill(const Config& page) {
-  page.AllowOnly({"enabled", "translation_m", "rotation_rad", "closure", "dwell_chunks", "min_chunks"});
-  StillRule still;
-  still.enabled = page.Get<bool>("enabled", still.enabled);
-  still.translation_m = page.Get<double>("translation_m", still.translation_m);
-  still.rotation_rad = page.Get<double>("rotation_rad", still.rotation_rad);
-  still.closure = page.Get<double>("closure", still.closure);
-  still.dwell_chunks = page.Get<int>("dwell_chunks", still.dwell_chunks);
-  still.min_chunks = page.Get<int>("min_chunks", still.min_chunks);
-  page.Require(still.translation_m >= 0, "translation_m", "0 or more");
-  page.Require(still.rotation_rad >= 0, "rotation_rad", "0 or more");
-  page.Require(still.closure >= 0, "closure", "0 or more");
-  page.Require(still.dwell_chunks >= 1, "dwell_chunks", "1 or more");
-  page.Require(still.min_chunks >= 0, "min_chunks", "0 or more");
-  return still;
-}
-
 Eigen::AlignedBox3d ReadWorkspace(const Config& page) {
   page.AllowOnly({"min", "max"});
   const Eigen::AlignedBox3d workspace_m(ReadVector(page, "min"), ReadVector(page, "max"));
@@ -204,13 +187,30 @@ Task ReadTask(const Config& page) {
   page.Require(task.period_s >= 0.001 && task.period_s <= 10, "period_s", "seconds, 0.001 … 10");
   task.max_chunks = page.Get<int>("max_chunks");
   page.Require(task.max_chunks >= 1, "max_chunks", "1 or more");
-  if (page.Has("still")) task.still = ReadStill(page.Section("still"));
+  if (page.Has("still")) task.still = ReadStillRule(page.Section("still"), {});
   task.workspace_m = ReadWorkspace(page.Section("workspace_m"));
   task.rubric = ReadRubric(page.Section("rubric"));
   return task;
 }
 
 }  // namespace
+
+StillRule ReadStillRule(const Config& page, const StillRule& otherwise) {
+  page.AllowOnly({"enabled", "translation_m", "rotation_rad", "closure", "dwell_chunks", "min_chunks"});
+  StillRule still;
+  still.enabled = page.Get<bool>("enabled", otherwise.enabled);
+  still.translation_m = page.Get<double>("translation_m", otherwise.translation_m);
+  still.rotation_rad = page.Get<double>("rotation_rad", otherwise.rotation_rad);
+  still.closure = page.Get<double>("closure", otherwise.closure);
+  still.dwell_chunks = page.Get<int>("dwell_chunks", otherwise.dwell_chunks);
+  still.min_chunks = page.Get<int>("min_chunks", otherwise.min_chunks);
+  page.Require(still.translation_m >= 0, "translation_m", "0 or more");
+  page.Require(still.rotation_rad >= 0, "rotation_rad", "0 or more");
+  page.Require(still.closure >= 0, "closure", "0 or more");
+  page.Require(still.dwell_chunks >= 1, "dwell_chunks", "1 or more");
+  page.Require(still.min_chunks >= 0, "min_chunks", "0 or more");
+  return still;
+}
 
 Task ReadTaskPage(const std::filesystem::path& path) { return ParseTaskPage(ReadFile(path), path); }
 

@@ -3,6 +3,7 @@
 #include <filesystem>
 #include <string>
 
+#include "core/config.h"
 #include "core/types.h"
 
 namespace evac {
@@ -13,5 +14,9 @@ namespace evac {
 Task ReadTaskPage(const std::filesystem::path& path);
 /// The same from a text, e.g. the one a store kept.
 Task ParseTaskPage(const std::string& text, const std::filesystem::path& path);
+
+/// A section `still` of a task or a suite; what it leaves out is as in `otherwise`.
+/// @throws InvalidInput naming file, line and field: an unknown one, or a number out of its range.
+StillRule ReadStillRule(const Config& page, const StillRule& otherwise);
 
 }  // namespace evac

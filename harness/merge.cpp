@@ -97,21 +97,34 @@ FinishedVideo CopyVideo(const Episode& episode, const fs::path& from, const Stor
   return {.path = copy, .sha256 = episode.video_sha256, .frames = static_cast<int>(episode.observations.size())};
 }
 
-void CopyEpisode(Episode episode, const Store& from, Store& to) {
+EpisodeRecord CopyFiles(Episode episode, const Store& from, const Store& to) {
   from.LoadSteps(episode);
   EpisodeRecord record;
   record.privileged = from.LoadPrivileged(episode.key.Id());
   if (!episode.video.empty()) record.video = CopyVideo(episode, from.folder(), to);
   if (!episode.thumbnail.empty()) record.thumbnail_jpeg = ReadFile(from.folder() / episode.thumbnail);
   record.episode = std::move(episode);
-  to.Add(record);
+  return record;
+}
+
+/// A transaction for some hundred episodes: each waits for the disk.
+void CopyEpisodes(const std::vector<Episode>& episodes, const Store& from, Store& to) {
+  constexpr std::size_t kBatch = 256;
+  std::vector<EpisodeRecord> batch;
+  for (const Episode& episode : episodes) {
+    batch.push_back(CopyFiles(episode, from, to));
+    if (batch.size() < kBatch) continue;
+    to.AddAll(batch);
+    batch.clear();
+  }
+  to.AddAll(batch);
 }
 
 /// What the shards say of the episodes taken from them, in their order; what two say alike is said once.
 void CopyVerdicts(const Store& from, const std::set<std::string>& taken, Store& to) {
-  for (const Verdict& verdict : from.Verdicts()) {
-    if (taken.contains(verdict.episode_id)) to.AddVerdict(verdict);
-  }
+  std::vector<Verdict> verdicts = from.Verdicts();
+  std::erase_if(verdicts, [&](const Verdict& verdict) { return !taken.contains(verdict.episode_id); });
+  to.AddVerdicts(verdicts);
 }
 
 /// Imported trials, those of the first shard that has them.
@@ -145,12 +158,11 @@ MergeSummary MergeRuns(const std::vector<fs::path>& shards, const fs::path& out)
     Store merged = Store::CreateOrContinue(part, stores.front().run());
     for (std::size_t s = 0; s < stores.size(); ++s) {
       CopyDeclarations(stores[s], merged);
+      std::vector<Episode> episodes = stores[s].Episodes();
+      std::erase_if(episodes, [&](const Episode& episode) { return choice.shard.at(episode.key) != s; });
       std::set<std::string> taken;
-      for (const Episode& episode : stores[s].Episodes()) {
-        if (choice.shard.at(episode.key) != s) continue;
-        taken.insert(episode.key.Id());
-        CopyEpisode(episode, stores[s], merged);
-      }
+      for (const Episode& episode : episodes) taken.insert(episode.key.Id());
+      CopyEpisodes(episodes, stores[s], merged);
       CopyVerdicts(stores[s], taken, merged);
       CopyRealTrials(stores[s], merged);
     }

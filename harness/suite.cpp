@@ -71,28 +71,12 @@ std::vector<InitialState> ReadInitialStates(const Config& suite) {
   return states;
 }
 
-StillRule ReadStill(const Config& suite, const StillRule& otherwise) {
-  if (!suite.Has("still")) return otherwise;
-  const Config page = suite.Section("still");
-  page.AllowOnly({"enabled", "translation_m", "rotation_rad", "closure", "dwell_chunks", "min_chunks"});
-  StillRule still;
-  still.enabled = page.Get<bool>("enabled", otherwise.enabled);
-  still.translation_m = page.Get<double>("translation_m", otherwise.translation_m);
-  still.rotation_rad = page.Get<double>("rotation_rad", otherwise.rotation_rad);
-  still.closure = page.Get<double>("closure", otherwise.closure);
-  still.dwell_chunks = page.Get<int>("dwell_chunks", otherwise.dwell_chunks);
-  still.min_chunks = page.Get<int>("min_chunks", otherwise.min_chunks);
-  page.Require(still.dwell_chunks >= 1, "dwell_chunks", "1 or more");
-  page.Require(still.translation_m >= 0 && still.rotation_rad >= 0 && still.closure >= 0, "translation_m", "thresholds of 0 or more");
-  return still;
-}
-
 std::vector<Task> ReadTasks(const Config& suite) {
   std::vector<Task> tasks;
   for (const Config& item : suite.List("tasks")) {
     const fs::path named = item.Value<std::string>();
     Task task = ReadTaskPage(named.is_absolute() ? named : suite.file().parent_path() / named);
-    task.still = ReadStill(suite, task.still);
+    if (suite.Has("still")) task.still = ReadStillRule(suite.Section("still"), task.still);
     tasks.push_back(std::move(task));
   }
   if (!suite.Has("image")) return tasks;

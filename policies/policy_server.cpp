@@ -5,6 +5,7 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <atomic>
 #include <csignal>
 #include <cstdlib>
 #include <deque>
@@ -275,7 +276,9 @@ const Counters& PolicyServer::counters() const { return impl_->counters; }
 
 namespace {
 
-volatile std::sig_atomic_t g_must_end = 0;
+/// Set by a signal handler, which may run in any thread.
+std::atomic<bool> g_must_end = false;
+static_assert(std::atomic<bool>::is_always_lock_free);
 
 /// SIGTERM and SIGINT end the loop. They are blocked here and in LCM's thread, which inherits that (a select that they
 /// interrupt is an error to LCM), and wait for sigtimedwait; threads that libraries started before may still take them,
@@ -285,7 +288,7 @@ sigset_t CatchEnding() {
   sigemptyset(&ending);
   for (const int number : {SIGTERM, SIGINT}) {
     sigaddset(&ending, number);
-    std::signal(number, [](int) { g_must_end = 1; });
+    std::signal(number, [](int) { g_must_end = true; });
   }
   pthread_sigmask(SIG_BLOCK, &ending, nullptr);
   return ending;
@@ -299,7 +302,7 @@ int ServePolicy(Policy& policy, const PolicySpec& spec, const LcmAddress& addres
   PolicyServer server(policy, spec, address);
   const timespec at_once{};
   const bool is_supervised = std::getenv("EVAC_SUPERVISED") != nullptr;
-  const auto must_end = [&] { return g_must_end != 0 || sigtimedwait(&ending, nullptr, &at_once) > 0; };
+  const auto must_end = [&] { return g_must_end || sigtimedwait(&ending, nullptr, &at_once) > 0; };
   while (!must_end() && !(is_supervised && getppid() != parent)) server.Handle(0.1);
   return 0;
 }

@@ -21,9 +21,13 @@ std::string CountInWords(Outcome outcome, std::int64_t count) {
 }
 
 Outcome OutcomeOf(const Episode& episode, const std::optional<Verdict>& verdict) {
-  if (IsFailure(episode.stop)) return Outcome::kError;
-  if (!verdict) return Outcome::kUnjudged;
-  switch (verdict->label) {
+  return OutcomeOf(IsFailure(episode.stop), verdict ? std::optional(verdict->label) : std::nullopt);
+}
+
+Outcome OutcomeOf(bool failed, std::optional<Label> label) {
+  if (failed) return Outcome::kError;
+  if (!label) return Outcome::kUnjudged;
+  switch (*label) {
     case Label::kSuccess:
       return Outcome::kSuccess;
     case Label::kFailure:

@@ -29,6 +29,8 @@ struct JudgedEpisode {
 
 /// An episode that could not go on is an error, whatever a judge says of it.
 Outcome OutcomeOf(const Episode& episode, const std::optional<Verdict>& verdict);
+/// The same of what the store tells of it.
+Outcome OutcomeOf(bool failed, std::optional<Label> label);
 
 /// "visual_pick@good"; the name alone without a checkpoint.
 std::string PolicyLabel(const std::string& name, const std::string& checkpoint);

@@ -5,6 +5,7 @@
 #include <nlohmann/json.hpp>
 
 #include "apps/commands.h"
+#include "tests/apps/printed.h"
 #include "tests/support/temp_folder.h"
 
 namespace evac {
@@ -19,22 +20,9 @@ class CorrelateOptions : public testing::Test {
                                             ",t,a,0.2,0.5\n,t,b,0.6,0.5\n,t,c,0.8,0.9\n,t,d,0.7,0.95\n";
   }
 
-  /// What the command prints; its exceptions come through.
   std::string Correlate(std::vector<std::string> words) const {
-    CLI::App app;
-    ExitCode exit_code = ExitCode::kInternal;
-    AddCorrelate(app, exit_code);
     words.insert(words.begin(), "correlate");
-    std::reverse(words.begin(), words.end());  // as CLI11 wants them
-    testing::internal::CaptureStdout();
-    try {
-      app.parse(words);
-    } catch (...) {
-      testing::internal::GetCapturedStdout();
-      throw;
-    }
-    EXPECT_EQ(exit_code, ExitCode::kOk);
-    return testing::internal::GetCapturedStdout();
+    return Printed(AddCorrelate, words);
   }
 
   nlohmann::json Group(std::vector<std::string> options) const {

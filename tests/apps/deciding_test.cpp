@@ -7,6 +7,7 @@
 #include "apps/commands.h"
 #include "core/store.h"
 #include "tests/core/store_samples.h"
+#include "tests/apps/printed.h"
 #include "tests/support/temp_folder.h"
 
 namespace evac {
@@ -46,26 +47,9 @@ class Deciding : public testing::Test {
 
   std::string Run() const { return (folder_ / "run").string(); }
 
-  /// What the command prints; its exceptions come through.
-  std::string Print(void (*add)(CLI::App&, ExitCode&), std::vector<std::string> words) const {
-    CLI::App app;
-    ExitCode exit_code = ExitCode::kInternal;
-    add(app, exit_code);
-    std::reverse(words.begin(), words.end());  // as CLI11 wants them
-    testing::internal::CaptureStdout();
-    try {
-      app.parse(words);
-    } catch (...) {
-      testing::internal::GetCapturedStdout();
-      throw;
-    }
-    EXPECT_EQ(exit_code, ExitCode::kOk);
-    return testing::internal::GetCapturedStdout();
-  }
-
   std::string Compare(std::vector<std::string> options) const {
     options.insert(options.begin(), {"compare", "visual_pick@good", "visual_pick@poor", "--run", Run()});
-    return Print(AddCompare, options);
+    return Printed(AddCompare, options);
   }
 
   std::string Csv(const std::string& rows) const {
@@ -88,10 +72,10 @@ TEST_F(Deciding, CompareNamesTheBetterPolicyInEveryWorld) {
 
 TEST_F(Deciding, ComparedRunsMayBeFoldersOfTheirOwn) {
   const std::string a = Run() + ":visual_pick@good", b = Run() + ":visual_pick@poor";
-  EXPECT_THAT(Print(AddCompare, {"compare", a, b, "--world", "sim"}), HasSubstr("visual_pick@good is better"));
-  EXPECT_THROW(Print(AddCompare, {"compare", a, a}), Error) << "against itself";
-  EXPECT_THROW(Print(AddCompare, {"compare", Run(), b}), Error) << "a run with several policies";
-  EXPECT_THROW(Print(AddCompare, {"compare", "visual_pick@good", b}), Error) << "no folder";
+  EXPECT_THAT(Printed(AddCompare, {"compare", a, b, "--world", "sim"}), HasSubstr("visual_pick@good is better"));
+  EXPECT_THROW(Printed(AddCompare, {"compare", a, a}), Error) << "against itself";
+  EXPECT_THROW(Printed(AddCompare, {"compare", Run(), b}), Error) << "a run with several policies";
+  EXPECT_THROW(Printed(AddCompare, {"compare", "visual_pick@good", b}), Error) << "no folder";
   EXPECT_THROW(Compare({"--world", "moon"}), Error);
   EXPECT_THROW(Compare({"--judge", "nobody"}), Error);
 }
@@ -106,28 +90,28 @@ TEST_F(Deciding, SequentialLooksAreKeptAndTheSameDataAreNoNewLook) {
 }
 
 TEST_F(Deciding, ImportedTrialsAreWhatAWorldIsHeldAgainst) {
-  EXPECT_THAT(Print(AddTrust, {"trust", Run()}), HasSubstr("Held against the world real"));
+  EXPECT_THAT(Printed(AddTrust, {"trust", Run()}), HasSubstr("Held against the world real"));
   std::ofstream(folder_ / "clip.mp4") << "video";
   const std::string csv =
       Csv("take_bottle,41-0000,visual_pick,good,success,clip.mp4\n"
           "take_bottle,41-0001,visual_pick,good,failure,\n");
-  EXPECT_THAT(Print(AddImportReal, {"import-real", csv, "--run", Run()}), HasSubstr("2 real trials imported"));
-  EXPECT_THAT(Print(AddImportReal, {"import-real", csv, "--run", Run()}), HasSubstr("2 there already"));
+  EXPECT_THAT(Printed(AddImportReal, {"import-real", csv, "--run", Run()}), HasSubstr("2 real trials imported"));
+  EXPECT_THAT(Printed(AddImportReal, {"import-real", csv, "--run", Run()}), HasSubstr("2 there already"));
   const Store store = Store::Open(Run(), Store::Mode::kReadOnly);
   ASSERT_EQ(store.RealTrials().size(), 2u);
   EXPECT_TRUE(std::filesystem::is_regular_file(store.folder() / store.RealTrials()[0].video));
   const auto task =
-      nlohmann::json::parse(Print(AddTrust, {"trust", Run(), "--json"})).at("worlds").at(0).at("tasks").at(0);
+      nlohmann::json::parse(Printed(AddTrust, {"trust", Run(), "--json"})).at("worlds").at(0).at("tasks").at(0);
   EXPECT_EQ(task.at("n"), 2);
   EXPECT_EQ(task.at("pairs").at("model_only"), 1);
   EXPECT_EQ(task.at("policies").at(0).at("further_imagined").at("trials"), 8);
 }
 
 TEST_F(Deciding, AWrongFileImportsNothing) {
-  EXPECT_THROW(Print(AddImportReal, {"import-real", Csv("take_bottle,41-0000,visual_pick,good,success,missing.mp4\n"),
+  EXPECT_THROW(Printed(AddImportReal, {"import-real", Csv("take_bottle,41-0000,visual_pick,good,success,missing.mp4\n"),
                                      "--run", Run()}),
                Error);
-  EXPECT_THROW(Print(AddImportReal, {"import-real",
+  EXPECT_THROW(Printed(AddImportReal, {"import-real",
                                      Csv("take_bottle,41-0000,visual_pick,good,success,\n"
                                          "take_bottle,41-0000,visual_pick,good,perhaps,\n"),
                                      "--run", Run()}),
@@ -136,9 +120,9 @@ TEST_F(Deciding, AWrongFileImportsNothing) {
 }
 
 TEST_F(Deciding, APlanNeedsNoRun) {
-  EXPECT_THAT(Print(AddPlan, {"plan", "--rate", "0.28", "--difference", "0.08"}), HasSubstr("533 episodes of each"));
-  EXPECT_EQ(nlohmann::json::parse(Print(AddPlan, {"plan", "--json"})).at("options").at("trials"), 40);
-  EXPECT_THROW(Print(AddPlan, {"plan", "--rate", "2"}), Error);
+  EXPECT_THAT(Printed(AddPlan, {"plan", "--rate", "0.28", "--difference", "0.08"}), HasSubstr("533 episodes of each"));
+  EXPECT_EQ(nlohmann::json::parse(Printed(AddPlan, {"plan", "--json"})).at("options").at("trials"), 40);
+  EXPECT_THROW(Printed(AddPlan, {"plan", "--rate", "2"}), Error);
 }
 
 }  // namespace

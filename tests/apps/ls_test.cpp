@@ -6,6 +6,7 @@
 #include "apps/commands.h"
 #include "core/store.h"
 #include "tests/core/store_samples.h"
+#include "tests/apps/printed.h"
 #include "tests/support/temp_folder.h"
 
 namespace evac {
@@ -38,22 +39,10 @@ class Ls : public testing::Test {
                        .rubric_version = ""});
   }
 
-  /// What the command prints, while the run is open for writing.
+  /// While the run is open for writing.
   std::string Print(std::vector<std::string> options) const {
-    CLI::App app;
-    ExitCode exit_code = ExitCode::kInternal;
-    AddLs(app, exit_code);
     options.insert(options.begin(), {"ls", (folder_ / "run").string()});
-    std::reverse(options.begin(), options.end());  // as CLI11 wants them
-    testing::internal::CaptureStdout();
-    try {
-      app.parse(options);
-    } catch (...) {
-      testing::internal::GetCapturedStdout();
-      throw;
-    }
-    EXPECT_EQ(exit_code, ExitCode::kOk);
-    return testing::internal::GetCapturedStdout();
+    return Printed(AddLs, options);
   }
 
   std::vector<std::string> Listed(const std::vector<std::string>& options) const {
@@ -121,6 +110,16 @@ TEST_F(Ls, TheTableEndsWithASummary) {
                                "human:ann=cannot_tell oracle=success\n"));
   EXPECT_THAT(table, HasSubstr("failed: real/take_bottle/visual_pick@good/41-0007-s10: the policy answered NaN\n"));
   EXPECT_THAT(table, HasSubstr("\n3 episodes (1 task, 1 policy, 2 worlds), 1 failed, 1 judged\n"));
+}
+
+TEST_F(Ls, RatesCountWhatAJudgeSaidAndSayWhatTheyDoNotCount) {
+  const std::string rates = Print({"--rates"});
+  EXPECT_THAT(rates, StartsWith("TASK"));
+  EXPECT_THAT(rates, HasSubstr("take_bottle  visual_pick@good  real   2         undefined"));
+  EXPECT_THAT(rates, HasSubstr("1 error, 1 not judged\n"));
+  EXPECT_THAT(rates, HasSubstr("take_bottle  visual_pick@good  sim    1         100 % [21, 100]       -\n"));
+  EXPECT_THAT(Print({"--rates", "--world", "sim"}), testing::Not(HasSubstr("real")));
+  EXPECT_THAT(Print({"--rates", "--judge", "human:ann"}), HasSubstr("1 cannot tell\n"));
 }
 
 TEST_F(Ls, HowTheWireMisbehavedIsShownWhereItDid) {

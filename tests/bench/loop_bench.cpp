@@ -1,8 +1,10 @@
 // What the harness adds to a chunk, and what lanes bring: the numbers of docs/performance.md.
 #include <benchmark/benchmark.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <chrono>
+#include <fstream>
 #include <opencv2/imgproc.hpp>
 #include <thread>
 
@@ -192,6 +194,53 @@ BENCHMARK(MujocoLanes)
     ->Iterations(1)
     ->UseRealTime()
     ->Unit(benchmark::kSecond);
+
+/// This process's memory that is its own, MiB.
+double ResidentMib() {
+  std::ifstream statm("/proc/self/statm");
+  double pages = 0, resident = 0, shared = 0;
+  statm >> pages >> resident >> shared;
+  return (resident - shared) * static_cast<double>(::sysconf(_SC_PAGESIZE)) / (1 << 20);
+}
+
+/// Answers every observation with the arms where they are.
+class StandingPolicy : public Policy {
+ public:
+  std::string Name() const override { return "stands"; }
+  void Reset(SceneId, const Task&, std::uint64_t) override {}
+  std::vector<Acted> Act(std::span<const SceneObservation> batch) override {
+    std::vector<Acted> answers;
+    for (const SceneObservation& asked : batch)
+      answers.push_back(ActionChunk{std::vector<Arms>(16, asked.observation->arms), false, 0});
+    return answers;
+  }
+};
+
+/// What the loop keeps of episodes that are done: memory after some hundreds, and after all.
+void MemoryOfFinishedEpisodes(benchmark::State& state) {
+  const int episodes = static_cast<int>(state.range(0));
+  const TempFolder folder;
+  Task task = ThreeHundredTwentyByFiveTwelve(1);
+  task.cameras[0].width_px = task.cameras[0].height_px = 64;
+  task.max_chunks = 2;
+  Store store = NewStore(folder, task, "waiting");
+  WaitingWorld world(task, 0);
+  StandingPolicy policy;
+  double early_mib = 0;
+  RolloutOptions options;
+  options.lanes = 4;
+  options.lane = {.chunk_size = 16, .policy_chunk_size = 16, .latency = {}, .video = {}};
+  options.on_progress = [&](const Progress& progress) {
+    if (early_mib == 0 && progress.done >= episodes / 4) early_mib = ResidentMib();
+  };
+  for (auto _ : state) {
+    JobQueue jobs(Jobs(task, "waiting", episodes));
+    RunEpisodes(policy, world, jobs, store, options);
+  }
+  state.counters["mib_after_a_quarter"] = early_mib;
+  state.counters["mib_after_all"] = ResidentMib();
+}
+BENCHMARK(MemoryOfFinishedEpisodes)->Arg(2000)->Iterations(1)->Unit(benchmark::kSecond);
 
 /// One frame of 320x512.
 void EncodeOneFrame(benchmark::State& state) {

@@ -2,20 +2,19 @@
 #include <gtest/gtest.h>
 #include <sys/mount.h>
 #include <sys/ptrace.h>
-#include <sys/resource.h>
 #include <sys/wait.h>
-#include <unistd.h>
 
 #include <chrono>
 #include <csignal>
-#include <fstream>
 #include <set>
+#include <sstream>
 #include <thread>
 
 #include "core/error.h"
 #include "core/file.h"
 #include "core/hash.h"
-#include "tests/core/store_samples.h"
+#include "tests/core/store_writing.h"
+#include "tests/support/command.h"
 #include "tests/support/temp_folder.h"
 
 /// What is left when the process that writes is killed, and when the disk is full.
@@ -26,38 +25,11 @@ using namespace samples;
 using testing::AnyOf;
 using testing::HasSubstr;
 
-/// Runs `body` in a child that never returns into the test; what `body` returns is its exit code.
-template <typename Body>
-pid_t InChild(const Body& body) {
-  const pid_t child = ::fork();
-  if (child != 0) return child;
-  int code = 0;
-  try {
-    code = body();
-  } catch (const std::exception& error) {
-    fmt::print(stderr, "{}\n", error.what());
-    code = 99;
-  }
-  ::_exit(code);
-}
-
-/// What a run does from its start: opens, tidies up, and adds what is not there yet.
-void AddMissing(const std::filesystem::path& run, int count) {
-  Store store = Store::CreateOrContinue(run, SomeRun());
-  store.RemoveOrphans();
-  Declare(store);
-  for (int i = 0; i < count; ++i) {
-    if (store.Has(Key(i))) continue;
-    store.AddInitialScene(Key(i).pair, {{Image(i)}, {}, {}});
-    store.Add(SomeEpisode(store, Key(i)));
-    store.AddVerdict({.episode_id = Key(i).Id(),
-                      .judge = "oracle",
-                      .label = Label::kSuccess,
-                      .probability = {},
-                      .stages = {},
-                      .reason = "",
-                      .rubric_version = ""});
-  }
+/// Starts tests/core/store_child.cpp.
+pid_t Child(const std::vector<std::string>& words, const std::filesystem::path& log) {
+  std::vector<std::string> command = {Binary("store_child")};
+  command.insert(command.end(), words.begin(), words.end());
+  return StartCommand(command, log);
 }
 
 std::vector<std::string> VideoHashes(const Store& store) {
@@ -90,8 +62,8 @@ TEST(StoreKill, AnEpisodeIsThereWithItsVideoOrNotAtAll) {
   const std::filesystem::path run = folder / "run";
   SplitMix64 random(20);
   for (int kills = 0; kills < 12; ++kills) {
-    const pid_t child = InChild([&] { return AddMissing(run, 1'000'000), 0; });
-    std::this_thread::sleep_for(std::chrono::microseconds(random.Below(120'000)));
+    const pid_t child = Child({"add", run.string(), "1000000"}, folder / "log");
+    std::this_thread::sleep_for(std::chrono::microseconds(random.Below(200'000)));
     ::kill(child, SIGKILL);
     int status = 0;
     ::waitpid(child, &status, 0);
@@ -134,15 +106,7 @@ TEST(StoreKill, AtWhicheverSystemCallOfAnAddTheEpisodeIsThereWholeOrNotAtAll) {
   AddMissing(run, 1);
   int n = 1;
   for (bool killed = true; killed; n += 3) {
-    const pid_t child = InChild([&] {
-      Store store = Store::CreateOrContinue(run, SomeRun());
-      if (store.Has(Key(1))) return 0;
-      store.RemoveOrphans();
-      if (::ptrace(PTRACE_TRACEME, 0, nullptr, nullptr) != 0) return kNotTraced;
-      ::raise(SIGSTOP);
-      store.Add(SomeEpisode(store, Key(1)));
-      return 0;
-    });
+    const pid_t child = Child({"add_traced", run.string()}, folder / "log");
     int status = 0;
     killed = KilledAtSystemCall(child, n, status);
     if (WIFEXITED(status) && WEXITSTATUS(status) == kNotTraced) GTEST_SKIP() << "this machine lets nobody trace";
@@ -156,15 +120,12 @@ TEST(StoreKill, AtWhicheverSystemCallOfAnAddTheEpisodeIsThereWholeOrNotAtAll) {
 TEST(StoreKill, TheLockGoesWithTheKilledProcess) {
   const TempFolder folder;
   const std::filesystem::path run = folder / "run";
-  int ready[2];
-  ASSERT_EQ(::pipe(ready), 0);
-  const pid_t child = InChild([&] {
-    const Store store = Store::CreateOrContinue(run, SomeRun());
-    if (::write(ready[1], "x", 1) != 1) return 1;
-    return ::pause();
-  });
-  char x = 0;
-  ASSERT_EQ(::read(ready[0], &x, 1), 1);
+  const pid_t child = Child({"hold", run.string()}, folder / "log");
+  const auto holds = [&] {
+    return std::filesystem::exists(folder / "log") && ReadFile(folder / "log").find("held") != std::string::npos;
+  };
+  while (!holds() && ::waitpid(child, nullptr, WNOHANG) == 0)
+    std::this_thread::sleep_for(std::chrono::milliseconds(5));
   try {
     Store::CreateOrContinue(run, SomeRun());
     ADD_FAILURE() << "a second process was let in";
@@ -174,22 +135,6 @@ TEST(StoreKill, TheLockGoesWithTheKilledProcess) {
   ::kill(child, SIGKILL);
   ::waitpid(child, nullptr, 0);
   EXPECT_NO_THROW(Store::CreateOrContinue(run, SomeRun()));
-  ::close(ready[0]);
-  ::close(ready[1]);
-}
-
-/// Adds until it is told that there is no room. @returns how many episodes were added, and the error.
-std::pair<int, std::string> AddUntilFull(const std::filesystem::path& run, int most) {
-  int added = 0;
-  try {
-    Store store = Store::CreateOrContinue(run, SomeRun());
-    Declare(store);
-    for (; added < most; ++added) store.Add(SomeEpisode(store, Key(added)));
-  } catch (const Error& error) {
-    EXPECT_EQ(error.exit_code(), ExitCode::kInternal);
-    return {added, error.what()};
-  }
-  return {added, ""};
 }
 
 TEST(StoreFull, OnAFullDiskTheStoreStaysIntactAndSaysSoOnce) {
@@ -213,22 +158,13 @@ TEST(StoreFull, OnAFullDiskTheStoreStaysIntactAndSaysSoOnce) {
 TEST(StoreFull, AtTheLimitOfAFilesSizeTheStoreStaysIntact) {
   const TempFolder folder;
   const std::filesystem::path run = folder / "run";
-  const pid_t child = InChild([&] {
-    std::signal(SIGXFSZ, SIG_IGN);
-    const rlimit limit{400 << 10, 400 << 10};
-    if (::setrlimit(RLIMIT_FSIZE, &limit) != 0) return 1;
-    const auto [added, message] = AddUntilFull(run, 1000);
-    std::ofstream(folder / "said") << added << " " << message;
-    return 0;
-  });
-  int status = 0;
-  ::waitpid(child, &status, 0);
-  ASSERT_EQ(status, 0);
-  std::ifstream said(folder / "said");
+  const CommandResult said = RunCommand({Binary("store_child"), "fill", run.string()});
+  ASSERT_EQ(said.exit_code, 0) << said.err;
   std::size_t added = 0;
   std::string message;
-  said >> added;
-  std::getline(said, message);
+  std::istringstream words(said.out);
+  words >> added;
+  std::getline(words, message);
   EXPECT_GT(added, 3u);
   EXPECT_THAT(message, HasSubstr("evac.sqlite"));
   ExpectWhole(run);

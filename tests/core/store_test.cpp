@@ -164,6 +164,20 @@ TEST_F(StoreTest, TheSameEpisodeIsNotAddedTwiceAndItsFilesStay) {
   EXPECT_EQ(ReadFile(run_ / store.Episodes().at(0).thumbnail), "jpeg of " + Key(1).Id());
 }
 
+TEST_F(StoreTest, ManyEpisodesAreAddedTogetherOrNotAtAll) {
+  Store store = NewRun();
+  std::vector<EpisodeRecord> records = {SomeEpisode(store, Key(1)), SomeEpisode(store, Key(2)), SomeEpisode(store, Key(1))};
+  EXPECT_THAT(MessageOf([&] { store.AddAll(records); }, ExitCode::kInternal), HasSubstr(Key(1).Id()));
+  EXPECT_TRUE(store.Episodes().empty());
+  records.pop_back();
+  store.AddAll(records);
+  ASSERT_EQ(store.Episodes().size(), 2u);
+  Episode second = store.Episodes().at(1);
+  store.LoadSteps(second);
+  EXPECT_EQ(second.commands.size(), records[1].episode.commands.size());
+  EXPECT_EQ(store.LoadPrivileged(second.key.Id()).size(), records[1].privileged.size());
+}
+
 TEST_F(StoreTest, AVideoOutsideTheFolderIsRefused) {
   Store store = NewRun();
   EpisodeRecord record = SomeEpisode(store, Key(1));

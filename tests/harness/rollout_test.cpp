@@ -76,6 +76,24 @@ class FaultyPolicy : public WalkingPolicy {
   Fault fault_;
 };
 
+/// A world that remembers how often it was asked.
+class CountedWorld : public World {
+ public:
+  explicit CountedWorld(World& world) : world_(world) {}
+  std::string Name() const override { return world_.Name(); }
+  WorldStep Reset(SceneId scene, const Task& task, const InitialState& initial, std::uint64_t seed) override {
+    return world_.Reset(scene, task, initial, seed);
+  }
+  std::vector<Advanced> Advance(std::span<const SceneChunk> batch) override {
+    ++advances;
+    return world_.Advance(batch);
+  }
+  int advances = 0;
+
+ private:
+  World& world_;
+};
+
 class Rollout : public ::testing::Test {
  protected:
   Rollout() : world_(StillLife()), task_(TaskFromRecording(StillLife())) {
@@ -286,8 +304,11 @@ TEST_F(Rollout, WhoeverWasSentAwayByAnInterruptIsNotStoredAsFailed) {
   });
   Store store = NewDeclaredStore("sent_away");
   options_.interrupted = [&] { return wants_an_end; };
-  const Summary summary = Run(policy, Jobs(3), store);
+  CountedWorld world(world_);
+  JobQueue queue(Jobs(3));
+  const Summary summary = RunEpisodes(policy, world, queue, store, options_);
   EXPECT_TRUE(summary.interrupted);
+  EXPECT_EQ(world.advances, 2) << "a chunk of a large world model takes minutes: nobody waits for one more";
   EXPECT_EQ(summary.failed, 0);
   EXPECT_TRUE(store.Episodes().empty());
 }

@@ -37,8 +37,11 @@ class SuiteTest : public ::testing::Test {
     return folder_ / name;
   }
   std::string Complaint(const std::string& text, const std::vector<std::string>& assignments = {}) {
+    return Complaint(Write("suite.yaml", text), assignments);
+  }
+  std::string Complaint(const std::filesystem::path& suite, const std::vector<std::string>& assignments) {
     try {
-      ReadSuite(Write("suite.yaml", text), assignments);
+      ReadSuite(suite, assignments);
     } catch (const Error& error) {
       EXPECT_EQ(error.exit_code(), ExitCode::kInvalidInput);
       return error.what();
@@ -57,7 +60,7 @@ TEST_F(SuiteTest, AWrongTypeSaysWhatWasFoundAndWhatWasWanted) {
 }
 
 TEST_F(SuiteTest, ASecondRealWorldOrATwinPolicyIsRefused) {
-  EXPECT_THAT(Complaint(kSuite, {"policies.1.checkpoint=a"}), HasSubstr("'replay@a' is there twice"));
+  EXPECT_THAT(Complaint(std::string(kSuite), {"policies.1.checkpoint=a"}), HasSubstr("'replay@a' is there twice"));
 }
 
 TEST_F(SuiteTest, SetOverridesAnyFieldAndChangesTheHash) {
@@ -66,7 +69,7 @@ TEST_F(SuiteTest, SetOverridesAnyFieldAndChangesTheHash) {
   EXPECT_EQ(changed.policies[1].checkpoint, "c");
   EXPECT_EQ(changed.chunk_size, 4);
   EXPECT_NE(plain.hash, changed.hash);
-  EXPECT_THAT(Complaint(kSuite, {"nowhere.field=1"}), HasSubstr("has no field 'nowhere'"));
+  EXPECT_THAT(Complaint(std::string(kSuite), {"nowhere.field=1"}), HasSubstr("has no field 'nowhere'"));
 }
 
 TEST_F(SuiteTest, TheHashIgnoresCommentsLayoutAndSpeedButNotTheContentOfFiles) {
@@ -76,6 +79,13 @@ TEST_F(SuiteTest, TheHashIgnoresCommentsLayoutAndSpeedButNotTheContentOfFiles) {
   EXPECT_EQ(ReadSuite(path, {"lanes=7", "error_budget=0.5"}).hash, hash);
   Write("rec/action.npy", "other bytes");
   EXPECT_NE(ReadSuite(path, {}).hash, hash);
+}
+
+TEST_F(SuiteTest, ItsStopRuleIsCheckedAsATasksIs) {
+  const auto demo = std::filesystem::path(EVAC_SOURCE_DIR) / "apps/configs/demo.yaml";
+  EXPECT_EQ(ReadSuite(demo, {"still={dwell_chunks: 4}"}).tasks.at(0).still.dwell_chunks, 4);
+  EXPECT_THAT(Complaint(demo, {"still={min_chunks: -1}"}), HasSubstr("min_chunks"));
+  EXPECT_THAT(Complaint(demo, {"still={rotation_rad: -0.1}"}), HasSubstr("rotation_rad"));
 }
 
 TEST_F(SuiteTest, APresetThatTheEncoderDoesNotKnowIsRefusedBeforeTheFirstVideo) {
@@ -88,11 +98,11 @@ TEST_F(SuiteTest, LatencyIsOffMeasuredOrSecondsAndAPartOfTheHashAsTheProbeIsNot)
   EXPECT_EQ(ReadSuite(path, {}).latency.kind, PolicyLatency::Kind::kOff);
   EXPECT_EQ(ReadSuite(path, {"policy={latency: 0.3}"}).latency.Text(), "0.3 s");
   EXPECT_EQ(ReadSuite(path, {"policy={latency: measured}", "lanes=1"}).latency.Text(), "measured");
-  EXPECT_THAT(Complaint(kSuite, {"policy={latency: measured}"}), HasSubstr("lanes: 1"));
-  EXPECT_THAT(Complaint(kSuite, {"policy={latency: -2}"}), HasSubstr("field policy.latency"));
+  EXPECT_THAT(Complaint(std::string(kSuite), {"policy={latency: measured}"}), HasSubstr("lanes: 1"));
+  EXPECT_THAT(Complaint(std::string(kSuite), {"policy={latency: -2}"}), HasSubstr("field policy.latency"));
   EXPECT_NE(ReadSuite(path, {"policy={latency: 0.3}"}).hash, ReadSuite(path, {"policy={latency: 0.4}"}).hash);
   EXPECT_EQ(ReadSuite(path, {"policy={latency: 0.3, start_probe: warn}"}).hash, ReadSuite(path, {"policy={latency: 0.3}"}).hash);
-  EXPECT_THAT(Complaint(kSuite, {"policy={start_probe: perhaps}"}), HasSubstr("refuse, warn or off"));
+  EXPECT_THAT(Complaint(std::string(kSuite), {"policy={start_probe: perhaps}"}), HasSubstr("refuse, warn or off"));
 }
 
 TEST_F(SuiteTest, PathsInSetAreRelativeToTheWorkingDirectory) {

@@ -52,6 +52,36 @@ TEST_F(Network, ThreeScenesTogetherAreThreeAlone) {
   }
 }
 
+/// Another source's weights in half the bytes.
+class HalfWeights final : public ParameterSource {
+ public:
+  explicit HalfWeights(ParameterSource& source) : source_(source) {}
+  Tensor Take(const std::string& key, at::IntArrayRef shape) override {
+    return source_.Take(key, shape).to(at::kBFloat16);
+  }
+
+ private:
+  ParameterSource& source_;
+};
+
+TEST_F(Network, InHalfTheBytesItSaysNearlyTheSame) {
+  HalfWeights halves(weights_);
+  const EvacModel half(halves, TinyConfig());
+  const Tensor x = Noise({1, 19, 5, 8, 12}, 10), tokens = Noise({1, 7, 32}, 1010), fps = at::full({1}, 2, at::kLong);
+  const auto denoised = [&](const EvacModel& model) {
+    return model.unet()({x, at::full({1}, 481, at::kLong), 1, 2}, model.unet().Prepare({tokens, fps, fps, 1}));
+  };
+  const auto relative = [](const Tensor& a, const Tensor& b) { return ((a - b).norm() / b.norm()).item<double>(); };
+  const Tensor exact = denoised(model_), coarse = denoised(half);
+  EXPECT_EQ(coarse.scalar_type(), at::kFloat);
+  EXPECT_LT(relative(coarse, exact), .05);
+  EXPECT_GT(relative(coarse, exact), 1e-5) << "nothing was halved";
+  const Tensor pictures = Noise({1, 3, 64, 96}, 5);
+  EXPECT_LT(relative(half.ImageTokens(pictures), model_.ImageTokens(pictures)), .05);
+  const Tensor latents = Noise({1, 4, 8, 12}, 6);
+  EXPECT_LT(relative(DecodeLatents(half, latents), DecodeLatents(model_, latents)), .05);
+}
+
 TEST_F(Network, AnswersTheSameBitsTwice) { EXPECT_TRUE(Denoised({10, 20}, 1).equal(Denoised({10, 20}, 1))); }
 
 TEST_F(Network, TheOrderOfActionsIsInvisibleToIt) {

@@ -4,6 +4,7 @@
 #include <signal.h>
 #include <sys/wait.h>
 
+#include "core/file.h"
 #include "policies/messages.h"
 #include "tests/policies/wire_support.h"
 #include "tests/support/command.h"
@@ -202,7 +203,7 @@ TEST_F(PolicyServerTest, AServedPolicyLeavesOnSigtermWithExitCodeZero) {
   int status = -1;
   ::waitpid(child, &status, 0);
   EXPECT_TRUE(WIFEXITED(status));
-  EXPECT_EQ(WEXITSTATUS(status), 0);
+  EXPECT_EQ(WEXITSTATUS(status), 0) << ReadFile(folder / "policy.log");
 }
 
 }  // namespace

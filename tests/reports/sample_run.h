@@ -26,6 +26,7 @@ class SampleRun {
 
   const std::filesystem::path& folder() const { return folder_.path(); }
   Store& store() { return store_; }
+  const Store& store() const { return store_; }
   RunSummary Summary(const SummaryOptions& options = {}) const { return Summarise(ReadRun(store_), options); }
 
  private:

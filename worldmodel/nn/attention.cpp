@@ -1,5 +1,7 @@
 #include "worldmodel/nn/attention.h"
 
+#include <ATen/record_function.h>
+
 #include <cmath>
 
 #include "worldmodel/nn/attention_kernel.h"
@@ -31,6 +33,7 @@ Tensor PlainAttention(const Tensor& q, const Tensor& k, const Tensor& v, std::in
 }
 
 Tensor Attention(const Tensor& q, const Tensor& k, const Tensor& v, std::int64_t heads) {
+  RECORD_FUNCTION("evac::attention", (std::vector<c10::IValue>{q, k, v}));  // for profiles: costs nothing otherwise
   if (!CanBeTiled(q) || !CanBeTiled(k) || !CanBeTiled(v)) return PlainAttention(q, k, v, heads);
   Tensor y = at::empty(q.sizes(), q.options());
   const kernels::AttentionShape shape{q.size(0), q.size(1), k.size(1), heads, q.size(2) / heads};
@@ -39,6 +42,7 @@ Tensor Attention(const Tensor& q, const Tensor& k, const Tensor& v, std::int64_t
 }
 
 Tensor TemporalAttention(const Tensor& q, const Tensor& k, const Tensor& v, std::int64_t heads) {
+  RECORD_FUNCTION("evac::temporal_attention", (std::vector<c10::IValue>{q, k, v}));
   const std::int64_t n = q.size(0), t = q.size(1), l = q.size(2), c = q.size(3);
   if (CanUseKernels(q) && CanUseKernels(k) && CanUseKernels(v)) {
     Tensor y = at::empty(q.sizes(), q.options());

@@ -66,10 +66,10 @@ ImageEncoder::Block::Block(const Scope& at, std::int64_t width)
 
 ImageEncoder::ImageEncoder(const Scope& at, const ImageEncoderConfig& config)
     : config_(config),
-      class_embedding_(at.Take("class_embedding", {config.width})),
-      positional_embedding_(at.Take("positional_embedding", {config.Tokens(), config.width})) {
+      class_embedding_(Precise(at.Take("class_embedding", {config.width}))),
+      positional_embedding_(Precise(at.Take("positional_embedding", {config.Tokens(), config.width}))) {
   at.Take("proj", {config.width, config.embed_dim});
-  patch_weight_ = at.Take("conv1.weight", {config.width, 3, config.patch_px, config.patch_px});
+  patch_weight_ = Precise(at.Take("conv1.weight", {config.width, 3, config.patch_px, config.patch_px}));
   norm_.emplace_back(at / "ln_pre", config.width);
   for (std::int64_t i = 0; i < config.layers; ++i)
     blocks_.emplace_back(at / "transformer" / "resblocks" / i, config.width);
@@ -78,7 +78,8 @@ ImageEncoder::ImageEncoder(const Scope& at, const ImageEncoderConfig& config)
 
 Tensor ImageEncoder::Run(const Block& block, const Tensor& x) const {
   const std::int64_t width = config_.width;
-  const Tensor qkv = at::linear(block.norm1(x), block.qkv_weight, block.qkv_bias);
+  const Tensor seen = block.norm1(x).to(block.qkv_weight.scalar_type());
+  const Tensor qkv = at::linear(seen, block.qkv_weight, block.qkv_bias).to(x.scalar_type());
   const Tensor mixed = Attention(qkv.narrow(2, 0, width), qkv.narrow(2, width, width), qkv.narrow(2, 2 * width, width),
                                  width / config_.head_width);
   const Tensor y = x + block.out(mixed);

@@ -1,5 +1,7 @@
 #include "worldmodel/nn/layers.h"
 
+#include <ATen/record_function.h>
+
 #include "worldmodel/nn/kernels.h"
 
 namespace evac::nn {
@@ -8,6 +10,9 @@ namespace {
 constexpr std::int64_t kGroups = 32;
 constexpr double kLayerNormEpsilon = 1e-5;
 
+/// Weights may be kept in half the bytes, with everything else in floats: x in the type of the weight.
+Tensor InTypeOf(const Tensor& weight, const Tensor& x) { return x.to(weight.scalar_type()); }
+
 /// What training needs: differentiable, exact for pictures of one colour too.
 Tensor DifferentiableGroupNorm(const Tensor& x, const GroupNorm& norm, double epsilon) {
   const Tensor channels_second = x.reshape({x.size(0), -1, x.size(-1)}).transpose(1, 2).contiguous();
@@ -15,6 +20,10 @@ Tensor DifferentiableGroupNorm(const Tensor& x, const GroupNorm& norm, double ep
 }
 
 }  // namespace
+
+Tensor Precise(const Tensor& weight) {
+  return weight.scalar_type() == at::kBFloat16 && weight.is_cpu() ? weight.to(at::kFloat) : weight;
+}
 
 bool CanUseKernels(const Tensor& x) {
   return !(at::GradMode::is_enabled()) && x.is_cpu() && x.scalar_type() == at::kFloat && x.is_contiguous();
@@ -35,7 +44,8 @@ Linear Linear::Pointwise(const Scope& at, std::int64_t in, std::int64_t out, std
 }
 
 Tensor Linear::operator()(const Tensor& x) const {
-  return at::linear(x, weight.dim() > 2 ? weight.flatten(1) : weight, bias);
+  const Tensor y = at::linear(InTypeOf(weight, x), weight.dim() > 2 ? weight.flatten(1) : weight, bias);
+  return y.to(x.scalar_type());
 }
 
 Conv2d::Conv2d(const Scope& at, std::int64_t in, std::int64_t out, const Options& options)
@@ -44,25 +54,26 @@ Conv2d::Conv2d(const Scope& at, std::int64_t in, std::int64_t out, const Options
       options_(options) {}
 
 Tensor Conv2d::operator()(const Tensor& x) const {
-  const Tensor channels_second = x.permute({0, 3, 1, 2});
+  const Tensor channels_second = InTypeOf(weight, x).permute({0, 3, 1, 2});
   const Tensor y = at::conv2d(channels_second, weight, bias, options_.stride, options_.padding);
-  return y.permute({0, 2, 3, 1}).contiguous();
+  return y.permute({0, 2, 3, 1}).contiguous().to(x.scalar_type());
 }
 
 CausalConv::CausalConv(const Scope& at, std::int64_t channels)
     : weight(at.Take("weight", {channels, channels, 3, 1, 1})), bias(at.Take("bias", {channels})) {}
 
 Tensor CausalConv::operator()(const Tensor& x) const {
-  const Tensor first = x.narrow(1, 0, 1);
-  const Tensor padded = at::cat({first, first, x}, 1);                                 // [N, T + 2, L, C]
+  const Tensor in = InTypeOf(weight, x), first = in.narrow(1, 0, 1);
+  const Tensor padded = at::cat({first, first, in}, 1);                                // [N, T + 2, L, C]
   const Tensor y = at::conv2d(padded.permute({0, 3, 1, 2}), weight.flatten(3), bias);  // kernel (3, 1)
-  return y.permute({0, 2, 3, 1}).contiguous();
+  return y.permute({0, 2, 3, 1}).contiguous().to(x.scalar_type());
 }
 
 GroupNorm::GroupNorm(const Scope& at, std::int64_t channels, double epsilon)
-    : weight(at.Take("weight", {channels})), bias(at.Take("bias", {channels})), epsilon_(epsilon) {}
+    : weight(Precise(at.Take("weight", {channels}))), bias(Precise(at.Take("bias", {channels}))), epsilon_(epsilon) {}
 
 Tensor GroupNorm::operator()(const Tensor& x, Activation activation) const {
+  RECORD_FUNCTION("evac::group_norm", {});
   const bool silu = activation == Activation::kSilu;
   if (!CanUseKernels(x)) {
     const Tensor y = DifferentiableGroupNorm(x, *this, epsilon_);
@@ -77,7 +88,7 @@ Tensor GroupNorm::operator()(const Tensor& x, Activation activation) const {
 }
 
 LayerNorm::LayerNorm(const Scope& at, std::int64_t channels)
-    : weight(at.Take("weight", {channels})), bias(at.Take("bias", {channels})) {}
+    : weight(Precise(at.Take("weight", {channels}))), bias(Precise(at.Take("bias", {channels}))) {}
 
 Tensor LayerNorm::operator()(const Tensor& x) const {
   return at::layer_norm(x, weight.sizes(), weight, bias, kLayerNormEpsilon);

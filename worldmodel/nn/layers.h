@@ -12,6 +12,10 @@ namespace evac::nn {
 /// Whether x may go through `kernels`: floats on the CPU, laid out as they are read, nothing to be differentiated.
 bool CanUseKernels(const Tensor& x);
 
+/// On the CPU, a model in bf16 keeps the weights of its matrix products so and computes the products in it; everything
+/// between them stays in floats, and so do small weights: these.
+Tensor Precise(const Tensor& weight);
+
 class Linear {
  public:
   enum class Bias { kNo, kYes };

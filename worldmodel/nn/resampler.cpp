@@ -19,7 +19,7 @@ Resampler::Layer::Layer(const Scope& at, const ResamplerConfig& config)
 
 Resampler::Resampler(const Scope& at, const ResamplerConfig& config)
     : config_(config),
-      latents_(at.Take("latents", {1, config.queries, config.dim})),
+      latents_(Precise(at.Take("latents", {1, config.queries, config.dim}))),
       in_(at / "proj_in", config.embedding_dim, config.dim),
       out_(at / "proj_out", config.dim, config.output_dim),
       out_norm_(at / "norm_out", config.output_dim) {

@@ -1,5 +1,7 @@
 #include "worldmodel/nn/transformers.h"
 
+#include <ATen/record_function.h>
+
 #include "worldmodel/nn/attention.h"
 #include "worldmodel/nn/kernels.h"
 
@@ -32,6 +34,7 @@ FeedForward::FeedForward(const Scope& at, std::int64_t channels)
 
 Tensor FeedForward::operator()(const Tensor& x) const {
   const Tensor both = in_(x);
+  RECORD_FUNCTION("evac::gated_gelu", {});
   const std::int64_t half = both.size(-1) / 2;
   if (CanUseKernels(both)) {
     std::vector<std::int64_t> shape = both.sizes().vec();

@@ -51,7 +51,7 @@ Tensor UNet::Resample::operator()(const Tensor& x) const { return conv(up ? Upsa
 
 UNet::UNet(const Scope& at, const UNetConfig& config)
     : config_(config),
-      domain_embedding_(at.Take("domain_embedding.weight", {config.domains, 4 * config.model_channels})),
+      domain_embedding_(Precise(at.Take("domain_embedding.weight", {config.domains, 4 * config.model_channels}))),
       time_embed_(at / "time_embed", config.model_channels, 4 * config.model_channels),
       fps_embedding_(at / "fps_embedding", config.model_channels, 4 * config.model_channels),
       width_(config.model_channels) {

@@ -1,7 +1,7 @@
 #include "worldmodel/sim/scene_page.h"
 
 #include <algorithm>
-#include <regex>
+#include <string_view>
 
 #include "core/config.h"
 #include "core/file.h"
@@ -83,13 +83,25 @@ Clutter ReadClutter(const Config& page) {
   return clutter;
 }
 
+/// The files of every `<include file="…"/>` of a MuJoCo scene, either kind of quote.
+std::vector<std::string> IncludedFiles(const std::string& xml) {
+  static constexpr std::string_view kTag = "<include", kBlank = " \t\r\n", kBeforeValue = " \t\r\n=";
+  std::vector<std::string> files;
+  for (std::size_t tag = xml.find(kTag); tag != std::string::npos; tag = xml.find(kTag, tag + 1)) {
+    const std::size_t name = xml.find_first_not_of(kBlank, tag + kTag.size());
+    if (name == std::string::npos || xml.compare(name, 4, "file") != 0) continue;
+    const std::size_t open = xml.find_first_not_of(kBeforeValue, name + 4);
+    if (open == std::string::npos || (xml[open] != '"' && xml[open] != '\'')) continue;
+    const std::size_t close = xml.find(xml[open], open + 1);
+    if (close != std::string::npos) files.push_back(xml.substr(open + 1, close - open - 1));
+  }
+  return files;
+}
+
 /// A suite's hash covers the files that a page names; so a page must name all that its scene is made of.
 void RequireIncludesNamed(const Config& page, const std::vector<std::string>& named,
                           const std::filesystem::path& scene) {
-  const std::string text = ReadFile(scene);
-  const std::regex include(R"re(<include\s+file\s*=\s*"([^"]*)")re");
-  for (std::sregex_iterator match(text.begin(), text.end(), include), end; match != end; ++match) {
-    const std::string file = (*match)[1];
+  for (const std::string& file : IncludedFiles(ReadFile(scene))) {
     if (std::find(named.begin(), named.end(), file) != named.end()) continue;
     throw InvalidInput("{}: {} includes '{}', wanted that file in the list", page.Where("includes"), scene.string(),
                        file);
