@@ -107,7 +107,7 @@ class Evaluation {
     for (const SuitePolicy& suite_policy : suite_.policies) {
       JobQueue jobs(MissingJobs(JobsOf(suite_, shard_, suite_world, suite_policy), store_));
       if (jobs.size() == 0) continue;
-      if (!world) world = MakeCheckedWorld(suite_world);
+      if (!world) world = MakeCheckedWorld(suite_world, suite_policy);
       display_.Begin(fmt::format("{} · {}@{}", suite_world.name, suite_policy.name, suite_policy.checkpoint));
       RunningPolicy policy(suite_policy, suite_, store_.folder(), IsInterrupted);
       store_.AddPolicy({suite_policy.name, suite_policy.checkpoint, policy.declaration()});
@@ -128,9 +128,12 @@ class Evaluation {
 
  private:
   /// A task page that the world cannot start from ends the run here, once, and not in every episode.
-  std::unique_ptr<World> MakeCheckedWorld(const SuiteWorld& suite_world) {
-    std::unique_ptr<World> world = MakeWorld(suite_world, suite_);
-    for (const Task& task : suite_.tasks) CheckStart(*world, task, suite_.initial_states.front());
+  std::unique_ptr<World> MakeCheckedWorld(const SuiteWorld& suite_world, const SuitePolicy& policy) {
+    std::unique_ptr<World> world = MakeWorld(suite_world, suite_, &store_);
+    std::set<std::string> seen;
+    for (const Job& job : MissingJobs(JobsOf(suite_, shard_, suite_world, policy), store_)) {
+      if (seen.insert(job.key.pair.task).second) CheckStart(*world, *job.task, job.initial);
+    }
     return world;
   }
 

@@ -6,8 +6,8 @@
 #include <cstdlib>
 #include <random>
 #include <sstream>
-#include <thread>
 
+#include "apps/evac_factory.h"
 #include "core/config.h"
 #include "core/recording.h"
 #include "judges/oracle_judge.h"
@@ -18,10 +18,6 @@ namespace evac {
 namespace {
 
 namespace fs = std::filesystem;
-
-int Threads(const Suite& suite) {
-  return suite.threads > 0 ? suite.threads : std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
-}
 
 /// Beside this program first, so that `evac` finds its own `evac-policy` wherever it was built or installed.
 std::string FindProgram(const std::string& program, const Suite& suite) {
@@ -98,12 +94,14 @@ void Declare(const Suite& suite, Store& store) {
   CheckRubrics(suite);
   for (const Task& task : suite.tasks) store.AddTask(task);
   for (const SuiteWorld& world : suite.worlds) {
-    const std::string profile_hash = world.profile.empty() ? "" : Config::FromFile(world.profile).ContentHash();
+    std::string profile_hash = world.profile.empty() ? "" : Config::FromFile(world.profile).ContentHash();
+    if (world.evac) profile_hash = world.evac->hash;
     store.AddWorld({.name = world.name, .type = world.type, .is_real = world.is_real, .profile_hash = profile_hash});
   }
 }
 
-std::unique_ptr<World> MakeWorld(const SuiteWorld& world, const Suite& suite) {
+std::unique_ptr<World> MakeWorld(const SuiteWorld& world, const Suite& suite, const Store* store) {
+  if (world.type == "evac") return MakeEvacWorld(world, suite, store);
   if (world.type == "echo") return std::make_unique<EchoWorld>(ReadRecording(*suite.recording));
   return std::make_unique<sim::MujocoWorld>(sim::MujocoWorldOptions{.name = world.name, .profile = world.profile, .threads = Threads(suite)});
 }

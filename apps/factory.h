@@ -30,7 +30,8 @@ void CheckStart(World& world, const Task& task, const InitialState& initial);
 /// Tasks and worlds, as the store keeps them; checks the rubrics first.
 void Declare(const Suite& suite, Store& store);
 
-std::unique_ptr<World> MakeWorld(const SuiteWorld& world, const Suite& suite);
+/// @param store  of the run, where imagined episodes find the real ones' first frames; null: there is none yet
+std::unique_ptr<World> MakeWorld(const SuiteWorld& world, const Suite& suite, const Store* store);
 
 /// The command line of a policy with its program found and `${recording}` filled in.
 /// @throws InvalidInput if the program is not there.

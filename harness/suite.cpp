@@ -28,17 +28,28 @@ std::string NameField(const Config& page, const std::string& key) {
   return name;
 }
 
-SuiteWorld ReadWorld(const Config& page) {
+/// Fields that only some types have: a page that names one of another type is wrong.
+void AllowOnlyFieldsOf(const std::string& type, const Config& page) {
+  if (type == "evac") {
+    return page.AllowOnly({"name", "type", "role", "weights", "config", "statistics", "solver", "steps", "eta", "cfg", "cfg_rescale", "period_s",
+                           "pose_map", "threads_per_scene", "quirks", "cache"});
+  }
   page.AllowOnly({"name", "type", "role", "profile"});
+}
+
+SuiteWorld ReadWorld(const Config& page) {
+  AllowOnlyFieldsOf(page.Has("type") ? page.Get<std::string>("type") : "", page);
   SuiteWorld world;
   world.name = NameField(page, "name");
   world.type = page.Get<std::string>("type");
-  page.Require(world.type == "mujoco" || world.type == "echo", "type", "mujoco or echo");
+  page.Require(world.type == "mujoco" || world.type == "echo" || world.type == "evac", "type", "mujoco, echo or evac");
   const std::string role = page.Get<std::string>("role", "evaluated");
   if (page.Has("role")) page.Require(role == "real" || role == "evaluated", "role", "real (the reference) or evaluated");
   world.is_real = role == "real";
+  page.Require(!world.is_real || world.type != "evac", "role", "evaluated: what is imagined is no reference");
   if (world.type == "mujoco") world.profile = page.Path("profile");
   if (world.type == "echo") page.Require(!page.Has("profile"), "profile", "none: a recording has no physics");
+  if (world.type == "evac") world.evac = ReadSuiteEvac(page);
   return world;
 }
 
@@ -167,6 +178,11 @@ void CheckWhole(const Suite& suite, const Config& page) {
   const auto reals = std::count_if(suite.worlds.begin(), suite.worlds.end(), [](const SuiteWorld& world) { return world.is_real; });
   page.Require(reals <= 1, "worlds", "at most one world with role: real");
   for (const SuiteWorld& world : suite.worlds) {
+    if (world.type == "evac") {
+      page.Require(suite.recording.has_value() || reals == 1, "worlds",
+                   "beside an evac world one with role: real, or a `recording`: imagined episodes start from its first frames");
+      continue;
+    }
     page.Require((world.type == "echo") == suite.recording.has_value(), "worlds", "echo worlds with a `recording`, mujoco worlds with task pages");
   }
 }
@@ -207,7 +223,8 @@ std::string FromWorkingDirectory(const std::string& assignment) {
   if (equals == std::string::npos) return assignment;
   const std::string field = assignment.substr(0, equals), value = assignment.substr(equals + 1);
   const std::string last = field.substr(field.rfind('.') + 1);
-  const bool is_path = last == "recording" || last == "profile" || field.starts_with("tasks.");
+  const bool is_path = last == "recording" || last == "profile" || last == "weights" || last == "config" || last == "statistics" ||
+                       last == "folder" || field.starts_with("tasks.");
   if (!is_path || value.empty() || fs::path(value).is_absolute()) return assignment;
   return field + "=" + fs::absolute(value).lexically_normal().string();
 }

@@ -9,14 +9,16 @@
 #include "core/store.h"
 #include "core/types.h"
 #include "harness/policy_latency.h"
+#include "harness/suite_evac.h"
 
 namespace evac {
 
 struct SuiteWorld {
   std::string name;
-  std::string type;                ///< mujoco, echo
+  std::string type;                ///< mujoco, echo, evac
   bool is_real = false;            ///< `role: real`
   std::filesystem::path profile;   ///< mujoco: the page of its physical truth; absolute or relative to the working directory
+  std::optional<SuiteEvac> evac = {};  ///< evac: its network
 };
 
 struct SuitePolicy {

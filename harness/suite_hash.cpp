@@ -48,13 +48,16 @@ std::string SuiteHash(const Config& page, const Suite& suite) {
   std::ostringstream text;
   std::istringstream lines(page.Canonical());
   for (std::string line; std::getline(lines, line);) {
-    const bool by_content = StartsWithAny(line, {".recording=", ".tasks."}) || line.find(".profile=") != std::string::npos;
+    const bool by_content = StartsWithAny(line, {".recording=", ".tasks."}) || IsHashedByContent(line);
     if (!by_content && !StartsWithAny(line, {".lanes=", ".threads=", ".error_budget=", ".description=", ".transport.deadline_s=",
                                           ".transport.repeat_after_s=", ".transport.start_s=", ".policy.start_probe="})) text << line << "\n";
   }
   for (const Task& task : suite.tasks) text << "task " << task.id << " " << HashOfPage(task.page_path) << "\n";
   for (const SuiteWorld& world : suite.worlds) {
     if (!world.profile.empty()) text << "profile " << world.name << " " << HashOfPage(world.profile) << "\n";
+  }
+  for (const SuiteWorld& world : suite.worlds) {
+    if (world.evac) text << "evac " << world.name << " " << world.evac->hash << "\n";
   }
   if (suite.recording) text << "recording " << HashOfTree(*suite.recording) << "\n";
   return Sha256Hex(text.str());

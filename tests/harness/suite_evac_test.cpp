@@ -1,0 +1,107 @@
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <fstream>
+
+#include "core/error.h"
+#include "harness/suite.h"
+#include "tests/support/temp_folder.h"
+
+namespace evac {
+namespace {
+
+using testing::AllOf;
+using testing::HasSubstr;
+
+constexpr const char* kSuite = R"(
+suite: imagined
+recording: rec
+worlds:
+  - {name: evac, type: evac, weights: w.safetensors, config: c.yaml}
+policies:
+  - {name: replay, command: [evac-policy, replay]}
+)";
+
+class EvacSuite : public testing::Test {
+ protected:
+  EvacSuite() {
+    std::filesystem::create_directory(folder_ / "rec");
+    Write("rec/action.npy", "bytes");
+    Write("w.safetensors", "weights");
+    Write("c.yaml", "chunk: 4\n");
+    Write("suite.yaml", kSuite);
+  }
+  void Write(const std::string& name, const std::string& text) const { std::ofstream(folder_ / name) << text; }
+  Suite Read(const std::vector<std::string>& assignments = {}) const {
+    return ReadSuite(folder_ / "suite.yaml", assignments);
+  }
+  std::string Complaint(const std::vector<std::string>& assignments) const {
+    try {
+      Read(assignments);
+    } catch (const Error& error) {
+      EXPECT_EQ(error.exit_code(), ExitCode::kInvalidInput);
+      return error.what();
+    }
+    return "no complaint";
+  }
+  TempFolder folder_;
+};
+
+TEST_F(EvacSuite, SaysWhatTheNetworkIsAndHowItImagines) {
+  const SuiteEvac evac = Read({"worlds.0.solver=dpm", "worlds.0.steps=8", "worlds.0.cfg=2",
+                               "worlds.0.quirks=[decoded_start]", "worlds.0.cache={folder: /tmp/chunks, limit_gb: 3}"})
+                             .worlds[0]
+                             .evac.value();
+  EXPECT_EQ(evac.weights, folder_ / "w.safetensors");
+  EXPECT_EQ(evac.config, folder_ / "c.yaml");
+  EXPECT_EQ(evac.solver, "dpm");
+  EXPECT_EQ(evac.steps, 8);
+  EXPECT_EQ(evac.cfg, 2);
+  EXPECT_EQ(evac.cache_folder, "/tmp/chunks");
+  EXPECT_EQ(evac.cache_limit_gb, 3);
+}
+
+TEST_F(EvacSuite, ItsHashIsOfTheFilesContentAndOfAllThatDecidesAFrame) {
+  const std::string hash = Read().hash;
+  std::filesystem::copy(folder_ / "w.safetensors", folder_ / "same.safetensors");
+  EXPECT_EQ(Read({"worlds.0.weights=" + (folder_ / "same.safetensors").string()}).hash, hash);
+  EXPECT_EQ(Read({"worlds.0.cache={folder: /tmp/chunks}"}).hash, hash) << "a cache changes nothing";
+  EXPECT_NE(Read({"worlds.0.steps=9"}).hash, hash);
+  EXPECT_NE(Read({"worlds.0.eta=0.5"}).hash, hash);
+  Write("c.yaml", "# a comment\nchunk: 4\n");
+  EXPECT_EQ(Read().hash, hash);
+  Write("c.yaml", "chunk: 5\n");
+  EXPECT_NE(Read().hash, hash);
+  Write("c.yaml", "chunk: 4\n");
+  Write("w.safetensors", "other weights");
+  EXPECT_NE(Read().hash, hash);
+}
+
+TEST_F(EvacSuite, WhatIsWrongIsNamedWithItsField) {
+  EXPECT_THAT(Complaint({"worlds.0.weight=w"}), AllOf(HasSubstr("weight"), HasSubstr("'weights'")));
+  EXPECT_THAT(Complaint({"worlds.0.weights=/nowhere"}), AllOf(HasSubstr("weights"), HasSubstr("/nowhere")));
+  EXPECT_THAT(Complaint({"worlds.0.solver=euler"}), AllOf(HasSubstr("solver"), HasSubstr("ddim or dpm")));
+  EXPECT_THAT(Complaint({"worlds.0.steps=0"}), HasSubstr("steps"));
+  EXPECT_THAT(Complaint({"worlds.0.solver=dpm", "worlds.0.steps=1"}), HasSubstr("2 … 1000"));
+  EXPECT_THAT(Complaint({"worlds.0.eta=2"}), HasSubstr("eta"));
+  EXPECT_THAT(Complaint({"worlds.0.period_s=0"}), HasSubstr("period_s"));
+  EXPECT_THAT(Complaint({"worlds.0.quirks=[delta_window]"}), HasSubstr("actions a policy has not sent yet"));
+  EXPECT_THAT(Complaint({"worlds.0.quirks=[nonsense]"}), HasSubstr("memory_not_scaled"));
+  EXPECT_THAT(Complaint({"worlds.0.cache={folder: x, limit_gb: 0}"}), HasSubstr("limit_gb"));
+  EXPECT_THAT(Complaint({"worlds.0.role=real"}), HasSubstr("what is imagined is no reference"));
+  EXPECT_THAT(Complaint({"worlds.0={name: evac, type: evac, weights: w.safetensors}"}), HasSubstr("config"));
+  EXPECT_THAT(Complaint({"worlds.0={name: echo, type: echo, steps: 3}"}), HasSubstr("steps"));
+}
+
+TEST_F(EvacSuite, WithoutARealWorldOrARecordingNothingCouldBeStartedFrom) {
+  const std::string task = EVAC_SOURCE_DIR "/worldmodel/sim/scenes/take_bottle.yaml";
+  Write("suite.yaml",
+        "suite: imagined\nworlds:\n  - {name: evac, type: evac, weights: w.safetensors, config: c.yaml}\ntasks: [" +
+            task +
+            "]\npolicies:\n  - {name: hold, command: [evac-policy, hold]}\ninitial_states: {seed: 1, count: 1}\n");
+  EXPECT_THAT(Complaint({}), AllOf(HasSubstr("role: real"), HasSubstr("first frames")));
+}
+
+}  // namespace
+}  // namespace evac

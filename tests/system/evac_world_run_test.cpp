@@ -1,0 +1,116 @@
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <signal.h>
+#include <sys/wait.h>
+
+#include <nlohmann/json.hpp>
+#include <thread>
+
+#include "apps/factory.h"
+#include "core/error.h"
+#include "core/hash.h"
+#include "core/seed.h"
+#include "tests/support/command.h"
+#include "tests/support/temp_folder.h"
+#include "tests/system/run_support.h"
+#include "worldmodel/evac_config.h"
+#include "worldmodel/nn/weights.h"
+
+namespace evac {
+namespace {
+
+namespace fs = std::filesystem;
+using system_test::List;
+using system_test::RunWords;
+using testing::HasSubstr;
+
+const std::string kImagined = EVAC_SOURCE_DIR "/tests/system/imagined.yaml";
+const std::string kSmallNetwork = EVAC_SOURCE_DIR "/tests/system/evac_small.yaml";
+
+/// A folder with random weights in it.
+class ImaginedRun : public testing::Test {
+ protected:
+  ImaginedRun() {
+    nn::RandomWeights random(5);
+    nn::SaveWeights(weights_, random, ReadEvacConfig(kSmallNetwork));
+  }
+
+  std::vector<std::string> Settings(const std::vector<std::string>& more = {}) const {
+    std::vector<std::string> settings = {"worlds.1.weights=" + weights_.string()};
+    settings.insert(settings.end(), more.begin(), more.end());
+    return settings;
+  }
+
+  const TempFolder folder_;
+  const fs::path weights_ = folder_ / "small.safetensors";
+};
+
+nlohmann::json Imagined(const std::string& list) {
+  nlohmann::json imagined = nlohmann::json::array();
+  for (const auto& episode : nlohmann::json::parse(list))
+    if (episode["world"] == "evac") imagined.push_back(episode);
+  return imagined;
+}
+
+TEST_F(ImaginedRun, HasTheSameFramesWithOneLaneAndWithEight) {
+  const fs::path one = folder_ / "one", eight = folder_ / "eight";
+  const CommandResult alone = RunCommand(RunWords(kImagined, one, Settings({"lanes=1"})));
+  ASSERT_EQ(alone.exit_code, 0) << alone.err;
+  const CommandResult together = RunCommand(RunWords(kImagined, eight, Settings({"lanes=8", "threads=3"})));
+  ASSERT_EQ(together.exit_code, 0) << together.err;
+  EXPECT_EQ(List(one), List(eight)) << "video hashes and all";
+  const nlohmann::json imagined = Imagined(List(one));
+  ASSERT_EQ(imagined.size(), 4u);
+  EXPECT_NE(imagined[0]["video_sha256"], imagined[1]["video_sha256"]);
+  for (const auto& episode : imagined)
+    EXPECT_EQ(Sha256HexOfFile(one / episode["video"].get<std::string>()), episode["video_sha256"]);
+}
+
+TEST_F(ImaginedRun, AfterAnyKillIsThatOfAnUninterruptedRun) {
+  const fs::path whole = folder_ / "whole", killed = folder_ / "killed";
+  const auto begin = std::chrono::steady_clock::now();
+  const CommandResult straight = RunCommand(RunWords(kImagined, whole, Settings()));
+  ASSERT_EQ(straight.exit_code, 0) << straight.err;
+  const double whole_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+  SplitMix64 random(23);
+  const auto words =
+      RunWords(kImagined, killed, Settings({"worlds.1.cache={folder: " + (folder_ / "cache").string() + "}"}));
+  for (int kill = 0; kill < 3; ++kill) {
+    const pid_t pid = StartCommand(words, folder_ / "log");
+    std::this_thread::sleep_for(std::chrono::duration<double>(random.Uniform(0.2, 0.9) * whole_s));
+    ::kill(pid, SIGKILL);
+    ::waitpid(pid, nullptr, 0);
+  }
+  const CommandResult last = RunCommand(words);
+  ASSERT_EQ(last.exit_code, 0) << last.err;
+  EXPECT_EQ(List(killed), List(whole)) << "also when chunks come from the cache";
+}
+
+TEST_F(ImaginedRun, NeedsTheRealOneFirst) {
+  const Suite suite = ReadSuite(kImagined, Settings());
+  const std::unique_ptr<World> world = MakeWorld(suite.worlds[1], suite, nullptr);
+  try {
+    world->Reset(0, suite.tasks.front(), suite.initial_states.front(), 1);
+    ADD_FAILURE() << "it started from nothing";
+  } catch (const Error& error) {
+    EXPECT_THAT(error.what(),
+                HasSubstr("nobody has seen task take_bottle, initial state 3-0000: run the real world first"));
+  }
+}
+
+TEST_F(ImaginedRun, WeightsOfAnotherNetworkAreRefused) {
+  const CommandResult result = RunCommand(RunWords(
+      kImagined, folder_ / "run", Settings({"worlds.1.config=" EVAC_SOURCE_DIR "/apps/configs/evac_published.yaml"})));
+  EXPECT_EQ(result.exit_code, 2) << result.err;
+  EXPECT_THAT(result.err, HasSubstr("small.safetensors"));
+}
+
+TEST_F(ImaginedRun, IsAnotherOneWithOtherWeights) {
+  const Suite first = ReadSuite(kImagined, Settings());
+  nn::RandomWeights random(6);
+  nn::SaveWeights(weights_, random, ReadEvacConfig(kSmallNetwork));
+  EXPECT_NE(ReadSuite(kImagined, Settings()).hash, first.hash);
+}
+
+}  // namespace
+}  // namespace evac
