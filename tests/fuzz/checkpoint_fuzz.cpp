@@ -1,20 +1,41 @@
 #include <cstdint>
 #include <cstdlib>
+#include <span>
 #include <string>
 
 #include "core/tensor_file.h"
+#include "core/tensor_file_pickle.h"
 
-/// Any bytes are a checkpoint of torch.save whose tensors fill their shapes within it, or a TensorError.
-extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
-  try {
-    const evac::TensorFile file =
-        evac::TensorFile::ParseTorch(std::string(reinterpret_cast<const char*>(data), size), "fuzz");
-    unsigned sum = 0;
-    for (const evac::TensorView& tensor : file.tensors()) {
-      if (tensor.bytes.size() != tensor.ByteCount()) std::abort();
-      for (const std::byte byte : tensor.bytes) sum += static_cast<unsigned>(byte);
+namespace {
+
+/// A checkpoint of torch.save whose tensors fill their shapes, or a TensorError.
+void AsCheckpoint(const std::string& bytes) {
+  const evac::TensorFile file = evac::TensorFile::ParseTorch(bytes, "fuzz");
+  unsigned sum = 0;
+  for (const evac::TensorView& tensor : file.tensors()) {
+    if (tensor.bytes.size() != tensor.ByteCount()) std::abort();
+    for (const std::byte byte : tensor.bytes) sum += static_cast<unsigned>(byte);
+  }
+  if (sum == ~0U) std::abort();
+}
+
+/// A pickle whose values hold values that are there, or a TensorError.
+void AsPickle(const std::string& bytes) {
+  const evac::Pickle pickle = evac::ReadPickle(std::as_bytes(std::span(bytes)), "fuzz");
+  if (pickle.root >= pickle.values.size()) std::abort();
+  for (const evac::PickleValue& value : pickle.values) {
+    for (const std::uint32_t item : value.items) {
+      if (item >= pickle.values.size()) std::abort();
     }
-    if (sum == ~0U) std::abort();
+  }
+}
+
+}  // namespace
+
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  const std::string bytes(reinterpret_cast<const char*>(data), size);
+  try {
+    bytes.starts_with("PK") ? AsCheckpoint(bytes) : AsPickle(bytes);
   } catch (const evac::TensorError&) {
   }
   return 0;

@@ -83,16 +83,21 @@ def in_layout(state, layout):
 
 def write(path, thing, storages, pickle_bytes=None, **zip_options):
     """@param storages  {key: bytes or a function that writes to a file}"""
+    def entry(name):
+        info = zipfile.ZipInfo("archive/" + name)  # of 1980: the same bytes every time
+        info.compress_type = zip_options.get("compression", zipfile.ZIP_STORED)
+        return info
+
     with zipfile.ZipFile(path, "w", **zip_options) as archive:
-        archive.writestr("archive/data.pkl", pickle_bytes if pickle_bytes is not None else pickled(thing))
-        archive.writestr("archive/byteorder", "little")
+        archive.writestr(entry("data.pkl"), pickle_bytes if pickle_bytes is not None else pickled(thing))
+        archive.writestr(entry("byteorder"), "little")
         for key, data in storages.items():
             if callable(data):
-                with archive.open("archive/data/" + key, "w", force_zip64=True) as out:
+                with archive.open(entry("data/" + key), "w", force_zip64=True) as out:
                     data(out)
             else:
-                archive.writestr("archive/data/" + key, data)
-        archive.writestr("archive/version", "3\n")
+                archive.writestr(entry("data/" + key), data)
+        archive.writestr(entry("version"), "3\n")
 
 
 def convert(source, target, layout):
@@ -130,6 +135,8 @@ def corpus(folder):
     storages = {"0": numbers, "1": bytes(8)}
     for layout in ("state_dict", "module", "plain"):
         write(f"{folder}/{layout}", in_layout(state, layout), storages)
+        with open(f"{folder}/{layout}_pickle", "wb") as out:
+            out.write(pickled(in_layout(state, layout)))
     bad = {"hostile": ({"w": Hostile()}, storages), "beyond": ({"w": Tensor(whole, (5, 6))}, storages),
            "repeated": ({"w": Tensor(whole, (1000, 1000, 1000), (0, 0, 0))}, storages),
            "lost": ({"w": Tensor(whole, (4, 6))}, {}), "short": ({"w": Tensor(whole, (4, 6))}, {"0": numbers[:-4]}),
