@@ -1,6 +1,7 @@
 #include "apps/evac_factory.h"
 
 #include <algorithm>
+#include <cstdio>
 #include <thread>
 
 #include "core/recording.h"
@@ -56,12 +57,22 @@ FirstScene FirstSceneOf(const Suite& suite, const Store* store, const std::strin
 }
 
 std::unique_ptr<const nn::EvacModel> Load(const SuiteEvac& evac, const nn::ModelConfig& config) try {
-  return std::make_unique<const nn::EvacModel>(nn::LoadModel(evac.weights, config));
+  nn::LoadReport report;
+  auto model = std::make_unique<const nn::EvacModel>(nn::LoadModel(evac.weights, config, {}, &report));
+  if (!report.schedule.empty())
+    std::fprintf(stderr, "evac: warning: %s: %s\n", evac.weights.c_str(), report.schedule.c_str());
+  return model;
 } catch (const TensorError& error) {
   throw InvalidInput("{}", error.what());
 }
 
 }  // namespace
+
+void CheckNetwork(const SuiteEvac& evac) try {
+  nn::FileWeights(evac.weights, ReadEvacConfig(evac.config));
+} catch (const TensorError& error) {
+  throw InvalidInput("{}", error.what());
+}
 
 int Threads(const Suite& suite) {
   return suite.threads > 0 ? suite.threads : std::max(1, static_cast<int>(std::thread::hardware_concurrency()));

@@ -14,6 +14,9 @@ namespace evac {
 /// @throws InvalidInput if page and weights are not of one network, or either is broken.
 std::unique_ptr<World> MakeEvacWorld(const SuiteWorld& world, const Suite& suite, const Store* store);
 
+/// The same without loading it: what is wrong with page and weights is known before the first episode of any world.
+void CheckNetwork(const SuiteEvac& evac);
+
 /// As many as the suite says, or one per core.
 int Threads(const Suite& suite);
 

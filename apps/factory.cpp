@@ -95,7 +95,10 @@ void Declare(const Suite& suite, Store& store) {
   for (const Task& task : suite.tasks) store.AddTask(task);
   for (const SuiteWorld& world : suite.worlds) {
     std::string profile_hash = world.profile.empty() ? "" : Config::FromFile(world.profile).ContentHash();
-    if (world.evac) profile_hash = world.evac->hash;
+    if (world.evac) {
+      CheckNetwork(*world.evac);
+      profile_hash = world.evac->hash;
+    }
     store.AddWorld({.name = world.name, .type = world.type, .is_real = world.is_real, .profile_hash = profile_hash});
   }
 }

@@ -27,7 +27,7 @@ void CheckRubrics(const Suite& suite);
 /// asked). @throws InvalidInput naming page and body.
 void CheckStart(World& world, const Task& task, const InitialState& initial);
 
-/// Tasks and worlds, as the store keeps them; checks the rubrics first.
+/// Tasks and worlds, as the store keeps them; checks rubrics and networks first.
 void Declare(const Suite& suite, Store& store);
 
 /// @param store  of the run, where imagined episodes find the real ones' first frames; null: there is none yet

@@ -79,7 +79,7 @@ CachedChunk Read(const fs::path& path) {
   const auto format = file.metadata().find("format"), hash = file.metadata().find("sha256");
   const bool is_whole = format != file.metadata().end() && format->second == kFormat && hash != file.metadata().end() &&
                         latents.type == TensorType::kF32 && latents.shape.size() == 2 &&
-                        pictures.type == TensorType::kU8 && pictures.shape.size() == 5 &&
+                        pictures.type == TensorType::kU8 && pictures.shape.size() == 5 && pictures.shape[4] == 3 &&
                         pictures.shape[0] == latents.shape[0] && hash->second == HashOf(latents.bytes, pictures.bytes);
   if (!is_whole) throw TensorError(path.string() + ": not what was written there");
   CachedChunk chunk;

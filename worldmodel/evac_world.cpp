@@ -71,6 +71,9 @@ WorldStep EvacWorld::Reset(SceneId scene, const Task& task, const InitialState& 
   if (std::abs(task.period_s - period_s) > 1e-6)
     throw InvalidInput("world {}: its frames are {:.4g} s apart, those of task {} {:.4g} s", options_.name, period_s,
                        task.id, task.period_s);
+  if (task.cameras.size() != static_cast<std::size_t>(imaginer_.config().views))
+    throw InvalidInput("world {}: task {} has {} cameras, the network imagines {} views", options_.name, task.id,
+                       task.cameras.size(), imaginer_.config().views);
   const InitialScene start = first_scene_(task, initial);
   CheckFits(task, start, options_.name);
   const nn::LibraryThreads threads(ThreadsPerScene());

@@ -105,6 +105,22 @@ std::vector<std::int64_t> With(std::vector<std::int64_t> shape, std::size_t at, 
   return shape;
 }
 
+/// Whether an entry of the cache, whose file anybody may have written, is of the sizes that were asked for.
+bool Fits(const CachedChunk& chunk, std::size_t count, const nn::ModelConfig& config) {
+  const auto values =
+      static_cast<std::size_t>(config.views * config.vae.z_channels * config.LatentHeight() * config.LatentWidth());
+  const cv::Size size(static_cast<int>(config.image_width_px), static_cast<int>(config.image_height_px));
+  const auto is_frame = [&](const std::vector<float>& latent) { return latent.size() == values; };
+  const auto is_picture = [&](const cv::Mat& picture) { return picture.size() == size; };
+  const auto are_views = [&](const std::vector<cv::Mat>& views) {
+    return views.size() == static_cast<std::size_t>(config.views) &&
+           std::all_of(views.begin(), views.end(), is_picture);
+  };
+  return chunk.latents.size() == count && chunk.pictures.size() == count &&
+         std::all_of(chunk.latents.begin(), chunk.latents.end(), is_frame) &&
+         std::all_of(chunk.pictures.begin(), chunk.pictures.end(), are_views);
+}
+
 void CheckStart(const InitialScene& start, const nn::ModelConfig& config) {
   if (start.cameras.size() != static_cast<std::size_t>(config.views))
     throw InvalidInput("the scene has {} cameras, the network imagines {} views", start.cameras.size(), config.views);
@@ -165,7 +181,9 @@ ChunkConditioning Imaginer::Condition(const ImaginedScene& scene, std::vector<st
 ChunkLatents Imaginer::Denoise(const ImaginedScene& scene, const ChunkConditioning& conditioning) const {
   if (!cache_) return DenoiseAnew(scene, conditioning);
   const std::string key = ChunkKey(options_, scene, conditioning);
-  if (auto known = cache_->Find(key)) return {std::move(known->latents), key, std::move(known->pictures)};
+  auto known = cache_->Find(key);
+  if (known && Fits(*known, conditioning.count, config()))
+    return {std::move(known->latents), key, std::move(known->pictures)};
   ChunkLatents latents = DenoiseAnew(scene, conditioning);
   latents.key = key;
   return latents;

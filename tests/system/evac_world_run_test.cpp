@@ -98,11 +98,12 @@ TEST_F(ImaginedRun, NeedsTheRealOneFirst) {
   }
 }
 
-TEST_F(ImaginedRun, WeightsOfAnotherNetworkAreRefused) {
+TEST_F(ImaginedRun, WeightsOfAnotherNetworkAreRefusedBeforeTheFirstEpisodeOfAnyWorld) {
   const CommandResult result = RunCommand(RunWords(
       kImagined, folder_ / "run", Settings({"worlds.1.config=" EVAC_SOURCE_DIR "/apps/configs/evac_published.yaml"})));
   EXPECT_EQ(result.exit_code, 2) << result.err;
   EXPECT_THAT(result.err, HasSubstr("small.safetensors"));
+  EXPECT_FALSE(fs::exists(folder_ / "run" / "videos"));
 }
 
 TEST_F(ImaginedRun, IsAnotherOneWithOtherWeights) {

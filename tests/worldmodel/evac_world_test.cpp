@@ -142,7 +142,8 @@ TEST(EvacWorld, WhatItCannotStartFromIsRefused) {
   Task two_arms = SomeTask();
   two_arms.arms = {"left", "right"};
   EXPECT_THAT(RefusalOf(world, two_arms), HasSubstr("shows 1 arms, wanted 2"));
-  EXPECT_THAT(RefusalOf(world, SomeTask(1)), HasSubstr("1 cameras, the network imagines 2 views"));
+  EXPECT_THAT(RefusalOf(world, SomeTask(1)),
+              HasSubstr("world evac: task push has 1 cameras, the network imagines 2 views"));
   Task renamed = SomeTask();
   renamed.cameras[0].name = "hand_left";
   EXPECT_THAT(RefusalOf(world, renamed), HasSubstr("not taken by the task's cameras"));

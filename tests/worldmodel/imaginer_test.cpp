@@ -114,6 +114,18 @@ TEST(Imaginer, BothSolversAndGuidanceStayFinite) {
   }
 }
 
+TEST(Imaginer, TheImageEncoderSeesTheGivenPictureUnlessTheQuirkDecodedStart) {
+  for (const bool quirk : {false, true}) {
+    ImaginerOptions options = FewSteps();
+    options.decoded_start = quirk;
+    const Imaginer imaginer = SmallImaginer(1, options);
+    ImaginedScene scene = imaginer.Begin(SomeScene(1, 1), 7);
+    const cv::Mat given = scene.first.front();
+    Imagine(imaginer, scene, Targets(3));
+    EXPECT_EQ(cv::norm(scene.first.front(), given, cv::NORM_INF) > 0, quirk);
+  }
+}
+
 TEST(Imaginer, ASceneThatDoesNotFitTheNetworkIsRefused) {
   const Imaginer imaginer = SmallImaginer();
   const auto refusal = [&](const InitialScene& scene) -> std::string {

@@ -1,0 +1,101 @@
+#include "worldmodel/conditioning.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "core/error.h"
+#include "core/geometry.h"
+#include "tests/worldmodel/imagined_support.h"
+#include "worldmodel/action_delta.h"
+
+namespace evac {
+namespace {
+
+using testing::Each;
+using testing::SizeIs;
+
+/// A scene of one frame, remembered twice: N = 2, K = 3, cameras on the base and on the right gripper.
+ImaginedScene Started(std::size_t arms = 1) {
+  ImaginedScene scene;
+  for (const Camera& camera : SomeCameras(2)) scene.cameras.push_back(Resized(camera, 24, 16));
+  scene.frames.assign(2, {{}, ArmsAt(0.4, arms)});
+  return scene;
+}
+
+ChunkConditioning Told(const ImaginedScene& scene, const std::vector<Arms>& targets) {
+  return Condition(scene, {0, 1}, targets, SmallConfig(), FewSteps().conditioning);
+}
+
+TEST(Conditioning, HasMapsOfTheFramesToImagineAndRaysOfAll) {
+  const ChunkConditioning told = Told(Started(), Targets(3));
+  EXPECT_THAT(told.deltas, SizeIs(3));
+  EXPECT_THAT(told.pose_maps, SizeIs(3)) << "none of the memory";
+  EXPECT_THAT(told.pose_maps, Each(SizeIs(2)));
+  EXPECT_THAT(told.rays, SizeIs(2 + 3));
+  EXPECT_THAT(told.rays, Each(SizeIs(2)));
+  EXPECT_EQ(told.pose_maps[0][0].size(), cv::Size(24, 16));
+  EXPECT_EQ(told.rays[0][0].height, 8);
+}
+
+TEST(Conditioning, AWristCamerasRaysMoveWithTheCommandedGripperAndABaseCamerasStay) {
+  const ChunkConditioning told = Told(Started(), Targets(3));
+  for (std::size_t t = 0; t < told.rays.size(); ++t) {
+    EXPECT_EQ(told.rays[t][0].origin, told.rays[0][0].origin);
+    const double moved_m = t < 2 ? 0 : 0.01 * static_cast<double>(t - 1);
+    EXPECT_NEAR(told.rays[t][1].origin.x() - told.rays[0][1].origin.x(), moved_m, 1e-6) << t;
+  }
+}
+
+TEST(Conditioning, DeltasLeadFromEachFrameToTheNext) {
+  const ChunkConditioning told = Told(Started(), Targets(3));
+  const ActionStatistics statistics = AgiBotWorldStatistics();
+  for (const DeltaRow& row : told.deltas) {
+    EXPECT_NEAR(row[7], (0.01 - 3 * statistics.mean[6]) / (3 * statistics.deviation[6]), 1e-4) << "right x";
+    EXPECT_FLOAT_EQ(row[13], 0.4F) << "the closure is absolute";
+    EXPECT_NEAR(row[0], -statistics.mean[0] / statistics.deviation[0], 1e-6)
+        << "there is no left arm: it does not move";
+    EXPECT_EQ(row[6], 0) << "and is open";
+  }
+}
+
+TEST(Conditioning, AfterTheLastTargetTheArmsRest) {
+  const ChunkConditioning told = Told(Started(), Targets(1));
+  EXPECT_EQ(told.count, 1u);
+  const ActionStatistics statistics = AgiBotWorldStatistics();
+  for (std::size_t k : {1, 2}) {
+    EXPECT_NEAR(told.deltas[k][7], -statistics.mean[6] / statistics.deviation[6], 1e-6);
+    EXPECT_FLOAT_EQ(told.deltas[k][13], 0.4F);
+    EXPECT_EQ(cv::norm(told.pose_maps[k][0], told.pose_maps[0][0], cv::NORM_INF), 0);
+    EXPECT_EQ(told.rays[2 + k][1].origin, told.rays[2][1].origin);
+  }
+}
+
+bool HasColour(const cv::Mat& map, const cv::Scalar& colour) {
+  cv::Mat found;
+  cv::inRange(map, colour, colour, found);
+  return cv::countNonZero(found) > 0;
+}
+
+TEST(Conditioning, OneArmIsDrawnAsTheRightOneAndTheOtherIsMissing) {
+  const cv::Scalar left_y(255, 255, 0), right_y(255, 0, 0);
+  PoseMapOptions options;
+  options.radius_px = 2;
+  options.thickness_px = 1;
+  const std::vector<Camera> cameras = {CameraNamed("head")};
+  const cv::Mat one = DrawPoseMaps(ArmsAt(0.4, 1), cameras, options)[0];
+  EXPECT_TRUE(HasColour(one, right_y));
+  EXPECT_FALSE(HasColour(one, left_y));
+  Arms two = ArmsAt(0.4, 2);
+  two[0].base_from_gripper.translation().y() += 0.15;
+  const cv::Mat both = DrawPoseMaps(two, cameras, options)[0];
+  EXPECT_TRUE(HasColour(both, right_y));
+  EXPECT_TRUE(HasColour(both, left_y));
+}
+
+TEST(Conditioning, AChunkOfNoTargetsOrTooManyIsRefused) {
+  EXPECT_THROW(Told(Started(), {}), Error);
+  EXPECT_THROW(Told(Started(), Targets(4)), Error);
+}
+
+}  // namespace
+}  // namespace evac
