@@ -1,4 +1,3 @@
-#include <ATen/Context.h>
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -15,6 +14,7 @@
 #include "worldmodel/action_delta.h"
 #include "worldmodel/frame_memory.h"
 #include "worldmodel/imaginer.h"
+#include "worldmodel/nn/library.h"
 #include "worldmodel/nn/threads.h"
 #include "worldmodel/nn/weights.h"
 
@@ -31,11 +31,18 @@ at::ScalarType TypeNamed(const std::string& name) {
   return name == "bf16" ? at::kBFloat16 : at::kHalf;
 }
 
-void FillIn(SamplerArguments& sampler) {
-  if (sampler.steps == 0) sampler.steps = sampler.solver == "ddim" ? kDdimSteps : kDpmSteps;
+void FillIn(SamplerArguments& sampler, const nn::ModelConfig& config) {
+  const bool ddim = sampler.solver == "ddim";
+  if (sampler.steps == 0) sampler.steps = ddim ? kDdimSteps : kDpmSteps;
+  const std::int64_t fewest = ddim ? 1 : 2, most = config.schedule.steps;
+  if (sampler.steps < fewest || sampler.steps > most)
+    throw InvalidInput("--steps {}: wanted {} … {} with {}", sampler.steps, fewest, most, sampler.solver);
   if (sampler.threads == 0) sampler.threads = static_cast<int>(std::max(1U, std::thread::hardware_concurrency()));
-  if (sampler.device == "cuda" && !at::hasCUDA())
-    throw InvalidInput("--device cuda: there is no CUDA for the libtorch that evac was built with; wanted cpu");
+  if (sampler.device == "cuda" && !nn::HasCuda())
+    throw InvalidInput("--device cuda: the libtorch that evac was built with has no CUDA; wanted cpu");
+  if (sampler.device == "cpu" && sampler.dtype == "f16")
+    throw InvalidInput(
+        "--dtype f16: libtorch does not compute in it on a processor; wanted bf16 or f32, or --device cuda");
 }
 
 nn::EvacModel Load(const ImagineArguments& arguments, const nn::ModelConfig& config) {
@@ -153,8 +160,8 @@ FinishedVideo WriteFrames(const ImagineArguments& arguments, const ImagineStart&
 
 ExitCode ImagineFrames(ImagineArguments arguments) {
   const auto begin = Clock::now();
-  FillIn(arguments.sampler);
   const nn::ModelConfig config = ModelSizes(arguments);
+  FillIn(arguments.sampler, config);
   ImaginerOptions options = OptionsOf(arguments, config);
   const ImagineStart start = ReadImagineStart(arguments.inputs, static_cast<std::size_t>(config.views));
   const nn::LibraryThreads threads(arguments.sampler.threads);
@@ -173,10 +180,9 @@ ExitCode ImagineFrames(ImagineArguments arguments) {
   const Sidecar sidecar(arguments, start, std::move(job));
   sidecar.WriteBegun();
   const ChunkFolder chunks(arguments.out / "chunks", sidecar.hash(), config);
-  FrameRun(arguments, start, imaginer, chunks, progress).Run(frames);
-
   const MapPainter painter(start, config, imaginer.options().conditioning.pose_map);
   WriteMaps(painter, frames, arguments.out);
+  FrameRun(arguments, start, imaginer, chunks, progress).Run(frames);
   const FinishedVideo video = WriteFrames(arguments, start, painter, chunks, frames, per_chunk);
   sidecar.WriteFinished(video, std::chrono::duration<double>(Clock::now() - begin).count());
   fmt::print("{}: {} frames of {}x{}, {:.4g} s apart\n", video.path.string(), frames,

@@ -1,12 +1,11 @@
 #include "apps/imagine_job.h"
 
-#include <torch/version.h>
-
 #include "core/config.h"
 #include "core/file.h"
 #include "core/hash.h"
 #include "core/version.h"
 #include "worldmodel/action_statistics.h"
+#include "worldmodel/nn/library.h"
 
 namespace evac {
 namespace {
@@ -72,7 +71,7 @@ Json JobOf(const ImagineArguments& arguments, const ImagineStart& start) {
   const SamplerArguments& sampler = arguments.sampler;
   const ActionStatistics statistics = StatisticsOf(arguments);
   return {{"evac", EVAC_VERSION},
-          {"libtorch", TORCH_VERSION},
+          {"libtorch", nn::LibtorchVersion()},
           {"weights", Sha256HexOfFile(arguments.weights)},
           {"config", arguments.config.empty() ? "published" : Config::FromFile(arguments.config).Canonical()},
           {"statistics", {{"mean", statistics.mean}, {"deviation", statistics.deviation}}},
@@ -104,8 +103,7 @@ Sidecar::Sidecar(const ImagineArguments& arguments, const ImagineStart& start, J
   if (!arguments.restart) {
     Refuse(Json::parse(ReadFile(path), nullptr, /*allow_exceptions=*/false));
   } else {
-    fs::remove_all(out_ / "chunks");
-    fs::remove(path);
+    for (const char* part : {"chunks", "frames", "maps", "imagined.mp4", "imagined.json"}) fs::remove_all(out_ / part);
   }
 }
 

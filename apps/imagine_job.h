@@ -16,8 +16,8 @@ nlohmann::json JobOf(const ImagineArguments& arguments, const ImagineStart& star
 /// OUT/imagined.json: what was asked for and, at the end, what came of it. Enough to do it again.
 class Sidecar {
  public:
-  /// @throws InvalidInput if `out` holds another job, naming what differs, unless `restart`; then its chunks are
-  /// removed.
+  /// @throws InvalidInput if `out` holds another job, naming what differs, unless `restart`; then what is there
+  /// is removed.
   Sidecar(const ImagineArguments& arguments, const ImagineStart& start, nlohmann::json job);
 
   /// Of the job as a whole.

@@ -18,6 +18,7 @@
 #include "tests/support/temp_folder.h"
 #include "tests/system/process_support.h"
 #include "worldmodel/evac_config.h"
+#include "worldmodel/nn/library.h"
 #include "worldmodel/nn/weights.h"
 
 namespace evac {
@@ -165,6 +166,11 @@ TEST_F(ImagineCommand, BadInputEndsInOneMessageAndLeavesNothing) {
   ExpectRefused(Words("refused", {"--maps-only", "--stride", "8"}), "nothing to imagine");
   ExpectRefused(Words("refused", {"--weights", folder_ / "none.safetensors"}), "none.safetensors");
   EXPECT_EQ(RunCommand(Frames("refused", {"--eta", "2"})).exit_code, 2);
+  ExpectRefused(Frames("refused", {"--dtype", "f16"}), "--dtype f16");
+  ExpectRefused(Words("refused", {"--weights", folder_ / "tiny.safetensors", "--solver", "dpm", "--steps", "1"}),
+                "--steps 1: wanted 2 … 1000 with dpm");
+  if (!nn::HasCuda()) ExpectRefused(Frames("refused", {"--device", "cuda"}), "has no CUDA");
+  ExpectRefused(Frames("refused", {"--statistics", folder_ / "none.yaml"}), "none.yaml");
   WriteText(folder_ / "tiny.yaml", std::string(kTiny) + "image_hight_px: 32\n");
   ExpectRefused(Words("refused", {"--maps-only"}), "image_hight_px");
   fs::remove(Page("head_intrinsic_params.json"));
@@ -260,6 +266,7 @@ TEST_F(ImagineCommand, EverySolverAndQuirkImaginesSomethingElse) {
                                                       {"--solver", "dpm"},
                                                       {"--eta", "0"},
                                                       {"--cfg", "3"},
+                                                      {"--dtype", "bf16"},
                                                       {"--reference-quirks", "residual_noise"},
                                                       {"--reference-quirks", "memory_not_scaled"},
                                                       {"--reference-quirks", "delta_window"},
