@@ -93,7 +93,10 @@ def write(path, thing, storages, pickle_bytes=None, **zip_options):
         archive.writestr(entry("byteorder"), "little")
         for key, data in storages.items():
             if callable(data):
-                with archive.open(entry("data/" + key), "w", force_zip64=True) as out:
+                info = entry("data/" + key)
+                padding = -(archive.fp.tell() + 30 + len(info.filename) + 4 + 20) % 64  # as torch.save: every storage at 64 bytes
+                info.extra = b"FB" + struct.pack("<H", padding) + bytes(padding)
+                with archive.open(info, "w", force_zip64=True) as out:
                     data(out)
             else:
                 archive.writestr(entry("data/" + key), data)

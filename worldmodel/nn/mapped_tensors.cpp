@@ -28,7 +28,11 @@ Tensor MappedTensors::Get(const std::string& name) const {
   const bool is_part = at >= first && view.bytes.size() <= file_->bytes().size() &&
                        static_cast<std::size_t>(at - first) <= file_->bytes().size() - view.bytes.size();
   const auto offset = static_cast<std::size_t>(at - first);
-  if (!is_part || view.bytes.empty() || here.data_ptr() != at || offset % BytesOf(view.type) != 0) return here.clone();
+  if (view.bytes.empty() || here.data_ptr() != at) {  // a copy already
+    file_->LetGo(view);
+    return here;
+  }
+  if (!is_part || offset % BytesOf(view.type) != 0) return here.clone();
   return at::empty({0}, here.options())
       .set_(storage_, static_cast<std::int64_t>(offset / BytesOf(view.type)), here.sizes(), here.strides());
 }
