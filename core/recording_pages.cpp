@@ -11,9 +11,19 @@ namespace {
 
 using Json = nlohmann::json;
 
+constexpr int kMaxDepth = 32;
+
+/// What walks through a page calls itself: a page of a million brackets must not reach it.
+void CheckDepth(const Json& value, int depth, const std::string& file) {
+  if (depth > kMaxDepth) throw InvalidInput("{}: lists and objects lie more than {} deep", file, kMaxDepth);
+  if (!value.is_structured()) return;
+  for (const Json& part : value) CheckDepth(part, depth + 1, file);
+}
+
 Json Parse(const std::string& text, const std::string& file) {
   Json page = Json::parse(text, nullptr, /*allow_exceptions=*/false);
   if (page.is_discarded()) throw InvalidInput("{}: no JSON", file);
+  CheckDepth(page, 0, file);
   return page;
 }
 

@@ -263,6 +263,7 @@ TEST(Recording, CameraPagesAreCheckedFieldByField) {
   EXPECT_THAT(intrinsics(R"({"intrinsic": {"fx": 1}})"), HasSubstr("field fy is missing"));
   EXPECT_THAT(intrinsics("[1]"), HasSubstr("field intrinsic is missing"));
   EXPECT_THAT(intrinsics("{"), HasSubstr("page.json: no JSON"));
+  EXPECT_THAT(intrinsics(std::string(1000000, '[') + std::string(1000000, ']')), HasSubstr("more than 32 deep"));
   EXPECT_THROW(ParseExtrinsics("[]", "page.json"), Error);
   EXPECT_THROW(
       ParseExtrinsics(R"([{"extrinsic": {"rotation_matrix": [[1,0,0],[0,1,0]], "translation_vector": [0,0,0]}}])",
