@@ -125,6 +125,30 @@ TEST_F(ImagineCommand, MapsNeedNoConfigurationAndComeInThePublishedSizeEveryTent
   EXPECT_EQ(cv::imread(folder_ / "maps/maps/frame_00000.png").size(), cv::Size(512, 320));
 }
 
+TEST_F(ImagineCommand, SeveralViewsStandSideBySide) {
+  SyntheticClip two(8);
+  two.cameras = {"head", "hand_left"};
+  two.Write(OneFolder(folder_ / "two"));
+  WriteText(folder_ / "two.yaml", std::string(kTiny) + "views: 2\n");
+  const std::vector<std::string> words = {
+      Binary("evac"), "imagine", "--recording", folder_ / "two", "--config", folder_ / "two.yaml", "--stride", "1"};
+  std::vector<std::string> maps = words;
+  maps.insert(maps.end(), {"--maps-only", "--out", folder_ / "maps"});
+  ASSERT_EQ(RunCommand(maps).exit_code, 0);
+  const cv::Mat first = cv::imread(folder_ / "maps/maps/frame_00000.png");
+  ASSERT_EQ(first.size(), cv::Size(128, 32));
+  nn::RandomWeights weights(5);
+  nn::SaveWeights(folder_ / "two.safetensors", weights, ReadEvacConfig(folder_ / "two.yaml"));
+  std::vector<std::string> frames = words;
+  frames.insert(frames.end(), {"--weights", folder_ / "two.safetensors", "--steps", "1", "--chunks", "1", "--out",
+                               folder_ / "frames"});
+  const CommandResult result = RunCommand(frames);
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_EQ(ReadAllFrames(folder_ / "frames/imagined.mp4").at(2).size(), cv::Size(128, 64));
+  frames.insert(frames.end(), {"--cameras", "head", "--restart"});
+  EXPECT_THAT(RunCommand(frames).err, HasSubstr("1 cameras, wanted 2"));
+}
+
 TEST_F(ImagineCommand, FourNamedFilesAndTheFolderGiveTheSameMaps) {
   const fs::path frame = folder_ / "first.png";
   cv::imwrite(frame.string(),
