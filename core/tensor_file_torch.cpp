@@ -1,3 +1,5 @@
+#include <sys/mman.h>
+
 #include <algorithm>
 #include <cstring>
 #include <map>
@@ -194,7 +196,11 @@ std::vector<std::byte> RowByRow(const Strided& tensor) {
 }  // namespace
 
 void TensorFile::ReadTorch() {
+  // Every storage has a header before it: without this the system would read the surroundings of each, gigabytes in
+  // all.
+  if (mapping_ != nullptr) ::madvise(mapping_, bytes_.size(), MADV_RANDOM);
   TorchReader reader(bytes_, name_);
+  if (mapping_ != nullptr) ::madvise(mapping_, bytes_.size(), MADV_NORMAL);
   std::size_t repacked = 0;
   for (Strided& tensor : reader.Tensors()) {
     const std::size_t count = tensor.ByteCount();
