@@ -19,8 +19,6 @@ namespace {
 
 using nn::Tensor;
 
-constexpr std::uint32_t kStart = 0;  ///< the step of the noise from which a chunk is denoised; the sampler's follow
-
 Tensor TensorOf(const std::vector<float>& values, at::IntArrayRef shape) {
   return at::from_blob(const_cast<float*>(values.data()), shape, at::TensorOptions().dtype(at::kFloat));
 }
@@ -43,7 +41,7 @@ Tensor StackOf(const std::vector<cv::Mat>& pictures) {
 
 /// [3, H, W] → CV_32FC3.
 cv::Mat FloatPicture(const Tensor& picture) {
-  const Tensor rows = picture.permute({1, 2, 0}).contiguous();
+  const Tensor rows = picture.permute({1, 2, 0}).cpu().contiguous();
   cv::Mat image(static_cast<int>(rows.size(0)), static_cast<int>(rows.size(1)), CV_32FC3);
   std::memcpy(image.data, rows.data_ptr<float>(), static_cast<std::size_t>(rows.numel()) * sizeof(float));
   return image;
@@ -57,7 +55,7 @@ cv::Mat BytePicture(const Tensor& rows) {
 }
 
 std::vector<float> ValuesOf(const Tensor& tensor) {
-  const Tensor whole = tensor.contiguous();
+  const Tensor whole = tensor.cpu().contiguous();
   const float* values = whole.data_ptr<float>();
   return {values, values + whole.numel()};
 }
@@ -164,7 +162,8 @@ ImaginedScene Imaginer::Begin(const InitialScene& start, std::uint64_t seed) con
   }
   scene.newest = scene.first;
   const Tensor noise = NoiseOf(scene, "first frame", 0, LatentShape(config()));
-  const Tensor latent = nn::EncodeImages(*model_, at::cat(pictures), noise);  // [V, z, h, w]
+  const at::Device device(options_.device);
+  const Tensor latent = nn::EncodeImages(*model_, at::cat(pictures).to(device), noise.to(device));  // [V, z, h, w]
   scene.frames.assign(static_cast<std::size_t>(config().memory), {ValuesOf(latent), start.arms});
   return scene;
 }
@@ -199,23 +198,28 @@ Pictures Imaginer::Decode(const ChunkLatents& latents) const {
 ChunkLatents Imaginer::DenoiseAnew(const ImaginedScene& scene, const ChunkConditioning& conditioning) const {
   const at::NoGradGuard no_gradients;
   const std::vector<std::int64_t> frame = LatentShape(config());  // [z, h, w]
+  const at::Device device(options_.device);
   nn::ChunkRequest request;
   std::vector<Tensor> memory, maps;
   for (const std::size_t index : conditioning.memory)
     memory.push_back(TensorOf(scene.frames.at(index).latent, With(frame, 0, config().views)));
-  request.memory = at::stack(memory, 2);
+  request.memory = at::stack(memory, 2).to(device);
   const bool starts = conditioning.memory.front() < static_cast<std::size_t>(config().memory);
-  request.image = StackOf(starts ? scene.first : scene.newest);
+  request.image = StackOf(starts ? scene.first : scene.newest).to(device);
   for (const std::vector<cv::Mat>& views : conditioning.pose_maps)
     maps.push_back(nn::ToNetworkRange(StackOf(views) / 255));
-  request.pose_maps =
-      nn::EncodePoseMaps(*model_, at::stack(maps, 1), NoiseOf(scene, "pose maps", 0, With(frame, 0, config().chunk)));
+  const Tensor map_noise = NoiseOf(scene, "pose maps", 0, With(frame, 0, config().chunk));
+  request.pose_maps = nn::EncodePoseMaps(*model_, at::stack(maps, 1).to(device), map_noise.to(device));
   SetRays(conditioning.rays, request);
-  request.deltas = DeltasOf(conditioning.deltas);
+  request.direction = request.direction.to(device);
+  request.origin = request.origin.to(device);
+  request.deltas = DeltasOf(conditioning.deltas).to(device);
 
-  std::uint32_t step = kStart;
-  const nn::ChunkNoise noise{NoiseOf(scene, "sampler", step, With(frame, 1, config().chunk)),
-                             [&] { return NoiseOf(scene, "sampler", ++step, With(frame, 1, config().Frames())); }};
+  std::uint32_t step = 0;  // first the noise from which the chunk is denoised, then the sampler's
+  const auto draw = [&](std::int64_t frames) {
+    return NoiseOf(scene, "sampler", step++, With(frame, 1, frames)).to(device);
+  };
+  const nn::ChunkNoise noise{draw(config().chunk), [&] { return draw(config().Frames()); }};
   const Tensor imagined = nn::ImagineChunk(*model_, request, noise, options_.sampler);  // [V, z, T, h, w]
   ChunkLatents latents;
   for (std::size_t k = 0; k < conditioning.count; ++k)
@@ -227,11 +231,11 @@ Pictures Imaginer::DecodeAnew(const ChunkLatents& latents) const {
   const at::NoGradGuard no_gradients;
   Pictures pictures;
   for (const std::vector<float>& frame : latents.frames) {
-    const Tensor decoded = nn::DecodeLatents(
-        *model_, TensorOf(frame, With(LatentShape(config()), 0, config().views)).clone());  // [V, 3, H, W]
+    const Tensor latent = TensorOf(frame, With(LatentShape(config()), 0, config().views)).clone();
+    const Tensor decoded = nn::DecodeLatents(*model_, latent.to(at::Device(options_.device)));  // [V, 3, H, W]
     if (!decoded.isfinite().all().item<bool>())
       throw InternalError("the codec answers finite latents with numbers that are not");
-    const Tensor bytes = nn::ToBytes(decoded).permute({0, 2, 3, 1}).contiguous();
+    const Tensor bytes = nn::ToBytes(decoded).permute({0, 2, 3, 1}).cpu().contiguous();
     std::vector<cv::Mat>& views = pictures.emplace_back();
     for (std::int64_t v = 0; v < config().views; ++v) views.push_back(BytePicture(bytes[v]));
   }
@@ -246,7 +250,7 @@ void Imaginer::Append(ImaginedScene& scene, std::span<const Arms> targets, Chunk
   const at::NoGradGuard no_gradients;
   if (options_.decoded_start && scene.frames.size() == static_cast<std::size_t>(config().memory)) {
     const Tensor start = TensorOf(scene.frames.front().latent, With(LatentShape(config()), 0, config().views));
-    const Tensor decoded = nn::DecodeLatents(*model_, start).clamp(-1, 1);
+    const Tensor decoded = nn::DecodeLatents(*model_, start.to(at::Device(options_.device))).clamp(-1, 1);
     for (std::size_t v = 0; v < scene.first.size(); ++v)
       scene.first[v] = FloatPicture(decoded[static_cast<std::int64_t>(v)]);
   }

@@ -23,6 +23,7 @@ struct ImaginerOptions {
   ConditioningOptions conditioning;
   /// Quirk decoded_start: from the second chunk on the image encoder sees the codec's version of the first frame.
   bool decoded_start = false;
+  std::string device = "cpu";  ///< where the network's weights are: libtorch's name
 
   /// What else decides the frames, for the cache: hashes of weights and configuration, device, number type, threads.
   std::string identity;

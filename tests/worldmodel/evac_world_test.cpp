@@ -2,6 +2,8 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <sys/wait.h>
+#include <unistd.h>
 
 #include <fstream>
 #include <limits>
@@ -274,6 +276,43 @@ TEST(ChunkCache, StaysBelowItsLimitAndForgetsTheOldestFirst) {
   ASSERT_TRUE(newest);
   EXPECT_EQ(newest->latents, chunk.latents);
   EXPECT_EQ(cv::norm(newest->pictures[0][0], chunk.pictures[0][0], cv::NORM_INF), 0);
+}
+
+CachedChunk ChunkNumber(int i) {
+  return {{std::vector<float>(1000, static_cast<float>(i))}, {{cv::Mat(10, 10, CV_8UC3, cv::Scalar::all(i))}}};
+}
+
+/// Looks for chunks, keeps those that are not there, in a folder that holds a few. @returns how many were not what was
+/// kept
+int UseCache(const fs::path& folder, std::uint64_t seed) {
+  ChunkCache cache({.folder = folder, .limit_gb = 40e-6});
+  SplitMix64 random(seed);
+  int wrong = 0;
+  for (int round = 0; round < 100; ++round) {
+    const int i = static_cast<int>(random.Below(16));
+    const std::string key = std::string(62, 'a') + std::to_string(10 + i);
+    const std::optional<CachedChunk> found = cache.Find(key);
+    if (found) wrong += found->latents != ChunkNumber(i).latents;
+    if (!found) cache.Keep(key, ChunkNumber(i));
+  }
+  return wrong;
+}
+
+TEST(ChunkCache, SeveralProcessesMayShareAFolder) {
+  const TempFolder folder;
+  std::vector<pid_t> children;
+  for (std::uint64_t child = 0; child < 3; ++child) {
+    const pid_t pid = ::fork();
+    if (pid == 0) ::_exit(UseCache(folder.path(), child));
+    children.push_back(pid);
+  }
+  for (const pid_t child : children) {
+    int status = 0;
+    ::waitpid(child, &status, 0);
+    EXPECT_TRUE(WIFEXITED(status) && WEXITSTATUS(status) == 0);
+  }
+  for (const fs::path& file : FilesBelow(folder.path()))
+    EXPECT_EQ(file.extension(), ".safetensors") << "nothing half done";
 }
 
 TEST(ChunkCache, WantsToKnowWhichNetworkItIsFor) {
