@@ -66,6 +66,7 @@ ImaginerOptions OptionsOf(const ImagineArguments& arguments, const nn::ModelConf
   options.sampler.memory_not_scaled = quirks.memory_not_scaled;
   options.sampler.residual_noise = quirks.residual_noise;
   options.decoded_start = quirks.decoded_start;
+  options.device = sampler.device;
   options.conditioning.statistics = StatisticsOf(arguments);
   options.conditioning.pose_map = MapOptions(arguments, config);
   return options;

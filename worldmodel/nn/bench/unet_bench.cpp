@@ -62,6 +62,7 @@ struct Profile {
 
 struct Running : at::ObserverContext {
   Clock::time_point start;
+  double flop = 0;
 };
 
 thread_local int depth = 0;
@@ -73,19 +74,21 @@ double FlopOf(const std::string& name, const at::RecordFunction& function) {
     return static_cast<double>(function.inputs()[i].toTensor().size(axis));
   };
   if (name == "aten::linear") return 2 * size(0) * side(1, 0);
-  if (name == "aten::conv2d") {
-    const double outputs = static_cast<double>(function.outputs()[0].toTensor().numel());
-    return 2 * outputs * size(1) / side(1, 0);
-  }
   if (name == "evac::attention") return 4 * size(0) * side(1, 1);
   if (name == "evac::temporal_attention") return 4 * size(0) * side(1, 1);
   return 0;
 }
 
-std::unique_ptr<at::ObserverContext> Begin(const at::RecordFunction&) {
+/// Of a convolution only when its result is there.
+double ConvolutionFlop(const at::RecordFunction& function) {
+  const Tensor weight = function.inputs()[1].toTensor(), y = function.outputs()[0].toTensor();
+  return 2 * static_cast<double>(y.numel()) * static_cast<double>(weight.numel() / weight.size(0));
+}
+
+std::unique_ptr<at::ObserverContext> Begin(const at::RecordFunction& function) {
   auto running = std::make_unique<Running>();
+  if (++depth == 1) running->flop = FlopOf(function.name(), function);
   running->start = Clock::now();
-  ++depth;
   return running;
 }
 
@@ -93,8 +96,9 @@ void End(const at::RecordFunction& function, at::ObserverContext* context) {
   if (--depth > 0 || profile == nullptr) return;
   const std::string name = function.name();
   Profile::Entry& entry = profile->entries[name];
-  entry.seconds += SecondsSince(static_cast<Running*>(context)->start);
-  entry.flop += FlopOf(name, function);
+  const auto* running = static_cast<Running*>(context);
+  entry.seconds += SecondsSince(running->start);
+  entry.flop += name == "aten::conv2d" ? ConvolutionFlop(function) : running->flop;
   ++entry.calls;
 }
 
