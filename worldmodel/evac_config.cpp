@@ -64,12 +64,13 @@ void ReadOurUNet(const Config& page, nn::UNetConfig& unet) {
 }
 
 void ReadOurVae(const Config& page, nn::VaeConfig& vae) {
-  page.AllowOnly({"channels", "channel_mult", "num_res_blocks", "z_channels", "scale_factor"});
+  page.AllowOnly({"channels", "channel_mult", "num_res_blocks", "z_channels", "scale_factor", "patch_px"});
   Read(page, "channels", vae.channels);
   Read(page, "channel_mult", vae.channel_mult);
   Read(page, "num_res_blocks", vae.num_res_blocks);
   Read(page, "z_channels", vae.z_channels);
   Read(page, "scale_factor", vae.scale_factor);
+  Read(page, "patch_px", vae.patch_px);
 }
 
 void ReadOurResampler(const Config& page, nn::ResamplerConfig& resampler) {
@@ -92,7 +93,8 @@ void ReadOurEncoder(const Config& page, nn::ImageEncoderConfig& encoder) {
 
 void ReadOurSchedule(const Config& page, nn::ScheduleConfig& schedule) {
   page.AllowOnly(
-      {"steps", "linear_start", "linear_end", "zero_terminal_snr", "dynamic_rescale", "base_scale", "turning_step"});
+      {"steps", "linear_start", "linear_end", "zero_terminal_snr", "dynamic_rescale", "base_scale", "turning_step",
+       "from_last_frame"});
   Read(page, "steps", schedule.steps);
   Read(page, "linear_start", schedule.linear_start);
   Read(page, "linear_end", schedule.linear_end);
@@ -100,6 +102,7 @@ void ReadOurSchedule(const Config& page, nn::ScheduleConfig& schedule) {
   Read(page, "dynamic_rescale", schedule.dynamic_rescale);
   Read(page, "base_scale", schedule.base_scale);
   Read(page, "turning_step", schedule.turning_step);
+  Read(page, "from_last_frame", schedule.from_last_frame);
 }
 
 nn::ModelConfig ReadOurs(const Config& page) {

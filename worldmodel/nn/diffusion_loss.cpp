@@ -49,6 +49,13 @@ Tensor ImageCondition(const Tensor& memory, std::int64_t chunk, const Tensor& ma
   return at::cat({memory, memory.narrow(2, memory.size(2) - 1, 1).expand(shape)}, 2) * mask;
 }
 
+Tensor FromLastFrame(const NoiseSchedule& schedule, const Tensor& v, const Tensor& image, const Tensor& t) {
+  if (!schedule.from_last_frame()) return v;
+  return v - image * PerRow(t, 5, [&](std::int64_t step) {
+           return std::sqrt(1 - schedule.AlphaBar(step)) * schedule.Scale(step);
+         });
+}
+
 Tensor DenoiserInput(const Tensor& x, const Concat& concat) {
   return at::cat({x, concat.image, concat.mask, concat.pose_map, concat.direction, concat.origin}, 1);
 }
@@ -66,8 +73,10 @@ Tensor DiffusionLoss(const UNet& unet, const NoiseSchedule& schedule, const Diff
   const Tensor target = batch.noise * levels.signal - x * levels.noise;
   const Tensor seen = at::cat({x.narrow(2, 0, batch.memory), noisy.narrow(2, batch.memory, chunk)}, 2);
   const UNet::Input input{DenoiserInput(seen, concat), t, batch.context.views, batch.memory};
-  const Tensor v = unet(input, unet.Prepare(batch.context));
-  return at::mse_loss(v.narrow(2, batch.memory, chunk), target.narrow(2, batch.memory, chunk));
+  const Tensor v = FromLastFrame(schedule, unet(input, unet.Prepare(batch.context)), concat.image, t);
+  const Tensor found = v.narrow(2, batch.memory, chunk), wanted = target.narrow(2, batch.memory, chunk);
+  if (!batch.weight.defined()) return at::mse_loss(found, wanted);
+  return ((found - wanted).square() * batch.weight).mean();
 }
 
 }  // namespace evac::nn

@@ -22,6 +22,14 @@ Tensor ImageCondition(const Tensor& memory, std::int64_t chunk, const Tensor& ma
 /// [BV, in_channels, T, h, w] in the order the network was trained with.
 Tensor DenoiserInput(const Tensor& x, const Concat& concat);
 
+/// What the network's answer is added to: nothing, or, with `from_last_frame`, the v of a chunk in which the newest
+/// memory frame stands still.
+/// @param v      [BV, z, T, h, w]: the network's answer
+/// @param image  [BV, z, T, h, w]: as in Concat
+/// @param t      [BV] integers
+/// @returns      [BV, z, T, h, w]
+Tensor FromLastFrame(const NoiseSchedule& schedule, const Tensor& v, const Tensor& image, const Tensor& t);
+
 /// Noise on the memory in training, so that the network bears with its own mistakes later.
 struct TeacherForcing {
   Tensor angle;              ///< [BV, N] in [-1.57, 1.57]: below 0 no noise
@@ -37,9 +45,10 @@ struct DiffusionBatch {
   Tensor noise;             ///< [BV, z, T, h, w]
   std::int64_t memory = 0;  ///< N
   std::optional<TeacherForcing> teacher_forcing;
+  Tensor weight = {};  ///< of the squared errors, to be broadcast to [BV, z, K, h, w]; undefined: 1
 };
 
-/// Mean squared error of v over the frames to imagine. @returns a number, differentiable.
+/// Mean squared error of v over the frames to imagine, weighted. @returns a number, differentiable.
 Tensor DiffusionLoss(const UNet& unet, const NoiseSchedule& schedule, const DiffusionBatch& batch);
 
 }  // namespace evac::nn

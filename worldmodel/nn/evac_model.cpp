@@ -3,6 +3,8 @@
 namespace evac::nn {
 namespace {
 
+constexpr std::int64_t kDeltaNumbers = 14;
+
 const ModelConfig& Checked(const ModelConfig& config) {
   config.Check();
   return config;
@@ -30,7 +32,12 @@ Tensor EvacModel::ImageTokens(const Tensor& images) const {
   return image_resampler_(image_encoder_(PreprocessForEncoder(images, image_encoder_.image_px())));
 }
 
-Tensor EvacModel::ActionTokens(const Tensor& deltas) const { return action_resampler_(deltas); }
+Tensor EvacModel::ActionTokens(const Tensor& deltas) const {
+  const std::int64_t order = config_.action_resampler.embedding_dim - kDeltaNumbers;
+  if (order == 0) return action_resampler_(deltas);
+  const Tensor place = SinusoidEmbedding(at::arange(deltas.size(1), deltas.options()), order);
+  return action_resampler_(at::cat({deltas, place.expand({deltas.size(0), deltas.size(1), order})}, 2));
+}
 
 Tensor EvacModel::ContextTokens(const Tensor& image_tokens, const Tensor& action_tokens) const {
   const std::int64_t views = image_tokens.size(0) / action_tokens.size(0);

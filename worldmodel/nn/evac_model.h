@@ -25,7 +25,7 @@ class EvacModel {
   /// @param images  [BV, 3, H, W] in [-1, 1]
   /// @returns       [BV, image tokens, context_dim]
   Tensor ImageTokens(const Tensor& images) const;
-  /// @param deltas  [B, any, 14], normalised
+  /// @param deltas  [B, any, 14], normalised; if the resampler takes more numbers, the others say which step it is
   /// @returns       [B, action tokens, context_dim]
   Tensor ActionTokens(const Tensor& deltas) const;
   /// Image tokens of each view followed by the scene's action tokens.

@@ -75,7 +75,8 @@ Denoise MakeDenoise(const EvacModel& model, const Conditioning& conditioning) {
   return [&model, concat = conditioning.concat, context = std::move(context), views, rows, memory](const Tensor& x_t,
                                                                                                    std::int64_t t) {
     const Tensor steps = at::full({rows}, t, at::kLong).to(x_t.device());
-    return model.unet()({DenoiserInput(x_t, concat), steps, views, memory}, context);
+    const Tensor v = model.unet()({DenoiserInput(x_t, concat), steps, views, memory}, context);
+    return FromLastFrame(model.schedule(), v, concat.image, steps);
   };
 }
 

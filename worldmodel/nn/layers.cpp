@@ -13,6 +13,11 @@ constexpr double kLayerNormEpsilon = 1e-5;
 /// Weights may be kept in half the bytes, with everything else in floats: x in the type of the weight.
 Tensor InTypeOf(const Tensor& weight, const Tensor& x) { return x.to(weight.scalar_type()); }
 
+/// A weight or bias in the type of the product.
+Tensor ForProduct(const ProductType& product, const Tensor& weight) {
+  return product && weight.defined() ? weight.to(*product) : weight;
+}
+
 /// What training needs: differentiable, exact for pictures of one colour too.
 Tensor DifferentiableGroupNorm(const Tensor& x, const GroupNorm& norm, double epsilon) {
   const Tensor channels_second = x.reshape({x.size(0), -1, x.size(-1)}).transpose(1, 2).contiguous();
@@ -29,13 +34,14 @@ bool CanUseKernels(const Tensor& x) {
   return !(at::GradMode::is_enabled()) && x.is_cpu() && x.scalar_type() == at::kFloat && x.is_contiguous();
 }
 
-Linear::Linear(const Scope& at, std::int64_t in, std::int64_t out, Bias with_bias) {
+Linear::Linear(const Scope& at, std::int64_t in, std::int64_t out, Bias with_bias) : product_(at.ProductType()) {
   weight = at.Take("weight", {out, in});
   if (with_bias == Bias::kYes) bias = at.Take("bias", {out});
 }
 
 Linear Linear::Pointwise(const Scope& at, std::int64_t in, std::int64_t out, std::int64_t extra_sides) {
   Linear linear;
+  linear.product_ = at.ProductType();
   std::vector<std::int64_t> shape = {out, in};
   shape.resize(2 + static_cast<std::size_t>(extra_sides), 1);
   linear.weight = at.Take("weight", shape);
@@ -44,28 +50,33 @@ Linear Linear::Pointwise(const Scope& at, std::int64_t in, std::int64_t out, std
 }
 
 Tensor Linear::operator()(const Tensor& x) const {
-  const Tensor y = at::linear(InTypeOf(weight, x), weight.dim() > 2 ? weight.flatten(1) : weight, bias);
-  return y.to(x.scalar_type());
+  const Tensor factor = ForProduct(product_, weight.dim() > 2 ? weight.flatten(1) : weight);
+  return at::linear(InTypeOf(factor, x), factor, ForProduct(product_, bias)).to(x.scalar_type());
 }
 
 Conv2d::Conv2d(const Scope& at, std::int64_t in, std::int64_t out, const Options& options)
     : weight(at.Take("weight", {out, in, options.kernel, options.kernel})),
       bias(at.Take("bias", {out})),
-      options_(options) {}
+      options_(options),
+      product_(at.ProductType()) {}
 
 Tensor Conv2d::operator()(const Tensor& x) const {
-  const Tensor channels_second = InTypeOf(weight, x).permute({0, 3, 1, 2});
-  const Tensor y = at::conv2d(channels_second, weight, bias, options_.stride, options_.padding);
+  const Tensor kernel = ForProduct(product_, weight);
+  const Tensor channels_second = InTypeOf(kernel, x).permute({0, 3, 1, 2});
+  const Tensor y = at::conv2d(channels_second, kernel, ForProduct(product_, bias), options_.stride, options_.padding);
   return y.permute({0, 2, 3, 1}).contiguous().to(x.scalar_type());
 }
 
 CausalConv::CausalConv(const Scope& at, std::int64_t channels)
-    : weight(at.Take("weight", {channels, channels, 3, 1, 1})), bias(at.Take("bias", {channels})) {}
+    : weight(at.Take("weight", {channels, channels, 3, 1, 1})),
+      bias(at.Take("bias", {channels})),
+      product_(at.ProductType()) {}
 
 Tensor CausalConv::operator()(const Tensor& x) const {
-  const Tensor in = InTypeOf(weight, x), first = in.narrow(1, 0, 1);
-  const Tensor padded = at::cat({first, first, in}, 1);                                // [N, T + 2, L, C]
-  const Tensor y = at::conv2d(padded.permute({0, 3, 1, 2}), weight.flatten(3), bias);  // kernel (3, 1)
+  const Tensor kernel = ForProduct(product_, weight.flatten(3));  // (3, 1)
+  const Tensor in = InTypeOf(kernel, x), first = in.narrow(1, 0, 1);
+  const Tensor padded = at::cat({first, first, in}, 1);  // [N, T + 2, L, C]
+  const Tensor y = at::conv2d(padded.permute({0, 3, 1, 2}), kernel, ForProduct(product_, bias));
   return y.permute({0, 2, 3, 1}).contiguous().to(x.scalar_type());
 }
 

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 
 #include "worldmodel/nn/parameters.h"
 #include "worldmodel/nn/tensor.h"
@@ -16,6 +17,9 @@ bool CanUseKernels(const Tensor& x);
 /// between them stays in floats, and so do small weights: these.
 Tensor Precise(const Tensor& weight);
 
+/// The type in which a layer's product is computed, where it is not that of its weight.
+using ProductType = std::optional<at::ScalarType>;
+
 class Linear {
  public:
   enum class Bias { kNo, kYes };
@@ -30,6 +34,7 @@ class Linear {
 
  private:
   Linear() = default;
+  ProductType product_;
 };
 
 /// A convolution over the picture.
@@ -50,6 +55,7 @@ class Conv2d {
 
  private:
   Options options_;
+  ProductType product_;
 };
 
 /// A convolution over time that sees the frame itself and the two before it; the first frame stands in for those
@@ -62,6 +68,9 @@ class CausalConv {
 
   Tensor weight;  ///< [C, C, 3, 1, 1]
   Tensor bias;    ///< [C]
+
+ private:
+  ProductType product_;
 };
 
 enum class Activation { kNone, kSilu };

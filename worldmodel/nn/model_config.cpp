@@ -67,6 +67,7 @@ void ModelConfig::Check() const {
   RequirePositive({{"vae.channels", vae.channels},
                    {"vae.z_channels", vae.z_channels},
                    {"vae.num_res_blocks", vae.num_res_blocks},
+                   {"vae.patch_px", vae.patch_px},
                    {"chunk", chunk},
                    {"memory", memory},
                    {"views", views},
@@ -77,6 +78,8 @@ void ModelConfig::Check() const {
   CheckResampler("image resampler", image_resampler, unet.context_dim);
   Require(image_resampler.embedding_dim == image_encoder.width, "image resampler embedding_dim",
           image_resampler.embedding_dim, "clip.width = " + std::to_string(image_encoder.width));
+  Require(action_resampler.embedding_dim >= 14 && action_resampler.embedding_dim % 2 == 0,
+          "action resampler embedding_dim", action_resampler.embedding_dim, "14, or more by an even number");
   Require(unet.in_channels == 3 * vae.z_channels + 7, "unet.in_channels", unet.in_channels,
           "3 latents, a mask and 6 of the rays: " + std::to_string(3 * vae.z_channels + 7));
   Require(unet.out_channels == vae.z_channels, "unet.out_channels", unet.out_channels, "vae.z_channels");

@@ -33,7 +33,10 @@ struct VaeConfig {
   std::int64_t num_res_blocks = 2;
   std::int64_t z_channels = 4;
   double scale_factor = 0.18215;  ///< latents are this times the posterior's sample
-  std::int64_t Stride() const { return std::int64_t{1} << (channel_mult.size() - 1); }
+  /// Squares of so many pixels are one position of the first layer, their colours its channels: small codecs save the
+  /// layers at full size. 1: as published.
+  std::int64_t patch_px = 1;
+  std::int64_t Stride() const { return patch_px << (channel_mult.size() - 1); }
 };
 
 /// A Perceiver resampler: any number of inputs to `queries` tokens.
@@ -70,12 +73,17 @@ struct ScheduleConfig {
   bool dynamic_rescale = true;
   double base_scale = 0.7;
   std::int64_t turning_step = 400;
+  /// The network's answer is counted from the v of "nothing changes": it need not learn to copy the newest memory
+  /// frame. Not in the paper; helps where training is short.
+  bool from_last_frame = false;
 };
 
 struct ModelConfig {
   UNetConfig unet;
   VaeConfig vae;
-  ResamplerConfig action_resampler;                                        ///< 14 numbers per step → 16 tokens
+  /// 14 numbers per step → 16 tokens. As published they are a set: with an embedding_dim of 14 plus an even number, so
+  /// many waves of the step's place are given with each.
+  ResamplerConfig action_resampler;
   ResamplerConfig image_resampler{.embedding_dim = 1280, .queries = 256};  ///< CLIP's tokens → 256 tokens
   ImageEncoderConfig image_encoder;
   ScheduleConfig schedule;

@@ -18,6 +18,7 @@ class NoiseSchedule {
   double AlphaBar(std::int64_t t) const { return alphas_cumprod_[Index(t)]; }
   /// The factor on clean latents at step t: 1 falling to base_scale; 1 everywhere without dynamic rescaling.
   double Scale(std::int64_t t) const { return scales_[Index(t)]; }
+  bool from_last_frame() const { return from_last_frame_; }
 
   /// A buffer that a checkpoint carries: the key and its float values.
   struct Buffer {
@@ -36,6 +37,7 @@ class NoiseSchedule {
   std::vector<double> betas_, exact_alphas_cumprod_;
   std::vector<double> alphas_cumprod_, scales_;  ///< rounded to float
   std::vector<float> scale_buffer_;
+  bool from_last_frame_;
 };
 
 /// v-prediction (Salimans and Ho 2022): three ways to say the same of x_t = √ā x0 + √(1 - ā) ε.

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -15,6 +16,9 @@ class ParameterSource {
   virtual ~ParameterSource() = default;
   /// @param key  as in the published checkpoint: "model.diffusion_model.out.2.weight".
   virtual Tensor Take(const std::string& key, at::IntArrayRef shape) = 0;
+  /// The type in which matrix products and convolutions are computed; nothing: that of their weights. Training keeps
+  /// its weights as floats and may ask for products in bf16.
+  virtual std::optional<at::ScalarType> ProductType() const { return std::nullopt; }
 };
 
 /// A place in the tree of keys: `Linear(at / "to_q", …)` takes "…to_q.weight".
@@ -26,6 +30,7 @@ class Scope {
   Tensor Take(const std::string& name, at::IntArrayRef shape) const {
     return source_->Take((*this / name).prefix_, shape);
   }
+  std::optional<at::ScalarType> ProductType() const { return source_->ProductType(); }
 
  private:
   ParameterSource* source_;
@@ -63,6 +68,7 @@ class RecordedWeights final : public ParameterSource {
   };
   explicit RecordedWeights(ParameterSource& source) : source_(source) {}
   Tensor Take(const std::string& key, at::IntArrayRef shape) override;
+  std::optional<at::ScalarType> ProductType() const override { return source_.ProductType(); }
   const std::vector<Parameter>& parameters() const { return parameters_; }
   /// @throws TensorError if no such key was asked for.
   const Tensor& Get(const std::string& key) const;

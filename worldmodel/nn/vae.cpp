@@ -1,6 +1,8 @@
 #include "worldmodel/nn/vae.h"
 
 #include <ATen/ops/constant_pad_nd.h>
+#include <ATen/ops/pixel_shuffle.h>
+#include <ATen/ops/pixel_unshuffle.h>
 
 #include <algorithm>
 
@@ -89,7 +91,7 @@ std::vector<Vae::Level> Vae::DecoderLevels(const Scope& at, const VaeConfig& con
 }
 
 Vae::Encoder::Encoder(const Scope& at, const VaeConfig& config)
-    : in(at / "conv_in", config.image_channels, config.channels),
+    : in(at / "conv_in", config.image_channels * config.patch_px * config.patch_px, config.channels),
       levels(EncoderLevels(at / "down", config)),
       middle(at / "mid", Deepest(config)),
       norm(at / "norm_out", Deepest(config), kEpsilon),
@@ -109,7 +111,8 @@ Vae::Decoder::Decoder(const Scope& at, const VaeConfig& config)
       middle(at / "mid", Deepest(config)),
       levels(DecoderLevels(at / "up", config)),
       norm(at / "norm_out", config.channels * config.channel_mult.front(), kEpsilon),
-      out(at / "conv_out", config.channels * config.channel_mult.front(), config.image_channels) {}
+      out(at / "conv_out", config.channels * config.channel_mult.front(),
+          config.image_channels * config.patch_px * config.patch_px) {}
 
 Tensor Vae::Decoder::operator()(const Tensor& z) const {
   Tensor h = middle(in(z));
@@ -129,12 +132,14 @@ Vae::Vae(const Scope& at, const VaeConfig& config)
 
 Posterior Vae::Encode(const Tensor& images) const {
   CheckShape("codec image", images, {-1, config_.image_channels, -1, -1});
-  return {FromLast(quantize_(encoder_(ToLast(images))))};
+  const Tensor patches = config_.patch_px > 1 ? at::pixel_unshuffle(images, config_.patch_px) : images;
+  return {FromLast(quantize_(encoder_(ToLast(patches))))};
 }
 
 Tensor Vae::Decode(const Tensor& latents) const {
   CheckShape("codec latent", latents, {-1, config_.z_channels, -1, -1});
-  return FromLast(decoder_(unquantize_(ToLast(latents / config_.scale_factor))));
+  const Tensor patches = FromLast(decoder_(unquantize_(ToLast(latents / config_.scale_factor))));
+  return config_.patch_px > 1 ? at::pixel_shuffle(patches, config_.patch_px) : patches;
 }
 
 }  // namespace evac::nn

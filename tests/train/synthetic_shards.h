@@ -1,0 +1,22 @@
+#pragma once
+
+#include <filesystem>
+
+#include "core/tensor_file.h"
+
+namespace evac::train {
+
+/// Clips of a bright square that goes where the actions say, on a ground that differs from clip to clip: small enough
+/// to learn in a test. The object is the square; it is "in contact" in the middle of each clip.
+struct SyntheticShards {
+  std::int64_t clips = 6;        ///< of each split
+  std::int64_t frames = 9;       ///< of a clip
+  std::int64_t views = 1;
+  std::int64_t height_px = 16, width_px = 24;
+  std::uint64_t seed = 1;
+};
+
+/// Writes shard_00000 (train), shard_00001 (hold-out) and shards.json, as docs/formats/shards.md says.
+void WriteSyntheticShards(const std::filesystem::path& folder, const SyntheticShards& options);
+
+}  // namespace evac::train

@@ -1,0 +1,244 @@
+#include "worldmodel/train/trainer.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <fstream>
+
+#include "tests/support/temp_folder.h"
+
+namespace evac::train {
+namespace {
+
+Tensor Line(std::int64_t count, double from, double to) {
+  return at::arange(count, at::kFloat) * ((to - from) / static_cast<double>(count - 1)) + from;
+}
+
+/// AdamW as its paper writes it, in double, one number.
+struct WrittenOut {
+  double w, m = 0, v = 0;
+  void Step(double gradient, int t, const AdamWOptions& o, double rate) {
+    m = o.beta1 * m + (1 - o.beta1) * gradient;
+    v = o.beta2 * v + (1 - o.beta2) * gradient * gradient;
+    const double m_hat = m / (1 - std::pow(o.beta1, t)), v_hat = v / (1 - std::pow(o.beta2, t));
+    w = w - rate * o.weight_decay * w - rate * m_hat / (std::sqrt(v_hat) + o.epsilon);
+  }
+};
+
+TEST(AdamW, TakesTheStepsThatItsPaperWrites) {
+  const AdamWOptions options{.beta1 = 0.8, .beta2 = 0.95, .epsilon = 1e-6, .weight_decay = 0.1};
+  AdamWState state{Line(5, -2, 2), at::zeros({5}), at::zeros({5}), at::zeros({5}), {}};
+  std::vector<WrittenOut> wanted;
+  for (int i = 0; i < 5; ++i) wanted.push_back({state.values[i].item<double>()});
+  for (int t = 1; t <= 20; ++t) {
+    for (int i = 0; i < 5; ++i) {
+      const double gradient = std::sin(t * 1.3 + i) * (i + 1);
+      state.gradients[i] = gradient;
+      wanted[static_cast<std::size_t>(i)].Step(gradient * 0.5, t, options, 0.01 * t);
+    }
+    StepAdamW(state, options, {t - 1, 0.01 * t, 0.5, 0});
+  }
+  for (int i = 0; i < 5; ++i) EXPECT_NEAR(state.values[i].item<double>(), wanted[static_cast<std::size_t>(i)].w, 2e-6);
+  EXPECT_EQ(state.gradients.abs().max().item<double>(), 0) << "gradients are ready for the next step";
+}
+
+TEST(AdamW, TheAverageFollowsTheValues) {
+  AdamWState state{at::full({3}, 1.0), at::zeros({3}), at::zeros({3}), at::zeros({3}), at::zeros({3})};
+  AdamWOptions still;
+  still.weight_decay = 0;
+  StepAdamW(state, still, {0, 0.1, 1, 0.75});
+  EXPECT_NEAR(state.average[0].item<double>(), 0.25, 1e-6);
+}
+
+TEST(Norm, IsThatOfAllNumbers) {
+  const Tensor flat = Line(100'000, -3, 3);
+  EXPECT_NEAR(Norm(flat), flat.to(at::kDouble).norm().item<double>(), 1e-6);
+}
+
+TEST(LearningRate, RisesStaysAndFallsToNothing) {
+  TrainerOptions options;
+  options.learning_rate = 2;
+  options.warmup_steps = 4;
+  options.decay_from = 0.5;
+  EXPECT_DOUBLE_EQ(LearningRateAt(options, 0, 100), 0.5);
+  EXPECT_DOUBLE_EQ(LearningRateAt(options, 3, 100), 2);
+  EXPECT_DOUBLE_EQ(LearningRateAt(options, 50, 100), 2);
+  EXPECT_DOUBLE_EQ(LearningRateAt(options, 75, 100), 1);
+  EXPECT_NEAR(LearningRateAt(options, 99, 100), 0.04, 1e-12);
+}
+
+TEST(Dice, EveryDrawIsAFunctionOfItsPlace) {
+  Dice one({7, 3, 0, 0}, 1), same({7, 3, 0, 0.5}, 1), later({7, 4, 0, 0}, 1), other({7, 3, 0, 0}, 2), part({7, 3, 1, 0}, 1);
+  const double first = one.Uniform();
+  EXPECT_EQ(first, same.Uniform());
+  EXPECT_NE(first, later.Uniform());
+  EXPECT_NE(first, other.Uniform());
+  EXPECT_NE(first, part.Uniform());
+  EXPECT_TRUE(at::equal(one.Normal({5}), same.Normal({5})));
+  EXPECT_FALSE(at::equal(one.Normal({5}), one.Normal({5}))) << "two draws in a row are two";
+}
+
+TEST(Dice, IsFair) {
+  Dice dice({1, 0, 0, 0}, 5);
+  std::array<int, 4> counts{};
+  for (int i = 0; i < 4000; ++i) ++counts[static_cast<std::size_t>(dice.Below(4))];
+  for (const int count : counts) EXPECT_NEAR(count, 1000, 120);
+  EXPECT_NEAR(dice.Normal({10000}).std().item<double>(), 1, 0.03);
+}
+
+/// A network of two parameters, and noisy data that it can learn.
+struct Regression {
+  Tensor weight = at::zeros({3, 1}), bias = at::zeros({1});
+  std::vector<NamedTensor> Parameters() const { return {{"weight", weight}, {"bias", bias}}; }
+  Tensor Loss(const StepPlace& place) const {
+    Dice dice(place, 1);
+    const Tensor x = dice.Normal({16, 3}), noise = dice.Normal({16, 1}) * 0.1;
+    const Tensor y = at::matmul(x, at::tensor({1.0F, -2.0F, 0.5F}).reshape({3, 1})) + 3 + noise;
+    return (at::matmul(x, weight) + bias - y).square().mean();
+  }
+  Tensor All() const { return at::cat({weight.detach().flatten(), bias.detach()}).clone(); }
+};
+
+TrainerOptions Quick(std::int64_t steps) {
+  TrainerOptions options;
+  options.steps = steps;
+  options.learning_rate = 0.05;
+  options.adamw.weight_decay = 0;
+  options.average_decay = 0.9;
+  options.clip_norm = 10;
+  options.decay_from = 0.5;
+  options.seed = 5;
+  return options;
+}
+
+TEST(Trainer, LearnsWhatTheLossSays) {
+  const TempFolder folder;
+  Regression regression;
+  Trainer trainer(regression.Parameters(), Quick(400), folder.path());
+  const TrainerSummary summary = trainer.Run({.loss = [&](const StepPlace& place) { return regression.Loss(place); }});
+  EXPECT_EQ(summary.why, "done");
+  EXPECT_NEAR(regression.weight[1].item<double>(), -2, 0.05);
+  EXPECT_NEAR(regression.bias[0].item<double>(), 3, 0.05);
+}
+
+TEST(Trainer, GoesOnAfterAnyKillAsIfNothingHadHappened) {
+  const TempFolder whole_folder, killed_folder;
+  Regression whole;
+  Trainer(whole.Parameters(), Quick(60), whole_folder.path()).Run({.loss = [&](const StepPlace& p) { return whole.Loss(p); }});
+  struct Killed {};
+  Tensor last;
+  for (const std::int64_t kill_at : {7, 20, 21, 59, 1000}) {
+    Regression killed;  // as a new process: nothing is left but the folder
+    TrainerOptions options = Quick(60);
+    options.checkpoint_every_s = 0;
+    Trainer trainer(killed.Parameters(), options, killed_folder.path());
+    try {
+      trainer.Run({.loss = [&](const StepPlace& place) {
+        if (place.step == kill_at) throw Killed();
+        return killed.Loss(place);
+      }});
+    } catch (const Killed&) {
+    }
+    last = killed.All();
+  }
+  EXPECT_TRUE(at::equal(last, whole.All()));
+}
+
+std::string Text(const std::filesystem::path& path) {
+  std::ifstream file(path);
+  return {std::istreambuf_iterator<char>(file), {}};
+}
+
+TEST(Trainer, KeepsTheBestOfTheHoldoutAndStopsWhenItGetsNoBetter) {
+  const TempFolder folder;
+  Regression regression;
+  TrainerOptions options = Quick(1000);
+  options.holdout_every = 10;
+  options.patience = 3;
+  int asked = 0;
+  Tensor at_best;
+  Trainer trainer(regression.Parameters(), options, folder.path());
+  const TrainerSummary summary = trainer.Run({.loss = [&](const StepPlace& place) { return regression.Loss(place); },
+                                              .holdout =
+                                                  [&] {
+                                                    if (++asked == 4) at_best = regression.All();
+                                                    return std::abs(asked - 4.0);
+                                                  }});
+  EXPECT_EQ(summary.best_step, 40);
+  EXPECT_EQ(summary.step, 70);
+  EXPECT_EQ(summary.why, "no better for 3 hold-outs");
+  const Tensor before = regression.All();
+  trainer.WithBest([&] { EXPECT_TRUE(at::equal(regression.All(), at_best)); });
+  EXPECT_TRUE(at::equal(regression.All(), before)) << "the weights in training are put back";
+  EXPECT_THAT(Text(folder / "holdout.csv"), testing::HasSubstr("\n40,0\n"));
+}
+
+TEST(Trainer, StopsWhenAskedToAndSavesWhatItHas) {
+  const TempFolder folder;
+  Regression regression;
+  Trainer trainer(regression.Parameters(), Quick(100), folder.path());
+  const TrainerSummary summary = trainer.Run({.loss = [&](const StepPlace& place) { return regression.Loss(place); },
+                                              .interrupted = [&] { return trainer.step() >= 12; }});
+  EXPECT_EQ(summary.why, "interrupted");
+  Regression again;
+  EXPECT_EQ(Trainer(again.Parameters(), Quick(100), folder.path()).step(), 12);
+}
+
+TEST(Trainer, AccumulatedPartsAreOneStepOfTheirMean) {
+  const TempFolder one, two;
+  Regression whole, parts;
+  const auto data = [](const Regression& r, const StepPlace& place) { return r.Loss({place.seed, place.step, 0, 0}); };
+  TrainerOptions options = Quick(5);
+  Trainer(whole.Parameters(), options, one.path()).Run({.loss = [&](const StepPlace& p) { return data(whole, p); }});
+  options.accumulate = 2;
+  Trainer(parts.Parameters(), options, two.path()).Run({.loss = [&](const StepPlace& p) { return data(parts, p); }});
+  EXPECT_TRUE(at::allclose(whole.All(), parts.All(), 1e-5, 1e-6));
+}
+
+TEST(Trainer, RefusesTheCheckpointOfAnotherTraining) {
+  const TempFolder folder;
+  Regression regression;
+  Trainer(regression.Parameters(), Quick(3), folder.path()).Run({.loss = [&](const StepPlace& p) { return regression.Loss(p); }});
+  TrainerOptions other = Quick(3);
+  other.learning_rate = 0.1;
+  Regression again;
+  EXPECT_THROW(Trainer(again.Parameters(), other, folder.path()), TensorError);
+  EXPECT_THROW(Trainer({{"weight", at::zeros({3, 1})}}, Quick(3), folder.path()), TensorError);
+}
+
+TEST(Trainer, AStepWhoseLossIsNotFiniteMovesNothing) {
+  const TempFolder folder;
+  Regression regression;
+  Trainer trainer(regression.Parameters(), Quick(30), folder.path());
+  trainer.Run({.loss = [&](const StepPlace& place) {
+    const Tensor loss = regression.Loss(place);
+    return place.step % 3 == 1 ? loss / 0.0 : loss;
+  }});
+  EXPECT_TRUE(std::isfinite(regression.All().sum().item<double>()));
+  TrainerOptions hopeless = Quick(200);
+  const TempFolder other;
+  Regression second;
+  EXPECT_THROW(Trainer(second.Parameters(), hopeless, other.path()).Run({.loss = [&](const StepPlace& place) {
+    return second.Loss(place) / 0.0;
+  }}),
+               TensorError);
+}
+
+TEST(Trainer, CountsTheStepsThatFitIntoTheMinutesOnceAndKeepsThem) {
+  const TempFolder folder;
+  TrainerOptions options = Quick(100000);
+  options.minutes = 0.01;
+  Regression first;
+  Trainer trainer(first.Parameters(), options, folder.path());
+  const TrainerSummary summary = trainer.Run({.loss = [&](const StepPlace& place) { return first.Loss(place); }});
+  EXPECT_EQ(summary.step, summary.steps);
+  EXPECT_LT(summary.steps, 100000);
+  Regression again;
+  const TrainerSummary same = Trainer(again.Parameters(), options, folder.path()).Run({.loss = [&](const StepPlace& p) { return again.Loss(p); }});
+  EXPECT_EQ(same.steps, summary.steps);
+  EXPECT_TRUE(at::equal(first.All(), again.All()));
+}
+
+}  // namespace
+}  // namespace evac::train

@@ -1,0 +1,19 @@
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <string>
+
+namespace evac::train {
+
+/// A table whose first column is the step. Rows of steps that were done but not saved before a kill go when the
+/// training goes on: they are done again.
+class CsvLog {
+ public:
+  /// @param from  rows of this step and later are dropped
+  static void Trim(const std::filesystem::path& path, const std::string& header, std::int64_t from);
+  /// Adds a row. @throws TensorError with the system's reason.
+  static void Add(const std::filesystem::path& path, const std::string& row);
+};
+
+}  // namespace evac::train

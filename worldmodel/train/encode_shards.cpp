@@ -1,0 +1,46 @@
+#include "worldmodel/train/encode_shards.h"
+
+#include <algorithm>
+#include <vector>
+
+namespace evac::train {
+namespace {
+
+constexpr std::int64_t kBatch = 32;
+
+/// [F, V, H, W, 3] bytes → [F, V, z, h, w] half
+Tensor Encode(const nn::Vae& vae, const Tensor& pictures) {
+  const Tensor all = pictures.flatten(0, 1);
+  std::vector<Tensor> parts;
+  for (std::int64_t from = 0; from < all.size(0); from += kBatch) {
+    const Tensor batch = PicturesFrom(all.narrow(0, from, std::min(kBatch, all.size(0) - from)));
+    parts.push_back((vae.Encode(batch).Sample({}) * vae.scale_factor()).to(at::kHalf));
+  }
+  return at::cat(parts).unflatten(0, {pictures.size(0), pictures.size(1)}).contiguous();
+}
+
+}  // namespace
+
+void EncodeShard(const nn::Vae& vae, const std::filesystem::path& shard, const EncodeOptions& options) {
+  const at::NoGradGuard no_gradients;
+  const nn::MappedTensors file(TensorFile::Open(shard));
+  const Tensor frames = Encode(vae, file.Get("frames")), maps = Encode(vae, file.Get("maps"));
+  const TensorView views[] = {nn::ViewOf("latents", frames), nn::ViewOf("map_latents", maps)};
+  WriteTensorFile(LatentsPath(shard), views,
+                  {{"format", "evac-latents"},
+                   {"version", "1"},
+                   {"codec", options.codec},
+                   {"shard_sha256", options.shard_sha256}});
+}
+
+bool IsEncoded(const std::filesystem::path& shard, const EncodeOptions& options) {
+  if (!std::filesystem::exists(LatentsPath(shard))) return false;
+  const TensorFile file = TensorFile::Open(LatentsPath(shard));
+  const auto says = [&](const char* key, const std::string& wanted) {
+    const auto found = file.metadata().find(key);
+    return found != file.metadata().end() && found->second == wanted;
+  };
+  return says("codec", options.codec) && says("shard_sha256", options.shard_sha256);
+}
+
+}  // namespace evac::train

@@ -1,0 +1,24 @@
+#pragma once
+
+#include <filesystem>
+#include <functional>
+#include <string>
+
+#include "worldmodel/nn/vae.h"
+#include "worldmodel/train/shards.h"
+
+namespace evac::train {
+
+struct EncodeOptions {
+  std::string codec;         ///< SHA-256 of its weights, kept in the file
+  std::string shard_sha256;  ///< of the shard's file, kept likewise
+};
+
+/// Writes a shard's latents beside it (docs/formats/shards.md): the posterior's mean of every picture and map, scaled.
+/// The file is there whole or not at all.
+void EncodeShard(const nn::Vae& vae, const std::filesystem::path& shard, const EncodeOptions& options);
+
+/// Whether the shard's latents are there and are of this codec and this shard.
+bool IsEncoded(const std::filesystem::path& shard, const EncodeOptions& options);
+
+}  // namespace evac::train

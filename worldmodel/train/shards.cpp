@@ -1,0 +1,139 @@
+#include "worldmodel/train/shards.h"
+
+#include <algorithm>
+
+namespace evac::train {
+namespace {
+
+constexpr const char* kCommon[] = {"period_s", "cameras", "arms", "pose_map", "delta_frames", "statistics"};
+
+std::string Text(const TensorFile& file, const std::string& key) {
+  const auto found = file.metadata().find(key);
+  if (found == file.metadata().end()) throw TensorError(file.name() + ": its metadata has no '" + key + "'");
+  return found->second;
+}
+
+void RequireText(const TensorFile& file, const std::string& key, const std::string& wanted) {
+  const std::string found = Text(file, key);
+  if (found != wanted) throw TensorError(file.name() + ": " + key + " is '" + found + "', wanted '" + wanted + "'");
+}
+
+/// A tensor of the wanted type and shape (-1: any).
+Tensor Checked(const nn::MappedTensors& file, const std::string& name, at::ScalarType type, at::IntArrayRef shape) {
+  const Tensor tensor = file.Get(name);
+  nn::CheckShape(file.file().name() + ": " + name, tensor, shape);
+  if (tensor.scalar_type() != type)
+    throw TensorError(file.file().name() + ": " + name + " is " + Name(file.file().Get(name).type) +
+                      ", wanted what docs/formats/shards.md says");
+  return tensor;
+}
+
+Shard Read(const std::filesystem::path& path, const nn::MappedTensors& file) {
+  Shard shard;
+  shard.path = path;
+  shard.frames = Checked(file, "frames", at::kByte, {-1, -1, -1, -1, 3});
+  const std::int64_t f = shard.frames.size(0), v = shard.frames.size(1);
+  shard.maps = Checked(file, "maps", at::kByte, shard.frames.sizes());
+  shard.clip_start = Checked(file, "clip_start", at::kLong, {-1});
+  const std::int64_t clips = shard.clip_start.size(0) - 1;
+  shard.task = Checked(file, "task", at::kInt, {clips});
+  shard.outcome = Checked(file, "outcome", at::kChar, {clips});
+  shard.deltas = Checked(file, "deltas", at::kFloat, {f, 14});
+  shard.c2w = Checked(file, "c2w", at::kFloat, {f, v, 4, 4});
+  shard.k = Checked(file, "k", at::kFloat, {f, v, 3, 3});
+  shard.object_px = Checked(file, "object_px", at::kFloat, {f, v, 2});
+  shard.contact = Checked(file, "contact", at::kByte, {f});
+  return shard;
+}
+
+std::vector<Clip> ClipsOf(const Shard& shard, std::size_t index) {
+  std::vector<Clip> clips;
+  const auto* starts = shard.clip_start.data_ptr<std::int64_t>();
+  const std::int64_t count = shard.clip_start.size(0) - 1;
+  for (std::int64_t i = 0; i < count; ++i) {
+    if (starts[i] < 0 || starts[i + 1] <= starts[i] || starts[i + 1] > shard.frames.size(0))
+      throw TensorError(shard.path.string() + ": clip " + std::to_string(i) + " has rows " + std::to_string(starts[i]) +
+                        " to " + std::to_string(starts[i + 1]) + " of " + std::to_string(shard.frames.size(0)));
+    clips.push_back({index, starts[i], starts[i + 1] - starts[i], shard.task.data_ptr<std::int32_t>()[i],
+                     shard.outcome.data_ptr<std::int8_t>()[i]});
+  }
+  return clips;
+}
+
+}  // namespace
+
+std::filesystem::path LatentsPath(const std::filesystem::path& shard) {
+  std::string name = shard.filename().string();
+  if (name.starts_with("shard_")) name = "latents_" + name.substr(6);
+  return shard.parent_path() / name;
+}
+
+std::vector<std::filesystem::path> ShardPaths(const std::filesystem::path& folder) {
+  if (!std::filesystem::exists(folder / "shards.json"))
+    throw TensorError(folder.string() + " has no shards.json: wanted a folder that `evac pack` has finished");
+  std::vector<std::filesystem::path> paths;
+  for (const auto& entry : std::filesystem::directory_iterator(folder)) {
+    const std::string name = entry.path().filename().string();
+    if (name.starts_with("shard_") && name.ends_with(".safetensors")) paths.push_back(entry.path());
+  }
+  std::sort(paths.begin(), paths.end());
+  return paths;
+}
+
+ShardSet::ShardSet(const std::filesystem::path& folder, Split split) {
+  for (const std::filesystem::path& path : ShardPaths(folder)) Add(path, split);
+  if (shards_.empty())
+    throw TensorError(folder.string() + " has no shard with split " + (split == Split::kTrain ? "train" : "holdout"));
+}
+
+void ShardSet::Add(const std::filesystem::path& path, Split split) {
+  const nn::MappedTensors file(TensorFile::Open(path));
+  RequireText(file.file(), "format", "evac-shard");
+  RequireText(file.file(), "version", "1");
+  if (Text(file.file(), "split") != (split == Split::kTrain ? "train" : "holdout")) return;
+  Shard shard = Read(path, file);
+  if (!shards_.empty()) nn::CheckShape(path.string() + ": frames", shard.frames, {-1, views(), height_px(), width_px(), 3});
+  CheckSame(path.string(), file.file().metadata());
+  for (const Clip& clip : ClipsOf(shard, shards_.size())) clips_.push_back(clip);
+  shards_.push_back(std::move(shard));
+}
+
+void ShardSet::CheckSame(const std::string& name, const TensorMetadata& metadata) {
+  if (shards_.empty()) {
+    metadata_ = metadata;
+    return;
+  }
+  for (const char* key : kCommon) {
+    const auto found = metadata.find(key);
+    const TensorMetadata::const_iterator wanted = metadata_.find(key);
+    const bool same = (found == metadata.end()) == (wanted == metadata_.end()) &&
+                      (found == metadata.end() || found->second == wanted->second);
+    if (!same) throw TensorError(name + ": " + key + " differs from that of " + shards_.front().path.string());
+  }
+}
+
+void ShardSet::OpenLatents(std::int64_t z, std::int64_t stride) {
+  for (Shard& shard : shards_) {
+    const std::filesystem::path path = LatentsPath(shard.path);
+    if (!std::filesystem::exists(path))
+      throw TensorError(shard.path.string() + " has no latents: wanted " + path.string() + ", which `evac encode` writes");
+    const nn::MappedTensors file(TensorFile::Open(path));
+    RequireText(file.file(), "format", "evac-latents");
+    RequireText(file.file(), "version", "1");
+    const std::vector<std::int64_t> shape = {shard.frames.size(0), views(), z, height_px() / stride, width_px() / stride};
+    shard.latents = Checked(file, "latents", at::kHalf, shape);
+    shard.map_latents = Checked(file, "map_latents", at::kHalf, shape);
+    if (codec_.empty()) codec_ = Text(file.file(), "codec");
+    RequireText(file.file(), "codec", codec_);
+  }
+}
+
+std::int64_t ShardSet::frame_count() const {
+  std::int64_t count = 0;
+  for (const Shard& shard : shards_) count += shard.frames.size(0);
+  return count;
+}
+
+Tensor PicturesFrom(const Tensor& bytes) { return bytes.permute({0, 3, 1, 2}).to(at::kFloat) / 127.5 - 1; }
+
+}  // namespace evac::train

@@ -1,0 +1,80 @@
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "worldmodel/nn/mapped_tensors.h"
+#include "worldmodel/train/flat_parameters.h"
+
+/// What is trained on (docs/formats/shards.md): mapped files, so a data set may be larger than memory.
+namespace evac::train {
+
+/// One crop of one recording: rows `first` … `first + frames - 1` of a shard.
+struct Clip {
+  std::size_t shard = 0;
+  std::int64_t first = 0, frames = 0;
+  std::int32_t task = 0;
+  std::int8_t outcome = -1;  ///< 1 success, 0 failure, -1 unknown
+};
+
+/// The tensors of one file, F frames of V views.
+struct Shard {
+  std::filesystem::path path;
+  Tensor clip_start;          ///< [clips + 1] long
+  Tensor task, outcome;       ///< [clips] int, char
+  Tensor frames, maps;        ///< [F, V, H, W, 3] bytes
+  Tensor deltas;              ///< [F, 14]
+  Tensor c2w;                 ///< [F, V, 4, 4] base_from_camera
+  Tensor k;                   ///< [F, V, 3, 3] pixels of the stored picture
+  Tensor object_px;           ///< [F, V, 2], not a number where unknown
+  Tensor contact;             ///< [F] bytes
+  Tensor latents, map_latents;  ///< [F, V, z, h, w] half, scaled; undefined before OpenLatents
+};
+
+enum class Split { kTrain, kHoldout };
+
+class ShardSet {
+ public:
+  /// @param folder  as `evac pack` writes it
+  /// @throws TensorError naming the file and what was found and wanted: packing not done, no shard of this split, a
+  ///   tensor that is missing or misshapen, another version, shards of different pictures, periods or cameras
+  ShardSet(const std::filesystem::path& folder, Split split);
+
+  /// @param z  latent channels
+  /// @param stride  of the codec, pixels
+  /// @throws TensorError if a shard has no latents yet, they are of another size, or of different codecs
+  void OpenLatents(std::int64_t z, std::int64_t stride);
+
+  const std::vector<Shard>& shards() const { return shards_; }
+  const std::vector<Clip>& clips() const { return clips_; }
+  /// Of all its shards: period_s, cameras, pose_map, delta_frames, statistics, recipe.
+  const TensorMetadata& metadata() const { return metadata_; }
+  std::int64_t views() const { return shards_.front().frames.size(1); }
+  std::int64_t height_px() const { return shards_.front().frames.size(2); }
+  std::int64_t width_px() const { return shards_.front().frames.size(3); }
+  std::int64_t frame_count() const;
+  /// SHA-256 of the codec whose latents are open.
+  const std::string& codec() const { return codec_; }
+
+ private:
+  void Add(const std::filesystem::path& path, Split split);
+  void CheckSame(const std::string& name, const TensorMetadata& metadata);
+
+  std::vector<Shard> shards_;
+  std::vector<Clip> clips_;
+  TensorMetadata metadata_;
+  std::string codec_;
+};
+
+/// The file of the latents that belong to a shard.
+std::filesystem::path LatentsPath(const std::filesystem::path& shard);
+/// Every shard of a folder, in order. @throws TensorError if the packing is not done.
+std::vector<std::filesystem::path> ShardPaths(const std::filesystem::path& folder);
+
+/// Bytes [N, H, W, 3] → [N, 3, H, W] in [-1, 1].
+Tensor PicturesFrom(const Tensor& bytes);
+
+}  // namespace evac::train

@@ -1,0 +1,193 @@
+#include "worldmodel/train/trainer.h"
+
+#include <ATen/ops/zeros_like.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <utility>
+
+#include "worldmodel/train/csv_log.h"
+
+namespace evac::train {
+namespace {
+
+constexpr std::int64_t kPlanFrom = 4;  ///< steps that are not timed: caches and buffers are still cold
+constexpr double kPlanSeconds = 10;    ///< timing takes about as long
+constexpr std::int64_t kNotFiniteAtMost = 100;
+
+void Require(bool holds, const char* name, double found, const char* wanted) {
+  if (!holds) throw TensorError(std::string("training: ") + name + " is " + std::to_string(found) + ", wanted " + wanted);
+}
+
+void Check(const TrainerOptions& o) {
+  Require(o.steps > 0, "steps", static_cast<double>(o.steps), "at least 1");
+  Require(o.minutes >= 0, "minutes", o.minutes, "at least 0");
+  Require(o.learning_rate > 0, "learning_rate", o.learning_rate, "a number above 0");
+  Require(o.decay_from >= 0 && o.decay_from <= 1, "decay_from", o.decay_from, "0 to 1");
+  Require(o.average_decay >= 0 && o.average_decay < 1, "average_decay", o.average_decay, "0 to below 1");
+  Require(o.accumulate > 0, "accumulate", static_cast<double>(o.accumulate), "at least 1");
+  Require(o.adamw.beta1 >= 0 && o.adamw.beta1 < 1, "beta1", o.adamw.beta1, "0 to below 1");
+  Require(o.adamw.beta2 >= 0 && o.adamw.beta2 < 1, "beta2", o.adamw.beta2, "0 to below 1");
+}
+
+template <typename... Args>
+std::string Text(const char* format, Args... args) {
+  char text[256];
+  std::snprintf(text, sizeof text, format, args...);
+  return text;
+}
+
+std::string Duration(double seconds) {
+  if (seconds < 90) return Text("%.0f s", seconds);
+  return seconds < 5400 ? Text("%.0f min", seconds / 60) : Text("%.1f h", seconds / 3600);
+}
+
+double SecondsSince(std::chrono::steady_clock::time_point start) {
+  return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+}
+
+}  // namespace
+
+double LearningRateAt(const TrainerOptions& options, std::int64_t step, std::int64_t steps) {
+  const double rise = options.warmup_steps > 0
+                          ? std::min(1.0, static_cast<double>(step + 1) / static_cast<double>(options.warmup_steps))
+                          : 1;
+  const double done = static_cast<double>(step) / static_cast<double>(std::max<std::int64_t>(steps, 1));
+  const double fall = done > options.decay_from ? (1 - done) / (1 - options.decay_from) : 1;
+  return options.learning_rate * rise * std::max(fall, 0.0);
+}
+
+std::string TrainerProgress::Line() const {
+  std::string line = Text("%lld/%lld steps, loss %.5f", static_cast<long long>(step), static_cast<long long>(steps), loss);
+  if (holdout) line += Text(", hold-out %.5f", *holdout);
+  if (best) line += Text(" (best %.5f)", *best);
+  if (steps_per_s > 0) {
+    line += Text(", %.2f steps/s, ", steps_per_s) + Duration(static_cast<double>(steps - step) / steps_per_s) + " left";
+  }
+  return line;
+}
+
+Trainer::Trainer(std::vector<NamedTensor> parameters, const TrainerOptions& options, std::filesystem::path folder)
+    : parameters_(std::move(parameters)), options_(options), folder_(std::move(folder)), steps_(options.steps) {
+  Check(options_);
+  const auto zeros = [&] { return at::zeros_like(parameters_.values()); };
+  state_ = {parameters_.values(), parameters_.gradients(), zeros(), zeros(), {}};
+  if (options_.average_decay > 0) state_.average = parameters_.values().clone();
+  planned_ = options_.minutes <= 0;
+  std::filesystem::create_directories(folder_);
+  Load();
+  CsvLog::Trim(folder_ / "metrics.csv", "step,loss,learning_rate,gradient_norm,seconds", step_);
+  CsvLog::Trim(folder_ / "holdout.csv", "step,holdout", step_ + 1);
+}
+
+Trainer::StepOutcome Trainer::Step(const TrainerCallbacks& callbacks) {
+  StepOutcome outcome;
+  const double done = static_cast<double>(step_) / static_cast<double>(steps_);
+  for (std::int64_t part = 0; part < options_.accumulate; ++part) {
+    const Tensor loss = callbacks.loss({options_.seed, step_, part, done});
+    (options_.accumulate > 1 ? loss / static_cast<double>(options_.accumulate) : loss).backward();
+    outcome.loss += loss.item<double>() / static_cast<double>(options_.accumulate);
+  }
+  outcome.gradient_norm = Norm(state_.gradients);
+  outcome.learning_rate = LearningRateAt(options_, step_, steps_);
+  if (!std::isfinite(outcome.gradient_norm) || !std::isfinite(outcome.loss)) {
+    Tensor(state_.gradients).zero_();
+    if (++not_finite_ >= kNotFiniteAtMost)
+      throw TensorError("training: the loss is not finite for 100 steps, at step " + std::to_string(step_) +
+                        ": a smaller learning_rate may help");
+    return outcome;
+  }
+  not_finite_ = 0;
+  const bool too_long = options_.clip_norm > 0 && outcome.gradient_norm > options_.clip_norm;
+  const auto n = static_cast<double>(step_);
+  StepAdamW(state_, options_.adamw,
+            {step_, outcome.learning_rate, too_long ? options_.clip_norm / outcome.gradient_norm : 1.0,
+             std::min(options_.average_decay, (1 + n) / (10 + n))});
+  return outcome;
+}
+
+void Trainer::PlanSteps() {
+  const std::int64_t timed = run_steps_ - kPlanFrom;
+  if (run_steps_ == kPlanFrom) run_started_ = Clock::now();
+  const double seconds = SecondsSince(run_started_);
+  if (timed < 4 || (seconds < kPlanSeconds && seconds < options_.minutes * 6)) return;
+  const double rate = static_cast<double>(timed) / seconds;
+  steps_ = std::max<std::int64_t>(step_ + 1, step_ + static_cast<std::int64_t>(rate * (options_.minutes * 60 - seconds)));
+  planned_ = true;
+}
+
+void Trainer::With(const Tensor& weights, const std::function<void()>& function) {
+  const at::NoGradGuard no_gradients;
+  if (weights.is_same(state_.values)) return function();
+  const Tensor kept = state_.values.clone();
+  Tensor values = state_.values;
+  values.copy_(weights);
+  try {
+    function();
+  } catch (...) {
+    values.copy_(kept);
+    throw;
+  }
+  values.copy_(kept);
+}
+
+void Trainer::HoldOut(const TrainerCallbacks& callbacks) {
+  With(Averaged(), [&] {
+    last_score_ = callbacks.holdout();
+    ++holdouts_since_best_;
+    if (!best_score_ || *last_score_ < *best_score_) {
+      best_score_ = last_score_;
+      best_step_ = step_;
+      best_ = state_.values.clone();
+      holdouts_since_best_ = 0;
+    }
+    if (callbacks.look) callbacks.look(step_);
+  });
+  CsvLog::Add(folder_ / "holdout.csv", Text("%lld,%.9g", static_cast<long long>(step_), *last_score_));
+}
+
+void Trainer::Record(const StepOutcome& outcome, double seconds) {
+  smooth_loss_ = step_ == 0 ? outcome.loss : smooth_loss_ + 0.02 * (outcome.loss - smooth_loss_);
+  CsvLog::Add(folder_ / "metrics.csv", Text("%lld,%.9g,%.9g,%.9g,%.4f", static_cast<long long>(step_), outcome.loss,
+                                            outcome.learning_rate, outcome.gradient_norm, seconds));
+}
+
+void Trainer::Report(const TrainerCallbacks& callbacks) const {
+  if (!callbacks.on_progress) return;
+  const std::int64_t timed = run_steps_;
+  callbacks.on_progress({step_, steps_, smooth_loss_, static_cast<double>(timed) / SecondsSince(run_started_),
+                         last_score_, best_score_});
+}
+
+std::string Trainer::WhyEnd(const TrainerCallbacks& callbacks) const {
+  if (planned_ && step_ >= steps_) return "done";
+  if (options_.patience > 0 && holdouts_since_best_ >= options_.patience)
+    return "no better for " + std::to_string(holdouts_since_best_) + " hold-outs";
+  return callbacks.interrupted && callbacks.interrupted() ? "interrupted" : "";
+}
+
+TrainerSummary Trainer::Run(const TrainerCallbacks& callbacks) {
+  run_started_ = saved_ = Clock::now();
+  run_steps_ = 0;
+  std::string why = WhyEnd(callbacks);
+  while (why.empty()) {
+    const Clock::time_point started = Clock::now();
+    Record(Step(callbacks), SecondsSince(started));
+    ++step_;
+    ++run_steps_;
+    if (!planned_) PlanSteps();
+    const bool last = planned_ && step_ >= steps_;
+    if (callbacks.holdout && options_.holdout_every > 0 && (step_ % options_.holdout_every == 0 || last))
+      HoldOut(callbacks);
+    Report(callbacks);
+    why = WhyEnd(callbacks);
+    if (!why.empty() || SecondsSince(saved_) >= options_.checkpoint_every_s) {
+      Save();
+      saved_ = Clock::now();
+    }
+  }
+  return {step_, steps_, why, best_score_, best_step_};
+}
+
+}  // namespace evac::train

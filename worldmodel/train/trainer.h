@@ -1,0 +1,119 @@
+#pragma once
+
+#include <chrono>
+#include <filesystem>
+#include <functional>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "worldmodel/train/adamw.h"
+#include "worldmodel/train/dice.h"
+#include "worldmodel/train/flat_parameters.h"
+
+/// Gradient descent on anything: parameters by name, and a function that says the loss at a step. It knows no network
+/// and no data; codec, world model, policies and judges are trained by it alike.
+namespace evac::train {
+
+/// The defaults are EVAC's (spec 8.4).
+struct TrainerOptions {
+  std::int64_t steps = 100'000;
+  /// Above 0: as many steps as fit into so many minutes. Counted once, after the first steps, and written into the
+  /// checkpoint: a training that is killed and goes on does the same steps.
+  double minutes = 0;
+  double learning_rate = 5e-5;
+  std::int64_t warmup_steps = 0;  ///< the rate rises from 0
+  double decay_from = 1;          ///< after this part of the steps the rate falls to 0 in a straight line; 1: never
+  AdamWOptions adamw;
+  double clip_norm = 0.5;          ///< longer gradients are shortened to it; 0: never
+  double average_decay = 0;        ///< of the moving average of the weights (EMA); 0: there is none
+  std::int64_t accumulate = 1;     ///< parts of a step whose gradients are averaged
+  std::int64_t holdout_every = 0;  ///< steps; 0: no hold-out
+  std::int64_t patience = 0;       ///< ends after so many hold-outs without a better one; 0: never
+  double checkpoint_every_s = 60;  ///< 0: after every step
+  std::uint64_t seed = 0;
+  std::string identity;  ///< what else decides the numbers: data, network, loss. A checkpoint of another is refused
+};
+
+/// The learning rate of a step: warm-up, constant, decay.
+double LearningRateAt(const TrainerOptions& options, std::int64_t step, std::int64_t steps);
+
+struct TrainerProgress {
+  std::int64_t step = 0, steps = 0;  ///< done, in all
+  double loss = 0;                   ///< of the last steps, smoothed
+  double steps_per_s = 0;
+  std::optional<double> holdout, best;
+  /// "1200/6000 steps, loss .0312, hold-out .0298 (best .0291), 2.4 steps/s, 33 min left"
+  std::string Line() const;
+};
+
+struct TrainerCallbacks {
+  /// The loss at a place: a number that can be differentiated. Whatever is random in it comes from Dice(place, …).
+  std::function<Tensor(const StepPlace&)> loss;
+  /// How well the weights do on what they do not see, smaller is better; called with the averaged ones in place.
+  std::function<double()> holdout = {};
+  /// Called after each hold-out, with the averaged weights in place: for pictures.
+  std::function<void(std::int64_t step)> look = {};
+  std::function<bool()> interrupted = {};  ///< asked after every step; the checkpoint is written then
+  std::function<void(const TrainerProgress&)> on_progress = {};
+};
+
+struct TrainerSummary {
+  std::int64_t step = 0, steps = 0;
+  std::string why;  ///< "done", "interrupted", "no better for 5 hold-outs"
+  std::optional<double> best;
+  std::int64_t best_step = 0;
+  bool IsDone() const { return why != "interrupted"; }
+};
+
+/// Writes into its folder:
+///   training.safetensors   weights, optimiser, average, best, step: whole or not at all. Killed at any moment and run
+///                          again, a training goes on from there; on the CPU it ends in the same bytes.
+///   metrics.csv            step,loss,learning_rate,gradient_norm,seconds
+///   holdout.csv            step,holdout
+class Trainer {
+ public:
+  /// @param parameters  floats; they stay where their holders see them (FlatParameters)
+  /// @throws TensorError for options that make no training, or if the folder holds another training's checkpoint
+  Trainer(std::vector<NamedTensor> parameters, const TrainerOptions& options, std::filesystem::path folder);
+
+  /// Trains from the checkpoint's step, or from 0, to the end.
+  /// @throws TensorError if the loss is not finite for 100 steps in a row
+  TrainerSummary Run(const TrainerCallbacks& callbacks);
+
+  std::int64_t step() const { return step_; }
+  /// Calls `function` with the best weights in place, those of the best hold-out; without one the averaged, or the last.
+  void WithBest(const std::function<void()>& function) { With(best_score_ ? best_ : Averaged(), function); }
+
+ private:
+  using Clock = std::chrono::steady_clock;
+  struct StepOutcome {
+    double loss = 0, gradient_norm = 0, learning_rate = 0;
+  };
+
+  void Load();
+  void Save() const;
+  std::string Identity() const;
+  StepOutcome Step(const TrainerCallbacks& callbacks);
+  void HoldOut(const TrainerCallbacks& callbacks);
+  std::string WhyEnd(const TrainerCallbacks& callbacks) const;
+  void PlanSteps();
+  void Report(const TrainerCallbacks& callbacks) const;
+  void Record(const StepOutcome& outcome, double seconds);
+  const Tensor& Averaged() const { return state_.average.defined() ? state_.average : state_.values; }
+  void With(const Tensor& weights, const std::function<void()>& function);
+
+  FlatParameters parameters_;
+  TrainerOptions options_;
+  std::filesystem::path folder_;
+  AdamWState state_;
+  Tensor best_;  ///< [count], what the best hold-out was measured with
+  std::optional<double> best_score_, last_score_;
+  std::int64_t best_step_ = 0, step_ = 0, steps_ = 0, holdouts_since_best_ = 0, not_finite_ = 0;
+  bool planned_ = false;  ///< the number of steps stands
+  double smooth_loss_ = 0;
+  std::int64_t run_steps_ = 0;      ///< by this process
+  Clock::time_point run_started_, saved_;
+};
+
+}  // namespace evac::train

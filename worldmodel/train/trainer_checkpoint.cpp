@@ -1,0 +1,114 @@
+#include <cstdio>
+#include <cstdlib>
+
+#include "worldmodel/nn/mapped_tensors.h"
+#include "worldmodel/train/trainer.h"
+
+namespace evac::train {
+namespace {
+
+constexpr const char* kFile = "training.safetensors";
+constexpr const char* kFormat = "evac-training 1";
+
+/// All 53 bits, so that a number read again is the number that was written.
+std::string Exact(double value) {
+  char text[40];
+  std::snprintf(text, sizeof text, "%a", value);
+  return text;
+}
+
+class Metadata {
+ public:
+  explicit Metadata(const TensorFile& file) : file_(file) {}
+  bool Has(const char* key) const { return file_.metadata().contains(key); }
+  std::string Text(const char* key) const {
+    const auto found = file_.metadata().find(key);
+    if (found == file_.metadata().end()) throw TensorError(file_.name() + ": its metadata has no '" + key + "'");
+    return found->second;
+  }
+  std::int64_t Whole(const char* key) const { return std::strtoll(Text(key).c_str(), nullptr, 10); }
+  double Number(const char* key) const { return std::strtod(Text(key).c_str(), nullptr); }
+
+ private:
+  const TensorFile& file_;
+};
+
+void CopyFrom(const nn::MappedTensors& file, const char* name, const Tensor& to) {
+  const Tensor found = file.Get(name);
+  nn::CheckShape(file.file().name() + ": " + name, found, to.sizes());
+  Tensor(to).copy_(found);
+}
+
+}  // namespace
+
+/// What must be the same for two processes to work on one training. How long it goes on and how often it is looked at
+/// may change from one to the next.
+std::string Trainer::Identity() const {
+  const TrainerOptions& o = options_;
+  std::string text;
+  for (const double number : {o.learning_rate, o.decay_from, o.adamw.beta1, o.adamw.beta2, o.adamw.epsilon,
+                              o.adamw.weight_decay, o.clip_norm, o.average_decay, static_cast<double>(o.warmup_steps),
+                              static_cast<double>(o.accumulate)})
+    text += Exact(number) + " ";
+  return text + "seed " + std::to_string(o.seed) + " " + o.identity;
+}
+
+void Trainer::Load() {
+  const std::filesystem::path path = folder_ / kFile;
+  if (!std::filesystem::exists(path)) return;
+  const at::NoGradGuard no_gradients;
+  const nn::MappedTensors file(TensorFile::Open(path));
+  const Metadata metadata(file.file());
+  if (metadata.Text("format") != kFormat)
+    throw TensorError(path.string() + ": format '" + metadata.Text("format") + "', wanted '" + kFormat + "'");
+  if (metadata.Text("layout") != parameters_.Layout())
+    throw TensorError(path.string() + " is a training of other parameters: another folder, or throw it away");
+  if (metadata.Text("identity") != Identity())
+    throw TensorError(path.string() + " is a training with other options (" + metadata.Text("identity") +
+                      "; wanted: " + Identity() + "): another folder, or throw it away");
+  CopyFrom(file, "values", state_.values);
+  CopyFrom(file, "first_moment", state_.first_moment);
+  CopyFrom(file, "second_moment", state_.second_moment);
+  if (state_.average.defined()) CopyFrom(file, "average", state_.average);
+  step_ = metadata.Whole("step");
+  not_finite_ = metadata.Whole("not_finite");
+  smooth_loss_ = metadata.Number("smooth_loss");
+  if (options_.minutes > 0 && metadata.Text("planned") == "1") {
+    planned_ = true;
+    steps_ = metadata.Whole("steps");
+  }
+  if (!metadata.Has("best_score")) return;
+  best_ = file.Get("best").clone().to(state_.values.device());
+  best_score_ = metadata.Number("best_score");
+  best_step_ = metadata.Whole("best_step");
+  holdouts_since_best_ = metadata.Whole("holdouts_since_best");
+}
+
+void Trainer::Save() const {
+  std::vector<NamedTensor> tensors = {{"values", state_.values},
+                                      {"first_moment", state_.first_moment},
+                                      {"second_moment", state_.second_moment}};
+  if (state_.average.defined()) tensors.push_back({"average", state_.average});
+  TensorMetadata metadata = {{"format", kFormat},
+                             {"layout", parameters_.Layout()},
+                             {"identity", Identity()},
+                             {"step", std::to_string(step_)},
+                             {"steps", std::to_string(steps_)},
+                             {"planned", planned_ ? "1" : "0"},
+                             {"not_finite", std::to_string(not_finite_)},
+                             {"smooth_loss", Exact(smooth_loss_)}};
+  if (best_score_) {
+    tensors.push_back({"best", best_});
+    metadata["best_score"] = Exact(*best_score_);
+    metadata["best_step"] = std::to_string(best_step_);
+    metadata["holdouts_since_best"] = std::to_string(holdouts_since_best_);
+  }
+  std::vector<TensorView> views;
+  for (NamedTensor& tensor : tensors) {
+    tensor.tensor = tensor.tensor.cpu();
+    views.push_back(nn::ViewOf(tensor.name, tensor.tensor));
+  }
+  WriteTensorFile(folder_ / kFile, views, metadata);
+}
+
+}  // namespace evac::train

@@ -1,0 +1,81 @@
+#include "worldmodel/train/windows.h"
+
+#include <algorithm>
+
+namespace evac::train {
+namespace {
+
+bool HasContact(const Shard& shard, const Clip& clip, std::int64_t from, std::int64_t count) {
+  const std::uint8_t* contact = shard.contact.data_ptr<std::uint8_t>() + clip.first + from;
+  return std::any_of(contact, contact + count, [](std::uint8_t value) { return value != 0; });
+}
+
+}  // namespace
+
+std::vector<std::int64_t> RolloutMemory(std::int64_t last, std::int64_t memory) {
+  const std::int64_t frames = memory + last;  // the history: N times frame 0, then 1 … last
+  std::vector<std::int64_t> picked;
+  for (std::int64_t j = 0; j + 1 < memory; ++j)
+    picked.push_back(std::max<std::int64_t>(0, frames * j / (memory - 1) - (memory - 1)));
+  picked.push_back(last);
+  return picked;
+}
+
+WindowSampler::WindowSampler(const ShardSet& shards, const WindowOptions& options) : options_(options) {
+  if (options.memory < 1 || options.chunk < 1 || options.history < options.memory)
+    throw TensorError("windows: memory " + std::to_string(options.memory) + ", chunk " + std::to_string(options.chunk) +
+                      ", history " + std::to_string(options.history) + ", wanted 1 <= memory <= history, 1 <= chunk");
+  for (const Clip& clip : shards.clips()) AddClip(shards, clip);
+  if (any_.empty())
+    throw TensorError("no clip of " + shards.shards().front().path.parent_path().string() + " has " +
+                      std::to_string(options.chunk + 1) + " frames");
+}
+
+void WindowSampler::AddClip(const ShardSet& shards, const Clip& clip) {
+  const Shard& shard = shards.shards()[clip.shard];
+  for (std::int64_t last = 0; last + options_.chunk < clip.frames; ++last) {
+    const bool starts = last % options_.chunk == 0, touches = HasContact(shard, clip, last + 1, options_.chunk);
+    any_.push_back({&clip, last});
+    if (starts) rollout_.push_back({&clip, last});
+    if (touches) any_contact_.push_back({&clip, last});
+    if (starts && touches) rollout_contact_.push_back({&clip, last});
+  }
+}
+
+std::vector<std::int64_t> WindowSampler::RandomMemory(std::int64_t last, Dice& dice) const {
+  std::vector<std::int64_t> back;  // how many frames before the newest, distinct
+  while (static_cast<std::int64_t>(back.size()) + 1 < options_.memory) {
+    const std::int64_t steps = 1 + dice.Below(options_.history - 1);
+    if (std::find(back.begin(), back.end(), steps) == back.end()) back.push_back(steps);
+  }
+  std::sort(back.rbegin(), back.rend());
+  std::vector<std::int64_t> picked;
+  for (const std::int64_t steps : back) picked.push_back(std::max<std::int64_t>(0, last - steps));
+  picked.push_back(last);
+  return picked;
+}
+
+Window WindowSampler::Pick(Dice& dice) const {
+  const bool rollout = dice.Chance(options_.rollout_share), contact = dice.Chance(options_.contact_share);
+  const std::vector<Start>* pool = rollout ? &rollout_ : &any_;
+  const std::vector<Start>& touching = rollout ? rollout_contact_ : any_contact_;
+  if (contact && !touching.empty()) pool = &touching;
+  const Start& start = (*pool)[static_cast<std::size_t>(dice.Below(static_cast<std::int64_t>(pool->size())))];
+  Window window{start.clip, {}, start.last, options_.chunk, 0};
+  window.memory = rollout ? RolloutMemory(start.last, options_.memory) : RandomMemory(start.last, dice);
+  const auto any = static_cast<std::size_t>(dice.Below(options_.memory));
+  window.image = window.memory[options_.first_image ? 0 : any];
+  return window;
+}
+
+std::vector<Window> WindowSampler::Spread(std::int64_t count) const {
+  std::vector<Window> windows;
+  const auto all = static_cast<std::int64_t>(rollout_.size());
+  for (std::int64_t i = 0; i < std::min(count, all); ++i) {
+    const Start& start = rollout_[static_cast<std::size_t>(i * all / std::min(count, all))];
+    windows.push_back({start.clip, RolloutMemory(start.last, options_.memory), start.last, options_.chunk, 0});
+  }
+  return windows;
+}
+
+}  // namespace evac::train

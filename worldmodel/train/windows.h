@@ -1,0 +1,56 @@
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "worldmodel/train/dice.h"
+#include "worldmodel/train/shards.h"
+
+/// Which frames a training sample of the world model is made of (spec 4.6, 9.2).
+namespace evac::train {
+
+/// Frames of one clip, counted from its first.
+struct Window {
+  const Clip* clip = nullptr;
+  std::vector<std::int64_t> memory;  ///< N frames, newest last
+  std::int64_t last = 0;             ///< the newest of them: frames last + 1 … last + chunk are to be imagined
+  std::int64_t chunk = 0;            ///< K
+  std::int64_t image = 0;            ///< what the image encoder sees
+};
+
+struct WindowOptions {
+  std::int64_t chunk = 16;          ///< K
+  std::int64_t memory = 4;          ///< N
+  std::int64_t history = 48;        ///< how far back memory reaches when it is picked at random (9.2)
+  /// Of the samples that begin where rollouts do (frame 0, K, 2K, …) and remember what rollouts do (4.6). The paper: 0.
+  double rollout_share = 0;
+  double contact_share = 0;         ///< of the samples whose chunk holds a frame in contact. The paper: 0
+  bool first_image = false;         ///< the image encoder sees the oldest memory, as when imagining; else any of it
+};
+
+/// The memory of a rollout that has shown `last + 1` frames: the first N times, then every frame; of these the first,
+/// others evenly spaced, and the newest (4.6).
+std::vector<std::int64_t> RolloutMemory(std::int64_t last, std::int64_t memory);
+
+class WindowSampler {
+ public:
+  /// @throws TensorError for options that make no window, or if no clip is long enough
+  WindowSampler(const ShardSet& shards, const WindowOptions& options);
+  Window Pick(Dice& dice) const;
+  /// About `count` windows at rollout positions, evenly spaced over the set: for measuring.
+  std::vector<Window> Spread(std::int64_t count) const;
+  const WindowOptions& options() const { return options_; }
+
+ private:
+  struct Start {
+    const Clip* clip;
+    std::int64_t last;
+  };
+  std::vector<std::int64_t> RandomMemory(std::int64_t last, Dice& dice) const;
+  void AddClip(const ShardSet& shards, const Clip& clip);
+
+  WindowOptions options_;
+  std::vector<Start> any_, rollout_, any_contact_, rollout_contact_;
+};
+
+}  // namespace evac::train

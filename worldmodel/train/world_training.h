@@ -1,0 +1,86 @@
+#pragma once
+
+#include "worldmodel/nn/evac_model.h"
+#include "worldmodel/train/trainable_weights.h"
+#include "worldmodel/train/world_batch.h"
+
+/// Training of the world model (EVAC, Sec. 3; spec 8.3), and what was added to it. The defaults are the paper's.
+namespace evac::train {
+
+/// What noise the memory is given, so that the network bears with its own mistakes later.
+enum class MemoryNoise {
+  kPublished,  ///< rising towards the newest frame, by a random angle (8.3)
+  kUniform,    ///< one deviation per sample, uniform up to `memory_noise`, for `memory_noise_share` of them
+};
+
+/// How much an error counts at a diffusion step. As said of the squared error of v.
+enum class StepWeight {
+  kVelocity,  ///< 1: the paper
+  kMinSnr,    ///< min(SNR, cap) / (SNR + 1) (Hang et al. 2023); 0 at pure noise, where nothing is learned then
+  kClean,     ///< noise² min(1 / noise², cap): the error of x0, with a bound
+};
+
+struct WorldTrainingOptions {
+  std::int64_t batch = 8;  ///< windows
+  WindowOptions windows;   ///< chunk and memory are the model's
+  double drop = 0.1;       ///< p of the condition dropouts (4.3)
+
+  MemoryNoise memory_noise_kind = MemoryNoise::kPublished;
+  double memory_noise = 0.3, memory_noise_share = 0.7;  ///< of kUniform
+
+  /// Of the samples at pure noise. The others: uniform over the steps (the paper), or uniform in the logarithm of
+  /// noise / signal between two bounds.
+  double terminal_share = 0;
+  bool log_uniform = false;
+  double ratio_from = 0.006, ratio_to = 2;
+
+  StepWeight step_weight = StepWeight::kVelocity;
+  double step_weight_cap = 3;
+  double object_weight = 0;         ///< more of latents at the object: a bell of `object_radius` latent pixels
+  double object_radius = 1;
+  double change_weight = 0;         ///< more of latents that differ from the newest memory frame, per unit
+
+  double self_memory_share = 0;  ///< of the samples whose memory the network imagined itself, in one step
+  double self_memory_from = 0.5; ///< after this part of the training
+
+  bool train_action_resampler = false;  ///< the paper's page freezes it, its text trains it
+  bool train_image_encoder = false;     ///< there is no pretrained one of a small size
+};
+
+/// Whether training moves a parameter; what nothing reads stays.
+bool IsTrained(const std::string& key, const WorldTrainingOptions& options);
+/// The keys that training moves, of a model.
+std::vector<NamedTensor> TrainedParameters(const TrainableWeights& weights, const nn::ModelConfig& config,
+                                           const WorldTrainingOptions& options);
+
+class WorldTraining {
+ public:
+  /// @param model  made from weights that are trained; it must outlive this, and so must the shards
+  WorldTraining(const nn::EvacModel& model, const ShardSet& shards, const WorldTrainingOptions& options);
+
+  /// The loss at a place.
+  Tensor Loss(const StepPlace& place) const;
+  /// The same loss on these windows, noise and steps always the same, without dropouts and noise on the memory.
+  double Measure(const std::vector<Window>& windows) const;
+  /// The chunks of windows, imagined in one step from pure noise. @returns [BV, z, K, h, w]
+  Tensor ImagineOnce(const WorldBatch& batch, Dice& dice) const;
+
+  const WindowSampler& sampler() const { return sampler_; }
+
+ private:
+  struct Drops;
+  Tensor LossOf(const WorldBatch& batch, const Drops& drops, const Tensor& t, Dice& dice, bool noisy_memory) const;
+  Drops DrawDrops(const WorldBatch& batch, Dice& dice) const;
+  std::int64_t DrawStep(Dice& dice) const;
+  Tensor Weight(const WorldBatch& batch, const Tensor& t) const;
+  nn::UNet::Context ContextOf(const Tensor& tokens, const WorldBatch& batch) const;
+  Tensor TokensOf(const WorldBatch& batch) const;
+  void RememberOwn(const std::vector<Window>& windows, WorldBatch& batch, Dice& dice) const;
+
+  const nn::EvacModel& model_;
+  const ShardSet& shards_;
+  WorldTrainingOptions options_;
+  WindowSampler sampler_;
+};
+
+}  // namespace evac::train
