@@ -23,5 +23,8 @@ void AddPlan(CLI::App& app, ExitCode& exit_code);
 void AddLs(CLI::App& app, ExitCode& exit_code);
 void AddWeights(CLI::App& app, ExitCode& exit_code);
 void AddImagine(CLI::App& app, ExitCode& exit_code);
+void AddTrain(CLI::App& app, ExitCode& exit_code);
+void AddEncode(CLI::App& app, ExitCode& exit_code);
+void AddCollect(CLI::App& app, ExitCode& exit_code);
 
 }  // namespace evac

@@ -29,6 +29,9 @@ int main(int argc, char** argv) {
     evac::AddLs(app, exit_code);
     evac::AddWeights(app, exit_code);
     evac::AddImagine(app, exit_code);
+    evac::AddTrain(app, exit_code);
+    evac::AddEncode(app, exit_code);
+    evac::AddCollect(app, exit_code);
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
     return app.exit(error) == 0 ? 0 : static_cast<int>(evac::ExitCode::kInvalidInput);

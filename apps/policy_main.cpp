@@ -80,6 +80,7 @@ void AddVisualPick(CLI::App& app, int& exit_code) {
   command.app->add_option("--bias-m", *bias_m, "X,Y: how far off it takes the thing to be, base frame")->delimiter(',')->expected(2)->capture_default_str();
   command.app->add_option("--noise-m", options->noise_m, "the same, random per episode: standard deviation")->capture_default_str();
   command.app->add_option("--request-noise-m", options->request_noise_m, "the same, random each time it looks")->capture_default_str();
+  command.app->add_option("--place-noise-m", options->place_noise_m, "how far off it takes the place to put it to be: standard deviation, per episode")->capture_default_str();
   command.app->add_option("--late-close-s", options->late_close_s, "closes the hand this late, the arm does not wait")->capture_default_str();
   command.app->add_option("--early-release-s", options->early_release_s, "opens the hand this early")->capture_default_str();
   command.app->add_option("--blindness", options->blindness, "probability to see nothing in an episode")->capture_default_str();

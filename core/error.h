@@ -24,8 +24,18 @@ class Error : public std::runtime_error {
   Error(ExitCode exit_code, const std::string& message) : std::runtime_error(message), exit_code_(exit_code) {}
   ExitCode exit_code() const { return exit_code_; }
 
+  /// The same error with a word for its kind, by which the errors of many files are counted: "short_video".
+  /// @param kind  lives as long as the program: a literal.
+  Error Called(const char* kind) const {
+    Error named = *this;
+    named.kind_ = kind;
+    return named;
+  }
+  const char* kind() const { return kind_; }  ///< "" where nobody counts
+
  private:
   ExitCode exit_code_;
+  const char* kind_ = "";
 };
 
 /// `throw InvalidInput("{}: image.height_px is {}, wanted a multiple of 2", file, found);`

@@ -66,6 +66,7 @@ Recording ReadRecording(const fs::path& folder, const RecordingOptions& options)
   recording.id = SafeName(recording.id);
   recording.every_nth = options.every_nth;
   recording.arm_names = {"left", "right"};
+  DropAbsentLeftArm(recording);
   recording.source += fmt::format(", {} steps of {:.4g} s", recording.arms.size(), recording.period_s);
   return recording;
 }

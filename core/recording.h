@@ -18,6 +18,7 @@ struct RecordingOptions {
   double camera_tolerance_m = 0.02;  ///< how far a camera may move against its mount and still count as fixed to it …
   double camera_tolerance_rad = 0.05;  ///< … and how far it may turn
   bool count_video_frames = true;  ///< false: believe that the videos are long enough (a policy that needs no image)
+  bool read_told = false;  ///< also read where the arms were told to be, where the file has it (`Recording::told`)
 };
 
 /// What one robot did, from one folder (docs/formats/recording.md): the arms at every step, and the cameras' images, at
@@ -26,8 +27,9 @@ struct Recording {
   std::string id;      ///< the folder's name, or <task>-<episode> in an AgiBot World tree; safe as a path
   std::string source;  ///< one sentence: folder, layout, steps, period
   double period_s = 0;
-  std::vector<std::string> arm_names;  ///< {left, right}
+  std::vector<std::string> arm_names;  ///< {left, right}; {right} of a robot that has no left arm
   std::vector<Arms> arms;              ///< [T], T >= 1, one per period: arms[0] is the start, arms[1 …] what followed
+  std::vector<Arms> told;  ///< [T], where they were told to be by then (told[0] is the start), or empty: not recorded
   std::vector<Camera> cameras;         ///< sizes are those of the images
   std::vector<cv::Mat> first_images;   ///< CV_8UC3 RGB, in the order of `cameras`
   std::vector<std::filesystem::path> videos;  ///< in the order of `cameras`, or empty: there is only the first frame
@@ -44,7 +46,7 @@ struct Recording {
 /// @throws InvalidInput naming file, field, what was found and what was wanted: a file missing or broken, a video
 /// shorter than
 ///   the arms' track, values that are not finite, quaternions that are not unit, distorted intrinsics, a camera that
-///   moves against its mount.
+///   moves against its mount. `Error::kind` is one word for the reason (docs/formats/recording.md).
 Recording ReadRecording(const std::filesystem::path& folder, const RecordingOptions& options = {});
 
 /// A recording of the head camera alone, in files of any name.

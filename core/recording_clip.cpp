@@ -67,7 +67,8 @@ std::vector<std::string> ChooseCameras(const ClipFolders& folders, const Recordi
       names.push_back(name);
     } else if (has_videos && fs::exists(IntrinsicsOf(folders, name))) {
       throw InvalidInput("{}: there is a page for camera {}, but no video {}", folders.pages.string(), name,
-                         VideoOf(folders, name).string());
+                         VideoOf(folders, name).string())
+          .Called("missing_camera");
     }
   }
   return names;
@@ -98,23 +99,26 @@ Camera ReadCamera(const Context& context, const std::string& name, const cv::Mat
 void CheckVideo(const VideoFacts& facts, const fs::path& path, const Context& context, double period_s) {
   if (context.options.count_video_frames && facts.frames < context.arms.size()) {
     throw InvalidInput("{}: {} frames, wanted one for each of the {} steps of {}", path.string(), facts.frames,
-                       context.arms.size(), context.folders.proprio.string());
+                       context.arms.size(), context.folders.proprio.string())
+        .Called("short_video");
   }
   if (period_s > 0 && std::abs(facts.period_s / period_s - 1) > kRateTolerance) {
     throw InvalidInput("{}: {:.2f} frames per second, wanted {:.2f} as the video before it", path.string(),
-                       1 / facts.period_s, 1 / period_s);
+                       1 / facts.period_s, 1 / period_s)
+        .Called("other_rate");
   }
 }
 
 /// Adds one camera that has a video. @returns the video's period, s, or 0 if it has one frame.
 double AddVideoCamera(const Context& context, const std::string& name, double period_s, Recording& recording) {
   const fs::path path = VideoOf(context.folders, name);
-  if (!fs::exists(path)) throw InvalidInput("{}: missing: camera {} has no video", path.string(), name);
-  const VideoFacts facts = LookThrough(path, context.options.count_video_frames);
+  if (!fs::exists(path))
+    throw InvalidInput("{}: missing: camera {} has no video", path.string(), name).Called("missing_camera");
+  const VideoFacts facts = Calling("broken_video", [&] { return LookThrough(path, context.options.count_video_frames); });
   CheckVideo(facts, path, context, period_s);
   recording.videos.push_back(path);
   recording.first_images.push_back(facts.first);
-  recording.cameras.push_back(ReadCamera(context, name, facts.first));
+  recording.cameras.push_back(Calling("broken_page", [&] { return ReadCamera(context, name, facts.first); }));
   return facts.period_s;
 }
 
@@ -123,16 +127,24 @@ void AddStillCamera(const Context& context, const std::vector<std::string>& name
   const fs::path frame = context.folders.images / "frame.png";
   if (names != std::vector<std::string>{"head"} || !fs::exists(frame)) {
     throw InvalidInput("{}: missing: camera {} has no video", VideoOf(context.folders, names.back()).string(),
-                       names.back());
+                       names.back())
+        .Called("missing_camera");
   }
   recording.first_images = {ReadPng(frame)};
-  recording.cameras = {ReadCamera(context, "head", recording.first_images[0])};
+  recording.cameras = {Calling("broken_page", [&] { return ReadCamera(context, "head", recording.first_images[0]); })};
 }
 
 }  // namespace
 
 Recording ReadClipLayout(const ClipFolders& folders, const RecordingOptions& options) {
-  std::vector<Arms> arms = ReadProprio(folders.proprio);
+  std::vector<Arms> arms = Calling("broken_track", [&] { return ReadProprio(folders.proprio); });
+  std::vector<Arms> told;
+  if (options.read_told) told = Calling("broken_track", [&] { return ReadTold(folders.proprio); });
+  if (!told.empty() && told.size() != arms.size()) {
+    throw InvalidInput("{}: action/end/position has {} steps, wanted the {} of state/end/position",
+                       folders.proprio.string(), told.size(), arms.size())
+        .Called("broken_track");
+  }
   const Context context{folders, options, arms};
   const std::vector<std::string> names = ChooseCameras(folders, options);
   Recording recording;
@@ -152,6 +164,7 @@ Recording ReadClipLayout(const ClipFolders& folders, const RecordingOptions& opt
   }
   recording.period_s = (options.recorded_period_s > 0 ? options.recorded_period_s : found_period_s) * options.every_nth;
   recording.arms = EveryNth(std::move(arms), options.every_nth);
+  recording.told = EveryNth(std::move(told), options.every_nth);
   recording.source = fmt::format("{}: AgiBot World layout, {} cameras{}", folders.images.string(), names.size(),
                                  recording.videos.empty() ? ", first frame" : "");
   return recording;

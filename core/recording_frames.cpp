@@ -18,7 +18,8 @@ struct RecordedFrames::Walk {
     for (int skipped = next == 0 ? every_nth - 1 : 0; skipped < every_nth; ++skipped) {
       images[camera] = videos[camera].Next();
       if (images[camera].empty())
-        throw InvalidInput("{}: the video ends before step {} of {}", paths[camera].string(), next, steps);
+        throw InvalidInput("{}: the video ends before step {} of {}", paths[camera].string(), next, steps)
+            .Called("short_video");
     }
   }
 };

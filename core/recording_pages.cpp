@@ -79,7 +79,7 @@ void RefuseDistortion(const Json& object, const std::string& field, const std::s
       throw InvalidInput(
           "{}: {} holds {}, wanted 0: a distorted camera is no pinhole; undistort its images first, or leave the "
           "camera out",
-          file, path, *found);
+          file, path, *found).Called("distorted");
     }
     if (value.is_structured()) RefuseDistortion(value, path, file);
   }

@@ -28,24 +28,27 @@ unsigned PngSide(const std::string& bytes, std::size_t at) {
 }  // namespace
 
 ArmState ArmFromRaw(const RawArm& raw, const std::string& where) {
-  if (!raw.xyz_m.allFinite() || !raw.quat_xyzw.allFinite()) throw InvalidInput("{}: the pose is not finite", where);
+  if (!raw.xyz_m.allFinite() || !raw.quat_xyzw.allFinite()) throw InvalidInput("{}: the pose is not finite", where).Called("not_finite");
   const double length = raw.quat_xyzw.norm();
   if (std::abs(length - 1) > kUnitTolerance) {
-    throw InvalidInput("{}: the quaternion has length {:.4f}, wanted 1 within {}", where, length, kUnitTolerance);
+    throw InvalidInput("{}: the quaternion has length {:.4f}, wanted 1 within {}", where, length, kUnitTolerance)
+        .Called("no_rotation");
   }
   if (!(raw.gripper >= kLowestGripper && raw.gripper <= kHighestGripper)) {
-    throw InvalidInput("{}: the gripper reads {}, wanted 0 (open) … {} (closed)", where, raw.gripper, kClosedGripper);
+    throw InvalidInput("{}: the gripper reads {}, wanted 0 (open) … {} (closed)", where, raw.gripper, kClosedGripper)
+        .Called("gripper_unit");
   }
   return {FromXyzQuat(raw.xyz_m, raw.quat_xyzw), std::clamp(raw.gripper / kClosedGripper, 0.0, 1.0)};
 }
 
 Eigen::Isometry3d RigidOrThrow(const Eigen::Matrix3d& rotation, const Eigen::Vector3d& translation_m,
                                const std::string& where) {
-  if (!rotation.allFinite() || !translation_m.allFinite()) throw InvalidInput("{}: the pose is not finite", where);
+  if (!rotation.allFinite() || !translation_m.allFinite()) throw InvalidInput("{}: the pose is not finite", where).Called("not_finite");
   const double off = (rotation * rotation.transpose() - Eigen::Matrix3d::Identity()).norm();
   if (!(off < kUnitTolerance && rotation.determinant() > 0)) {
     throw InvalidInput("{}: the rotation matrix is no rotation (R Rᵀ is {:.4f} from the identity, determinant {:.4f})",
-                       where, off, rotation.determinant());
+                       where, off, rotation.determinant())
+        .Called("no_rotation");
   }
   Eigen::Isometry3d pose = Eigen::Isometry3d::Identity();
   pose.linear() = Eigen::Quaterniond(rotation).normalized().toRotationMatrix();
@@ -105,7 +108,8 @@ Eigen::Isometry3d FixedMount(const CameraTrack& track, const RecordingOptions& o
         "{}: at step {} the camera is {:.3f} m and {:.3f} rad from where it was at step 0 on its mount ({}); wanted "
         "at most {} m and {} rad: a camera that moves on its mount cannot be described",
         file, k, moved_m, turned_rad, track.mount == Mount::kBase ? "the base" : "the gripper",
-        options.camera_tolerance_m, options.camera_tolerance_rad);
+        options.camera_tolerance_m, options.camera_tolerance_rad)
+        .Called("moving_camera");
   }
   return first;
 }

@@ -2,10 +2,12 @@
 
 #include <Eigen/Geometry>
 #include <filesystem>
+#include <mutex>
 #include <opencv2/core.hpp>
 #include <string>
 #include <vector>
 
+#include "core/error.h"
 #include "core/recording.h"
 #include "core/types.h"
 
@@ -47,9 +49,20 @@ Camera ParseIntrinsics(const std::string& json, const std::string& file);
 std::vector<Eigen::Isometry3d> ParseExtrinsics(const std::string& json, const std::string& file);
 
 /// `proprio_stats.h5`: state/effector/position [T, 2], state/end/position [T, 2, 3] m, state/end/orientation [T, 2, 4]
-/// xyzw; index 0 left, 1 right. HDF5 keeps state of its own: call from one thread at a time.
+/// xyzw; index 0 left, 1 right.
 /// @returns [T], left and right arm at every step.
 std::vector<Arms> ReadProprio(const std::filesystem::path& path);
+/// The same of action/effector/position (0 open … 1 closed), action/end/position and action/end/orientation: where the
+/// arms were told to be at each step. @returns nothing if the file has no such groups.
+std::vector<Arms> ReadTold(const std::filesystem::path& path);
+/// HDF5 keeps state of its own, for the whole process: whoever calls it holds this.
+std::unique_lock<std::mutex> LockHdf5();
+/// A robot without a left arm: it lies at the base's origin, unturned, at every step, where no gripper can be.
+void DropAbsentLeftArm(Recording& recording);
+
+/// The bytes of `proprio_stats.h5`: `arms` as state, `told` (unless empty) as action; a missing left arm at the base's
+/// origin. The same arms give the same bytes.
+std::string ProprioBytes(const std::vector<Arms>& arms, const std::vector<Arms>& told);
 
 /// The pose of a camera on its mount, from where it was at every step.
 struct CameraTrack {
@@ -63,13 +76,23 @@ struct CameraTrack {
 /// off.
 Eigen::Isometry3d FixedMount(const CameraTrack& track, const RecordingOptions& options, const std::string& file);
 
+/// What `read` returns; an Error of it without a kind gets this one.
+template <typename Read>
+auto Calling(const char* kind, const Read& read) {
+  try {
+    return read();
+  } catch (const Error& error) {
+    throw error.kind()[0] == '\0' ? error.Called(kind) : error;
+  }
+}
+
 /// Every nth of the steps.
 std::vector<Arms> EveryNth(std::vector<Arms> arms, int n);
 
 /// The two readers behind ReadRecording.
 Recording ReadExampleLayout(const std::filesystem::path& folder, const RecordingOptions& options);
 struct ClipFolders {
-  std::string id;
+  std::string id;  ///< the recording's
   std::filesystem::path images, pages;  ///< folders with {camera}_color.mp4 and with {camera}_*.json
   std::filesystem::path proprio;        ///< the h5 file
 };

@@ -16,6 +16,7 @@ constexpr hsize_t kMaxSteps = 1'000'000;  // nine hours at 30 Hz
 constexpr std::size_t kMaxNumberBytes = 8;
 constexpr hsize_t kMaxChunkNumbers = hsize_t{1} << 24;  // the library allocates whole chunks
 constexpr int kArms = 2;
+constexpr double kClosedGripper = 120;  // raw; in the action half a closed gripper is 1
 
 /// Owns an identifier of the HDF5 library.
 class Handle {
@@ -34,7 +35,8 @@ class Handle {
   herr_t (*close_)(hid_t);
 };
 
-/// The library's own error printing is off while this lives: what goes wrong is said by our messages.
+/// The library is this thread's while this lives, and its own error printing is off: what goes wrong is said by our
+/// messages.
 class QuietHdf5 {
  public:
   QuietHdf5() {
@@ -46,6 +48,7 @@ class QuietHdf5 {
   QuietHdf5& operator=(const QuietHdf5&) = delete;
 
  private:
+  std::unique_lock<std::mutex> lock_ = LockHdf5();
   H5E_auto2_t function_ = nullptr;
   void* data_ = nullptr;
 };
@@ -107,19 +110,22 @@ Track ReadTrack(const Handle& file, const char* name, hsize_t width, const std::
   return track;
 }
 
-}  // namespace
+Handle OpenH5(const fs::path& path) {
+  const hid_t file = H5Fopen(path.c_str(), H5F_ACC_RDONLY, H5P_DEFAULT);
+  if (file < 0) throw InvalidInput("{}: no HDF5 file, or a broken one", path.string());
+  return {file, H5Fclose};
+}
 
-std::vector<Arms> ReadProprio(const fs::path& path) {
-  const QuietHdf5 quiet;
-  const Handle file(H5Fopen(path.c_str(), H5F_ACC_RDONLY, H5P_DEFAULT), H5Fclose);
-  if (!file.valid()) throw InvalidInput("{}: no HDF5 file, or a broken one", path.string());
-  const Track gripper = ReadTrack(file, "state/effector/position", 1, path.string());
-  const Track position = ReadTrack(file, "state/end/position", 3, path.string());
-  const Track orientation = ReadTrack(file, "state/end/orientation", 4, path.string());
+/// The arms of one of the file's two halves: `state` or `action`.
+/// @param gripper_unit  raw units per unit of the half's gripper
+std::vector<Arms> ReadHalf(const Handle& file, const std::string& half, double gripper_unit, const fs::path& path) {
+  const Track gripper = ReadTrack(file, (half + "/effector/position").c_str(), 1, path.string());
+  const Track position = ReadTrack(file, (half + "/end/position").c_str(), 3, path.string());
+  const Track orientation = ReadTrack(file, (half + "/end/orientation").c_str(), 4, path.string());
   if (gripper.steps != position.steps || gripper.steps != orientation.steps) {
     throw InvalidInput(
-        "{}: state/effector/position has {} steps, state/end/position {}, state/end/orientation {}; wanted the same",
-        path.string(), gripper.steps, position.steps, orientation.steps);
+        "{}: {}/effector/position has {} steps, {}/end/position {}, {}/end/orientation {}; wanted the same",
+        path.string(), half, gripper.steps, half, position.steps, half, orientation.steps);
   }
   std::vector<Arms> arms;
   arms.reserve(gripper.steps);
@@ -127,13 +133,34 @@ std::vector<Arms> ReadProprio(const fs::path& path) {
     Arms both;
     for (int arm = 0; arm < kArms; ++arm) {
       const RawArm raw{Eigen::Vector3d(position.At(step, arm)), Eigen::Vector4d(orientation.At(step, arm)),
-                       *gripper.At(step, arm)};
+                       gripper_unit * *gripper.At(step, arm)};
       both.push_back(
           ArmFromRaw(raw, fmt::format("{}: step {}, {} arm", path.string(), step, arm == 0 ? "left" : "right")));
     }
     arms.push_back(std::move(both));
   }
   return arms;
+}
+
+}  // namespace
+
+std::unique_lock<std::mutex> LockHdf5() {
+  static std::mutex mutex;
+  return std::unique_lock(mutex);
+}
+
+std::vector<Arms> ReadProprio(const fs::path& path) {
+  const QuietHdf5 quiet;
+  return ReadHalf(OpenH5(path), "state", 1, path);
+}
+
+std::vector<Arms> ReadTold(const fs::path& path) {
+  const QuietHdf5 quiet;
+  const Handle file = OpenH5(path);
+  for (const char* part : {"action", "action/end", "action/end/position", "action/effector"}) {
+    if (H5Lexists(file.id(), part, H5P_DEFAULT) <= 0) return {};
+  }
+  return ReadHalf(file, "action", kClosedGripper, path);
 }
 
 }  // namespace evac

@@ -83,6 +83,19 @@ std::optional<std::string> WhatIsWrong(const Rubric& rubric, const PrivilegedFra
   return std::nullopt;
 }
 
+Verdict RateTrack(const Task& task, const PrivilegedTrack& track) {
+  Verdict verdict;
+  verdict.judge = "oracle";
+  verdict.rubric_version = task.rubric.version;
+  if (auto wrong = WhatIsWrong(task.rubric, track.front())) {
+    verdict.label = Label::kInvalid;
+    verdict.reason = "rubric: " + *wrong;
+  } else {
+    JudgeTrack(task.rubric, {track, task.period_s}, verdict);
+  }
+  return verdict;
+}
+
 Verdict OracleJudge::Rate(const Task& task, const Episode& episode) {
   Verdict verdict;
   verdict.episode_id = episode.key.Id();
@@ -99,9 +112,9 @@ Verdict OracleJudge::Rate(const Task& task, const Episode& episode) {
     if (task.rubric.stages.empty()) return say(Label::kCannotTell, "the task's rubric has no stages");
     const PrivilegedTrack track = store_.LoadPrivileged(verdict.episode_id);
     if (track.empty()) return say(Label::kCannotTell, "the world has no physics: there is no privileged track");
-    if (auto wrong = WhatIsWrong(task.rubric, track.front())) return say(Label::kInvalid, "rubric: " + *wrong);
-    JudgeTrack(task.rubric, {track, task.period_s}, verdict);
-    return verdict;
+    Verdict rated = RateTrack(task, track);
+    rated.episode_id = verdict.episode_id;
+    return rated;
   } catch (const Error& error) {
     return say(Label::kInvalid, error.what());
   }

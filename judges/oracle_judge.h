@@ -40,6 +40,10 @@ class OracleJudge : public Judge {
   const Store& store_;
 };
 
+/// The same of a track that no store keeps: fills in label, stages, reason and the rubric's version.
+/// @param track  [T], T >= 1
+Verdict RateTrack(const Task& task, const PrivilegedTrack& track);
+
 /// What is wrong with a rubric, as a sentence, or nothing: stages without a name or with one twice, without conditions,
 /// an unknown kind, a body missing or too many, neither `above` nor `below`, bounds that exclude each other, a negative
 /// hold_s.

@@ -3,6 +3,7 @@
 #include "core/error.h"
 #include "core/geometry.h"
 #include "core/seed.h"
+#include "policies/gripper_poses.h"
 
 namespace evac {
 namespace {
@@ -13,46 +14,15 @@ constexpr double kOpening_s = 0.4;
 constexpr double kRetreat_m = 0.12;
 constexpr double kArrived_m = 0.025;    // observed distance from where it should be, to trust the wrist's picture
 constexpr double kBelievable_m = 0.06;  // a closer look that corrects more than this saw something else
-constexpr double kMargin_m = 0.005;     // targets keep this far within the workspace
 constexpr double kEmptyShare = 0.15;    // of the held thing's silhouette that shows its colour
 
-/// Pointing straight down: x of the gripper at `yaw_rad` about the vertical.
-Eigen::Isometry3d Down(const Eigen::Vector2d& xy_m, double z_m, double yaw_rad) {
-  Eigen::Isometry3d pose = BaseFromObject({xy_m, yaw_rad}, z_m);
-  pose.linear() = pose.linear() * Eigen::Vector3d(1, -1, -1).asDiagonal();
-  return pose;
-}
-
 Eigen::Isometry3d Raised(const Eigen::Isometry3d& pose, double by_m) { return Eigen::Translation3d(0, 0, by_m) * pose; }
-
-/// The nearest pose in the workspace: a degraded policy misses, but asks for nothing that is refused.
-Eigen::Isometry3d Inside(Eigen::Isometry3d pose, const Eigen::AlignedBox3d& workspace_m) {
-  const Eigen::Vector3d margin = Eigen::Vector3d::Constant(kMargin_m);
-  pose.translation() = pose.translation().cwiseMax(workspace_m.min() + margin).cwiseMin(workspace_m.max() - margin);
-  return pose;
-}
-
-/// The camera's picture, its calibration at the picture's size, and its pose.
-std::optional<View> ViewOf(const char* name, const Task& task, const Observation& observation) {
-  for (std::size_t i = 0; i < task.cameras.size() && i < observation.images.size(); ++i) {
-    if (task.cameras[i].name != name) continue;
-    const cv::Mat& rgb = observation.images[i];
-    return View{&rgb, Resized(task.cameras[i], rgb.cols, rgb.rows), BaseFromCamera(task.cameras[i], observation.arms)};
-  }
-  return std::nullopt;
-}
 
 bool HasHeadCamera(const Task& task) {
   for (const Camera& camera : task.cameras) {
     if (camera.name == "head") return true;
   }
   return false;
-}
-
-/// An arm that stays where it is; a hand that is closed around something keeps pressing.
-ArmState Held(ArmState arm) {
-  arm.closure = arm.closure > 0.5 ? 1.0 : 0.0;
-  return arm;
 }
 
 Eigen::Vector2d Noise(SplitMix64& random, double sd_m) {
@@ -70,6 +40,8 @@ VisualEpisode::VisualEpisode(const Task& task, const VisualPickOptions& options,
   SplitMix64 random(SeedFor(seed, "visual_pick episode"));
   blind_ = random.Uniform() < options.blindness;
   error_m_ = options.bias_m + Noise(random, options.noise_m);
+  SplitMix64 random_place(SeedFor(seed, "visual_pick place"));
+  place_error_m_ = Noise(random_place, options.place_noise_m);
   thing_ = knowledge_.usual.placement;
   target_ = knowledge_.usual_target.placement;
 }
@@ -143,19 +115,19 @@ bool VisualEpisode::HandIsEmpty(const Glance& glance) {
 VisualEpisode::Plan VisualEpisode::Approach() const {
   Plan plan{Timeline(last_.base_from_gripper, limits_), {}, told_};
   plan.hand = {last_.closure, std::nullopt, 0.0};
-  plan.path.MoveTo(Down(thing_.xy_m, knowledge_.hover_m, thing_.yaw_rad + knowledge_.turn_rad));
+  plan.path.MoveTo(PointingDown(thing_.xy_m, knowledge_.hover_m, thing_.yaw_rad + knowledge_.turn_rad));
   return plan;
 }
 
 VisualEpisode::Plan VisualEpisode::Transfer(const Eigen::Vector2d& error_m) const {
   const Eigen::Vector2d thing_m = thing_.xy_m + error_m;
   const double yaw_rad = thing_.yaw_rad + knowledge_.turn_rad;
-  const Eigen::Isometry3d grasp = Down(thing_m, knowledge_.grasp_m, yaw_rad);
+  const Eigen::Isometry3d grasp = PointingDown(thing_m, knowledge_.grasp_m, yaw_rad);
   const Eigen::Isometry3d release = Release();
   Plan plan{Timeline(last_.base_from_gripper, limits_), {}, told_};
   plan.transfers = true;
   plan.gripper_from_thing = grasp.inverse() * BaseFromObject({thing_m, thing_.yaw_rad}, knowledge_.thing.height_m);
-  plan.path.MoveTo(Down(thing_m, knowledge_.hover_m, yaw_rad));
+  plan.path.MoveTo(PointingDown(thing_m, knowledge_.hover_m, yaw_rad));
   plan.path.MoveTo(grasp);
   plan.path.Pause(kSettle_s);
   const double close_s = plan.path.duration_s();
@@ -177,9 +149,10 @@ VisualEpisode::Plan VisualEpisode::Transfer(const Eigen::Vector2d& error_m) cons
 /// The thing's lower edge just above where it belongs, leaning so that its top falls towards the robot.
 Eigen::Isometry3d VisualEpisode::Release() const {
   const double foot_m = knowledge_.grasp_m - knowledge_.thing.height_m;  // below the gripper, in the hand
-  Eigen::Isometry3d pose = Down(target_.xy_m, 0, knowledge_.turn_rad);
+  const Eigen::Vector2d place_m = target_.xy_m + place_error_m_;
+  Eigen::Isometry3d pose = PointingDown(place_m, 0, knowledge_.turn_rad);
   pose.linear() = Eigen::AngleAxisd(-knowledge_.tilt_rad, Eigen::Vector3d::UnitY()) * pose.linear();
-  const Eigen::Vector3d lower_edge_m(target_.xy_m.x() + knowledge_.fall_m, target_.xy_m.y(),
+  const Eigen::Vector3d lower_edge_m(place_m.x() + knowledge_.fall_m, place_m.y(),
                                      knowledge_.target_floor_m + knowledge_.drop_m);
   pose.translation() = lower_edge_m - foot_m * pose.linear().col(2);
   return pose;

@@ -55,7 +55,8 @@ class VisualEpisode {
   PickKnowledge knowledge_;
   std::uint64_t seed_;
   bool blind_ = false;
-  Eigen::Vector2d error_m_;      ///< of this episode: bias and noise
+  Eigen::Vector2d error_m_;        ///< of this episode: bias and noise
+  Eigen::Vector2d place_error_m_;  ///< of this episode, of where it puts things
   int requests_ = 0, told_ = 0;  ///< requests answered and targets given so far
   int retries_left_;
   Eigen::Isometry3d home_ = Eigen::Isometry3d::Identity();  ///< where the gripper was at first, and rests at last

@@ -22,6 +22,7 @@ void Check(const VisualPickOptions& options) {
   Require("bias-m (y)", options.bias_m.y(), -0.5, 0.5);
   Require("noise-m", options.noise_m, 0, 0.5);
   Require("request-noise-m", options.request_noise_m, 0, 0.5);
+  Require("place-noise-m", options.place_noise_m, 0, 0.5);
   Require("late-close-s", options.late_close_s, 0, 3);
   Require("early-release-s", options.early_release_s, 0, 3);
   Require("blindness", options.blindness, 0, 1);

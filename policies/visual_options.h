@@ -11,6 +11,7 @@ struct VisualPickOptions {
       Eigen::Vector2d::Zero();   ///< it takes the thing to be this far off, base frame, [-0.5, 0.5] each
   double noise_m = 0;            ///< the same, drawn once per episode: standard deviation along x and y, [0, 0.5]
   double request_noise_m = 0;    ///< the same, drawn anew each time it looks
+  double place_noise_m = 0;      ///< it takes the place to put it to be this far off: once per episode, [0, 0.5]
   double late_close_s = 0;       ///< the hand closes this much after it should, [0, 3]; the arm does not wait for it
   double early_release_s = 0;    ///< the hand opens this much before it should, [0, 3]
   double blindness = 0;          ///< probability that it sees nothing all episode and goes where the thing usually is

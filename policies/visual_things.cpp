@@ -111,6 +111,7 @@ PickKnowledge TakeToast() {
   knowledge.target = Plate();
   knowledge.usual_target = {{{0.45, 0.14}, 0}, 0.12};
   knowledge.target_floor_m = 0.008;
+  knowledge.target_rim_m = 0.089;
   knowledge.drop_m = 0.006;
   knowledge.tilt_rad = 33 * kRadians;
   knowledge.fall_m = 0.035;
@@ -147,6 +148,7 @@ PickKnowledge TakeHam() {
   knowledge.target = Bread();
   knowledge.usual_target = {{{0.45, 0.14}, 0}, 0.12};
   knowledge.target_floor_m = 0.018;
+  knowledge.target_rim_m = 0.056;
   knowledge.drop_m = 0.006;
   return knowledge;
 }
@@ -179,6 +181,7 @@ PickKnowledge TakeLettuce() {
   knowledge.target = Bowl();
   knowledge.usual_target = {{{0.45, 0.14}, 0}, 0.12};
   knowledge.target_floor_m = 0.006;
+  knowledge.target_rim_m = 0.080;
   knowledge.drop_m = 0.045;
   return knowledge;
 }

@@ -50,6 +50,7 @@ struct PickKnowledge {
   std::optional<Thing> target;  ///< what it is put on; none: a free place on the table
   Prior usual_target;           ///< that place, or where the target is when nothing is seen
   double target_floor_m = 0;    ///< height of what it is put on
+  double target_rim_m = 0;      ///< from its middle to where two fingers can straddle its edge
   double drop_m = 0;            ///< gap below it when the hand opens
   double tilt_rad = 0;          ///< lean of the gripper when it lets go, its palm towards the robot
   double fall_m = 0;  ///< how far towards the robot its middle comes to lie from where its lower edge is put down

@@ -3,6 +3,7 @@
 #include <array>
 #include <cstdio>
 #include <cstdlib>
+#include <mutex>
 
 #include "core/error.h"
 #include "worldmodel/sim/box_contacts.h"
@@ -10,6 +11,8 @@
 namespace evac::sim {
 
 ModelPtr LoadModel(const std::filesystem::path& path) {
+  static std::mutex compiler;  // MuJoCo's is not thread-safe
+  const std::lock_guard lock(compiler);
   std::array<char, 1000> message{};
   ModelPtr model(mj_loadXML(path.c_str(), nullptr, message.data(), static_cast<int>(message.size())));
   if (!model) throw InvalidInput("{}: MuJoCo cannot read this scene: {}", path.string(), message.data());

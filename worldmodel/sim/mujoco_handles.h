@@ -19,7 +19,7 @@ struct DeleteData {
 using ModelPtr = std::unique_ptr<mjModel, DeleteModel>;
 using DataPtr = std::unique_ptr<mjData, DeleteData>;
 
-/// Compiles a scene. Not thread-safe (MuJoCo's compiler is not). @throws InvalidInput with MuJoCo's own words.
+/// Compiles a scene, one at a time. @throws InvalidInput with MuJoCo's own words.
 ModelPtr LoadModel(const std::filesystem::path& path);
 ModelPtr CopyModel(const mjModel& model);
 DataPtr MakeData(const mjModel& model);

@@ -10,6 +10,8 @@
 namespace evac::sim {
 namespace {
 
+constexpr double kFloorBelowTableM = 0.75;  // scenes/robot.xml
+
 std::vector<double> ReadNumbers(const Config& page, const std::string& key, std::size_t count) {
   auto numbers = page.Get<std::vector<double>>(key);
   page.Require(numbers.size() == count, key, fmt::format("{} numbers", count));
@@ -127,6 +129,21 @@ ScenePage ReadScenePage(const Task& task) {
   scene.light = ReadLight(page.Section("light"));
   scene.clutter = ReadClutter(page.Section("clutter"));
   return scene;
+}
+
+Task WithoutObject(const Task& task, const std::string& body) {
+  Config page = Config::FromText(task.page, task.page_path);
+  const std::vector<Config> objects = page.Section("mujoco").List("objects");
+  for (std::size_t i = 0; i < objects.size(); ++i) {
+    const Placement placement = ReadPlacement(objects[i]);
+    if (placement.body != body) continue;
+    page.Set(fmt::format("mujoco.objects.{}={{body: {}, x_m: [3, 3], y_m: [-3, -3], z_m: {}, yaw_deg: [{}, {}]}}", i,
+                         body, placement.z_m - kFloorBelowTableM, placement.yaw_deg.low, placement.yaw_deg.high));
+    Task without = task;
+    without.page = page.Text();
+    return without;
+  }
+  throw InvalidInput("{}: found no object '{}' to take away", page.Where("mujoco.objects"), body);
 }
 
 }  // namespace evac::sim

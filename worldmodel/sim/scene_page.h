@@ -62,4 +62,9 @@ struct ScenePage {
 /// @throws InvalidInput if the task's page has no such section or something is wrong in it.
 ScenePage ReadScenePage(const Task& task);
 
+/// The same task with one of its things taken away: it lies on the floor behind every camera. All else of an initial
+/// state stays as it is; the rubric's bodies are still there.
+/// @throws InvalidInput if no object of the page has that name.
+Task WithoutObject(const Task& task, const std::string& body);
+
 }  // namespace evac::sim

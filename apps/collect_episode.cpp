@@ -1,0 +1,140 @@
+#include "apps/collect_episode.h"
+
+#include <limits>
+#include <numeric>
+
+#include "core/check.h"
+#include "core/error.h"
+#include "core/file.h"
+#include "core/geometry.h"
+#include "harness/still.h"
+#include "judges/attempt.h"
+
+namespace evac {
+namespace {
+
+/// Adds one frame. @returns its observation, images and all.
+Observation Append(WorldStep step, Arms told, CollectedRun& run) {
+  run.recorded.arms.push_back(step.observation.arms);
+  run.recorded.told.push_back(std::move(told));
+  run.recorded.pictures.push_back(step.observation.images);
+  run.track.push_back(std::move(step.privileged));
+  return std::move(step.observation);
+}
+
+/// @throws InternalError for a policy that fails or asks for what no world should do: it is ours.
+ActionChunk Ask(Policy& policy, const Task& task, const Observation& observation) {
+  const SceneObservation asked{0, &observation};
+  Acted acted = std::move(policy.Act({&asked, 1}).front());
+  if (const auto* failure = std::get_if<Failure>(&acted))
+    throw InternalError("policy {}: {}", policy.Name(), failure->message);
+  ActionChunk chunk = std::get<ActionChunk>(std::move(acted));
+  if (const auto wrong = WhatIsWrong(chunk, task, static_cast<int>(chunk.targets.size())))
+    throw InternalError("policy {}: {}", policy.Name(), *wrong);
+  return chunk;
+}
+
+const Eigen::Isometry3d& PoseOf(const std::string& body, const PrivilegedFrame& frame) {
+  for (const PrivilegedFrame::Body& found : frame.bodies) {
+    if (found.name == body) return found.base_from_body;
+  }
+  throw InvalidInput("recipe: there is no body '{}' in the scene", body);
+}
+
+/// Where the hands truly are.
+Arms TrueArms(const Task& task, const PrivilegedFrame& frame) {
+  Arms arms;
+  for (const std::string& arm : task.arms)
+    arms.push_back({PoseOf(arm == "left" ? "left_gripper" : "gripper", frame), 0.0});
+  return arms;
+}
+
+EpisodeTruth TruthOf(const CollectJob& job, const Task& task, const CollectedRun& run, int scale) {
+  EpisodeTruth truth{task.cameras.size(), {}, {}};
+  constexpr float kUnknown = std::numeric_limits<float>::quiet_NaN();
+  for (const PrivilegedFrame& frame : run.track) {
+    const Eigen::Vector3d middle_m = PoseOf(job.task->object, frame) * job.task->middle_m;
+    const Arms arms = TrueArms(task, frame);
+    for (const Camera& camera : task.cameras) {
+      const auto at_px = Project(camera, BaseFromCamera(camera, arms).inverse() * middle_m);
+      truth.object_px.push_back(at_px ? static_cast<float>(at_px->x() * scale) : kUnknown);
+      truth.object_px.push_back(at_px ? static_cast<float>(at_px->y() * scale) : kUnknown);
+    }
+  }
+  return truth;
+}
+
+const Task& TaskOf(const CollectJob& job) {
+  return job.behaviour->without_object ? job.task->without : job.task->task;
+}
+
+}  // namespace
+
+EpisodeCollector::EpisodeCollector(const Recipe& recipe, std::filesystem::path out)
+    : recipe_(recipe), out_(std::move(out)), world_({.name = "real", .profile = recipe.profile, .threads = 1}) {}
+
+CollectedRun EpisodeCollector::Run(const CollectJob& job) {
+  const Task& task = TaskOf(job);
+  const std::unique_ptr<Policy> policy = MakePolicy(job, recipe_.chunk_size);
+  CollectedRun run;
+  run.recorded.period_s = task.period_s;
+  run.recorded.cameras = task.cameras;
+  run.stop = Name(StopReason::kMaxChunks);
+  policy->Reset(0, task, job.row.policy_seed);
+  WorldStep first = world_.Reset(0, task, {job.row.initial_state, job.row.state_seed}, job.row.world_seed);
+  Arms start = first.observation.arms;
+  Observation observation = Append(std::move(first), std::move(start), run);
+  StillMeter still(task.still);
+  std::vector<Arms> observed;
+  for (int chunks = 0; chunks < recipe_.max_chunks; ++chunks) {
+    const ActionChunk chunk = Ask(*policy, task, observation);
+    if (still.Rest(run.recorded.told.back(), chunk.targets, observed)) {
+      run.stop = Name(StopReason::kStill);
+      break;
+    }
+    const SceneChunk driven{0, &chunk};
+    Advanced advanced = std::move(world_.Advance({&driven, 1}).front());
+    if (const auto* failure = std::get_if<Failure>(&advanced)) {
+      run.stop = Name(failure->stop);
+      run.failure = failure->message;
+      break;
+    }
+    observed = {observation.arms};
+    auto& steps = std::get<std::vector<WorldStep>>(advanced);
+    for (std::size_t k = 0; k < steps.size(); ++k) {
+      observed.push_back(steps[k].observation.arms);
+      observation = Append(std::move(steps[k]), chunk.targets[k], run);
+    }
+  }
+  return run;
+}
+
+CollectedEpisode EpisodeCollector::Collect(const CollectJob& job) {
+  const CollectedRun run = Run(job);
+  const Task& task = TaskOf(job);
+  CollectedEpisode row = job.row;
+  row.stop = run.stop;
+  const TreePlace place = PlaceOf(out_, row);
+  if (run.failure.empty()) {
+    const WhatHappened happened = Look({task, job.task->object, run.track, run.recorded.told});
+    EpisodeTruth truth = TruthOf(job, task, run, recipe_.video.scale);
+    truth.contact = happened.contact;
+    row.success = happened.fate == Fate::kSuccess;
+    row.fate = Name(happened.fate);
+    row.reason = happened.reason;
+    row.frames = static_cast<int>(run.track.size());
+    row.contact_frames = std::accumulate(truth.contact.begin(), truth.contact.end(), 0);
+    WriteRecording(place, run.recorded, recipe_.video);
+    WriteTruth(TruthPath(place), truth);
+  } else {
+    row.fate = run.stop;
+    row.reason = run.failure;
+  }
+  MakeFolders(RowPath(place).parent_path());
+  WriteFileAtomically(RowPath(place), CollectedJson(row) + "\n");
+  return row;
+}
+
+TreePlace PlaceOf(const std::filesystem::path& out, const CollectedEpisode& row) { return {out, row.task, row.episode}; }
+
+}  // namespace evac

@@ -1,0 +1,214 @@
+#include "apps/collect_recipe.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <set>
+
+#include "core/config.h"
+#include "core/file.h"
+#include "core/geometry.h"
+#include "core/hash.h"
+#include "core/seed.h"
+#include "core/task_page.h"
+#include "policies/explorer.h"
+#include "policies/visual_pick.h"
+#include "worldmodel/sim/scene_page.h"
+
+namespace evac {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// Parameters of visual_pick that a recipe may draw, and where they go.
+struct PickParameter {
+  const char* name;
+  double VisualPickOptions::*field;
+};
+constexpr PickParameter kPickParameters[] = {{"noise_m", &VisualPickOptions::noise_m},
+                                             {"request_noise_m", &VisualPickOptions::request_noise_m},
+                                             {"place_noise_m", &VisualPickOptions::place_noise_m},
+                                             {"late_close_s", &VisualPickOptions::late_close_s},
+                                             {"early_release_s", &VisualPickOptions::early_release_s},
+                                             {"blindness", &VisualPickOptions::blindness},
+                                             {"request_blindness", &VisualPickOptions::request_blindness},
+                                             {"speed", &VisualPickOptions::speed}};
+/// Besides: `miss_m` and `miss_deg`, the bias in polar form, and `retries`.
+constexpr const char* kPickExtras[] = {"miss_m", "miss_deg", "retries"};
+
+bool IsKnown(const std::string& policy, const std::string& name) {
+  if (policy == "explorer") return name == "speed";
+  const auto is_it = [&](const PickParameter& known) { return name == known.name; };
+  return std::any_of(std::begin(kPickParameters), std::end(kPickParameters), is_it) ||
+         std::find(std::begin(kPickExtras), std::end(kPickExtras), name) != std::end(kPickExtras);
+}
+
+Behaviour ReadBehaviour(const Config& page) {
+  Behaviour behaviour;
+  behaviour.name = page.Get<std::string>("name");
+  behaviour.share = page.Get<double>("share");
+  behaviour.policy = page.Get<std::string>("policy");
+  behaviour.does = page.Get<std::string>("does", "");
+  behaviour.without_object = page.Get<bool>("without_object", false);
+  page.Require(behaviour.share > 0 && std::isfinite(behaviour.share), "share", "a positive number");
+  page.Require(behaviour.policy == "visual_pick" || behaviour.policy == "explorer", "policy", "visual_pick or explorer");
+  page.Require((behaviour.policy == "explorer") == page.Has("does"), "does", "it with policy explorer, and only there");
+  if (page.Has("does")) ExplorationFromName(behaviour.does);
+  static const std::set<std::string> kOwn = {"name", "share", "policy", "does", "without_object"};
+  for (const std::string& key : page.Keys()) {
+    if (kOwn.contains(key)) continue;
+    page.Require(IsKnown(behaviour.policy, key), key, "no such field: it is no parameter of " + behaviour.policy);
+    const auto range = page.Get<std::vector<double>>(key);
+    page.Require(range.size() == 2 && range[0] <= range[1], key, "[low, high] with low <= high");
+    behaviour.parameters.push_back({key, {range[0], range[1]}});
+  }
+  return behaviour;
+}
+
+CollectTask ReadCollectTask(const Config& page) {
+  page.AllowOnly({"page", "object", "middle_m"});
+  CollectTask task;
+  task.task = ReadTaskPage(page.Path("page"));
+  task.object = page.Get<std::string>("object");
+  task.without = sim::WithoutObject(task.task, task.object);
+  const auto middle_m = page.Get<std::vector<double>>("middle_m");
+  page.Require(middle_m.size() == 3, "middle_m", "three numbers");
+  task.middle_m = {middle_m[0], middle_m[1], middle_m[2]};
+  return task;
+}
+
+void ResizeCameras(const Config& page, Recipe& recipe) {
+  if (!page.Has("image")) return;
+  const Config image = page.Section("image");
+  image.AllowOnly({"height_px", "width_px"});
+  const int height_px = image.Get<int>("height_px"), width_px = image.Get<int>("width_px");
+  image.Require(height_px > 0 && height_px <= 2048, "height_px", "1 … 2048");
+  image.Require(width_px > 0 && width_px <= 2048, "width_px", "1 … 2048");
+  for (CollectTask& task : recipe.tasks) {
+    for (Task* one : {&task.task, &task.without}) {
+      for (Camera& camera : one->cameras) camera = Resized(camera, width_px, height_px);
+    }
+  }
+}
+
+/// How many there are decides no episode: a collection can grow.
+std::string HashOf(Config page, const Recipe& recipe) {
+  page.Set("episodes=0");
+  std::string all = page.Canonical() + Config::FromFile(recipe.profile).ContentHash();
+  for (const CollectTask& task : recipe.tasks) {
+    const Config task_page = Config::FromText(task.task.page, task.task.page_path);
+    all += task_page.ContentHash();
+    const Config mujoco = task_page.Section("mujoco");
+    all += Sha256HexOfFile(mujoco.Path("scene"));
+    for (const auto& file : mujoco.Get<std::vector<std::string>>("includes", std::vector<std::string>{}))
+      all += Sha256HexOfFile(mujoco.Path("scene").parent_path() / file);
+  }
+  return Sha256Hex(all);
+}
+
+void ReadNumbers(const Config& page, Recipe& recipe) {
+  recipe.episodes = page.Get<int>("episodes");
+  recipe.episodes_per_state = page.Get<int>("episodes_per_state", 1);
+  recipe.chunk_size = page.Get<int>("chunk_size", 8);
+  recipe.max_chunks = page.Get<int>("max_chunks");
+  page.Require(recipe.episodes > 0, "episodes", "at least 1");
+  page.Require(recipe.episodes_per_state > 0, "episodes_per_state", "at least 1");
+  page.Require(recipe.chunk_size > 0 && recipe.chunk_size <= 1000, "chunk_size", "1 … 1000");
+  page.Require(recipe.max_chunks > 0 && recipe.max_chunks <= 1000, "max_chunks", "1 … 1000");
+  if (!page.Has("video")) return;
+  const Config video = page.Section("video");
+  video.AllowOnly({"crf", "scale"});
+  recipe.video = {video.Get<int>("crf", recipe.video.crf), video.Get<int>("scale", recipe.video.scale)};
+  video.Require(recipe.video.crf >= 0 && recipe.video.crf <= 51, "crf", "0 … 51");
+  video.Require(recipe.video.scale >= 1 && recipe.video.scale <= 8, "scale", "1 … 8");
+}
+
+/// Four digits: what a manifest shows is what was used.
+double Rounded(double value) { return std::round(value * 1e4) / 1e4; }
+
+const Behaviour& Choose(const std::vector<Behaviour>& mix, double uniform) {
+  double total = 0;
+  for (const Behaviour& behaviour : mix) total += behaviour.share;
+  double left = uniform * total;
+  for (const Behaviour& behaviour : mix) {
+    if ((left -= behaviour.share) < 0) return behaviour;
+  }
+  return mix.back();
+}
+
+VisualPickOptions PickOptions(const std::map<std::string, double>& parameters, int chunk_size) {
+  VisualPickOptions options;
+  options.chunk_size = chunk_size;
+  const auto value = [&](const char* name, double otherwise) {
+    const auto found = parameters.find(name);
+    return found == parameters.end() ? otherwise : found->second;
+  };
+  for (const PickParameter& parameter : kPickParameters)
+    options.*parameter.field = value(parameter.name, options.*parameter.field);
+  const double miss_rad = value("miss_deg", 0) * std::numbers::pi / 180;
+  options.bias_m = value("miss_m", 0) * Eigen::Vector2d(std::cos(miss_rad), std::sin(miss_rad));
+  options.retries = static_cast<int>(std::lround(value("retries", options.retries)));
+  return options;
+}
+
+}  // namespace
+
+Recipe ReadRecipe(const fs::path& path, const std::vector<std::string>& assignments) {
+  Config page = Config::FromFile(path);
+  for (const std::string& assignment : assignments) page.Set(assignment);
+  page.AllowOnly({"recipe", "profile", "tasks", "mix", "episodes", "episodes_per_state", "chunk_size", "max_chunks",
+                  "image", "video"});
+  Recipe recipe;
+  recipe.name = page.Get<std::string>("recipe");
+  recipe.profile = page.Path("profile");
+  for (const Config& task : page.List("tasks")) recipe.tasks.push_back(ReadCollectTask(task));
+  for (const Config& behaviour : page.List("mix")) recipe.mix.push_back(ReadBehaviour(behaviour));
+  page.Require(!recipe.tasks.empty(), "tasks", "at least one task");
+  page.Require(!recipe.mix.empty(), "mix", "at least one behaviour");
+  ReadNumbers(page, recipe);
+  ResizeCameras(page, recipe);
+  recipe.text = page.Text();
+  recipe.hash = HashOf(page, recipe);
+  for (const Behaviour& behaviour : recipe.mix) {  // both ends of every range are values that the policy takes
+    for (const bool high : {false, true}) {
+      CollectJob job{&recipe.tasks.front(), &behaviour, {}};
+      for (const auto& [name, range] : behaviour.parameters) job.row.parameters[name] = high ? range.second : range.first;
+      MakePolicy(job, recipe.chunk_size);
+    }
+  }
+  return recipe;
+}
+
+CollectJob JobAt(const Recipe& recipe, std::uint64_t seed, std::int64_t index) {
+  const auto number = static_cast<std::uint64_t>(index), tasks = static_cast<std::uint64_t>(recipe.tasks.size());
+  const std::uint64_t state = number / tasks / static_cast<std::uint64_t>(recipe.episodes_per_state);
+  CollectJob job;
+  job.task = &recipe.tasks[number % tasks];
+  SplitMix64 random(SeedFor(SeedFor(seed, "collected episode"), number));
+  job.behaviour = &Choose(recipe.mix, random.Uniform());
+  CollectedEpisode& row = job.row;
+  row.index = index;
+  row.task = job.task->task.id;
+  row.episode = fmt::format("{:06}", index);
+  row.initial_state = fmt::format("collect-{}-{:05}", seed, state);
+  row.state_seed = SeedFor(SeedFor(SeedFor(seed, "collected state"), state), row.task);
+  row.world_seed = random.Next();
+  row.policy_seed = random.Next();
+  row.behaviour = job.behaviour->name;
+  row.policy = job.behaviour->policy;
+  for (const auto& [name, range] : job.behaviour->parameters)
+    row.parameters[name] = Rounded(random.Uniform(range.first, range.second));
+  if (job.behaviour->without_object) row.without = job.task->object;
+  row.video_scale = recipe.video.scale;
+  return job;
+}
+
+std::unique_ptr<Policy> MakePolicy(const CollectJob& job, int chunk_size) {
+  if (job.behaviour->policy == "visual_pick")
+    return std::make_unique<VisualPick>(PickOptions(job.row.parameters, chunk_size));
+  const auto speed = job.row.parameters.find("speed");
+  return std::make_unique<Explorer>(ExplorerOptions{ExplorationFromName(job.behaviour->does), chunk_size,
+                                                    speed == job.row.parameters.end() ? 1.0 : speed->second});
+}
+
+}  // namespace evac

@@ -1,0 +1,71 @@
+#include "core/recording_writer.h"
+
+#include <nlohmann/json.hpp>
+
+#include "core/error.h"
+#include "core/file.h"
+#include "core/geometry.h"
+#include "core/recording_parts.h"
+
+namespace evac {
+namespace {
+
+namespace fs = std::filesystem;
+using Json = nlohmann::ordered_json;
+
+std::string IntrinsicsPage(const Camera& camera, int scale) {
+  const Json intrinsic = {{"fx", camera.fx_px * scale},
+                          {"fy", camera.fy_px * scale},
+                          {"ppx", camera.cx_px * scale},
+                          {"ppy", camera.cy_px * scale}};
+  return Json{{"intrinsic", intrinsic}}.dump() + "\n";
+}
+
+Json PoseEntry(const Eigen::Isometry3d& base_from_camera) {
+  Json rows = Json::array();
+  for (int row = 0; row < 3; ++row) {
+    const Eigen::RowVector3d values = base_from_camera.linear().row(row);
+    rows.push_back({values[0], values[1], values[2]});
+  }
+  const Eigen::Vector3d at = base_from_camera.translation();
+  return {{"extrinsic", {{"rotation_matrix", rows}, {"translation_vector", {at[0], at[1], at[2]}}}}};
+}
+
+std::string ExtrinsicsPage(const Camera& camera, const std::vector<Arms>& arms) {
+  Json list = Json::array();
+  for (const Arms& now : arms) list.push_back(PoseEntry(BaseFromCamera(camera, now)));
+  return list.dump() + "\n";
+}
+
+void WriteVideo(const fs::path& path, const RecordedEpisode& episode, std::size_t view, const RecordingVideo& video) {
+  VideoWriter writer(path, {.period_s = episode.period_s, .crf = video.crf, .scale = video.scale});
+  for (const std::vector<cv::Mat>& pictures : episode.pictures) writer.Append(pictures[view]);
+  writer.Finish();
+}
+
+void CheckLengths(const TreePlace& place, const RecordedEpisode& episode) {
+  const std::size_t steps = episode.arms.size();
+  const bool told_fits = episode.told.empty() || episode.told.size() == steps;
+  if (steps > 0 && told_fits && episode.pictures.size() == steps) return;
+  throw InternalError("{}: {} measured steps, {} told, {} pictures; wanted the same", place.Folder().string(), steps,
+                      episode.told.size(), episode.pictures.size());
+}
+
+}  // namespace
+
+void WriteRecording(const TreePlace& place, const RecordedEpisode& episode, const RecordingVideo& video) {
+  CheckLengths(place, episode);
+  const fs::path videos = place.Folder() / "videos";
+  const fs::path pages = place.root / "parameters" / place.task / place.episode / "parameters" / "camera";
+  const fs::path proprio = place.root / "proprio_stats" / place.task / place.episode;
+  for (const fs::path& folder : {videos, pages, proprio}) MakeFolders(folder);
+  for (std::size_t view = 0; view < episode.cameras.size(); ++view) {
+    const Camera& camera = episode.cameras[view];
+    WriteVideo(videos / (camera.name + "_color.mp4"), episode, view, video);
+    WriteFileAtomically(pages / (camera.name + "_intrinsic_params.json"), IntrinsicsPage(camera, video.scale));
+    WriteFileAtomically(pages / (camera.name + "_extrinsic_params_aligned.json"), ExtrinsicsPage(camera, episode.arms));
+  }
+  WriteFileAtomically(proprio / "proprio_stats.h5", ProprioBytes(episode.arms, episode.told));
+}
+
+}  // namespace evac
