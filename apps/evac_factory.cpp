@@ -7,6 +7,7 @@
 #include "core/recording.h"
 #include "worldmodel/evac_config.h"
 #include "worldmodel/evac_world.h"
+#include "worldmodel/nn/memory.h"
 #include "worldmodel/nn/weights.h"
 
 namespace evac {
@@ -84,6 +85,7 @@ std::unique_ptr<World> MakeEvacWorld(const SuiteWorld& world, const Suite& suite
   const int threads = Threads(suite);
   const ImaginerOptions options =
       OptionsOf(evac, static_cast<int>(config.image_height_px), evac.all_threads_per_scene ? threads : 1);
+  nn::KeepFreedMemory();
   return std::make_unique<EvacWorld>(Imaginer(Load(evac, config), options), FirstSceneOf(suite, store, world.name),
                                      EvacWorldOptions{world.name, threads, evac.all_threads_per_scene});
 }

@@ -15,6 +15,7 @@
 #include "worldmodel/frame_memory.h"
 #include "worldmodel/imaginer.h"
 #include "worldmodel/nn/library.h"
+#include "worldmodel/nn/memory.h"
 #include "worldmodel/nn/threads.h"
 #include "worldmodel/nn/weights.h"
 
@@ -165,6 +166,7 @@ ExitCode ImagineFrames(ImagineArguments arguments) {
   FillIn(arguments.sampler, config);
   ImaginerOptions options = OptionsOf(arguments, config);
   const ImagineStart start = ReadImagineStart(arguments.inputs, static_cast<std::size_t>(config.views));
+  nn::KeepFreedMemory();
   const nn::LibraryThreads threads(arguments.sampler.threads);
   auto model = std::make_unique<const nn::EvacModel>(Load(arguments, config));
 

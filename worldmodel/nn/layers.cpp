@@ -18,6 +18,16 @@ Tensor ForProduct(const ProductType& product, const Tensor& weight) {
   return product && weight.defined() ? weight.to(*product) : weight;
 }
 
+/// x weightᵀ + bias as a convolution of one pixel: libtorch hands convolutions to oneDNN, whose products are faster
+/// here than those of the BLAS that at::linear calls (docs/performance.md).
+Tensor AsConvolution(const Tensor& x, const Tensor& weight, const Tensor& bias) {
+  const std::int64_t in = weight.size(1), out = weight.size(0), rows = x.numel() / in;
+  const Tensor pixels = x.view({1, rows, 1, in}).permute({0, 3, 1, 2});  // channels last, as x lies
+  std::vector<std::int64_t> shape = x.sizes().vec();
+  shape.back() = out;
+  return at::conv2d(pixels, weight.view({out, in, 1, 1}), bias).permute({0, 2, 3, 1}).contiguous().view(shape);
+}
+
 /// What training needs: differentiable, exact for pictures of one colour too.
 Tensor DifferentiableGroupNorm(const Tensor& x, const GroupNorm& norm, double epsilon) {
   const Tensor channels_second = x.reshape({x.size(0), -1, x.size(-1)}).transpose(1, 2).contiguous();
@@ -50,8 +60,12 @@ Linear Linear::Pointwise(const Scope& at, std::int64_t in, std::int64_t out, std
 }
 
 Tensor Linear::operator()(const Tensor& x) const {
-  const Tensor factor = ForProduct(product_, weight.dim() > 2 ? weight.flatten(1) : weight);
-  return at::linear(InTypeOf(factor, x), factor, ForProduct(product_, bias)).to(x.scalar_type());
+  constexpr std::int64_t kManyRows = 512;
+  const Tensor matrix = ForProduct(product_, weight.dim() > 2 ? weight.flatten(1) : weight);
+  const Tensor addend = ForProduct(product_, bias);
+  if (CanUseKernels(x) && matrix.scalar_type() == at::kFloat && x.numel() >= kManyRows * x.size(-1))
+    return AsConvolution(x, matrix, addend);
+  return at::linear(InTypeOf(matrix, x), matrix, addend).to(x.scalar_type());
 }
 
 Conv2d::Conv2d(const Scope& at, std::int64_t in, std::int64_t out, const Options& options)

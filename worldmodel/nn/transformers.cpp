@@ -2,6 +2,8 @@
 
 #include <ATen/record_function.h>
 
+#include <algorithm>
+
 #include "worldmodel/nn/attention.h"
 #include "worldmodel/nn/kernels.h"
 
@@ -27,23 +29,34 @@ Tensor ViewsApart(const Tensor& tokens, at::IntArrayRef picture, const FrameLayo
       .reshape(picture);
 }
 
+/// The first half of the channels, weighted by the second.
+Tensor Gated(const Tensor& both) {
+  RECORD_FUNCTION("evac::gated_gelu", {});
+  const std::int64_t half = both.size(-1) / 2;
+  Tensor gated = at::empty({both.size(0), half}, both.options());
+  kernels::GatedGelu(both.size(0), half, both.data_ptr<float>(), gated.data_ptr<float>());
+  return gated;
+}
+
 }  // namespace
 
 FeedForward::FeedForward(const Scope& at, std::int64_t channels)
     : in_(at / "net" / "0" / "proj", channels, 8 * channels), out_(at / "net" / "2", 4 * channels, channels) {}
 
 Tensor FeedForward::operator()(const Tensor& x) const {
-  const Tensor both = in_(x);
-  RECORD_FUNCTION("evac::gated_gelu", {});
-  const std::int64_t half = both.size(-1) / 2;
-  if (CanUseKernels(both)) {
-    std::vector<std::int64_t> shape = both.sizes().vec();
-    shape.back() = half;
-    Tensor gated = at::empty(shape, both.options());
-    kernels::GatedGelu(both.numel() / (2 * half), half, both.data_ptr<float>(), gated.data_ptr<float>());
-    return out_(gated);
+  if (!CanUseKernels(x)) {
+    const Tensor both = in_(x);
+    const std::int64_t half = both.size(-1) / 2;
+    return out_(both.narrow(-1, 0, half) * at::gelu(both.narrow(-1, half, half)));
   }
-  return out_(both.narrow(-1, 0, half) * at::gelu(both.narrow(-1, half, half)));
+  constexpr std::int64_t kRows = 4096;  // at a time: what lies between the products is eight times as wide as x
+  const Tensor rows = x.view({-1, x.size(-1)});
+  Tensor y = at::empty(rows.sizes(), rows.options());
+  for (std::int64_t from = 0; from < rows.size(0); from += kRows) {
+    const std::int64_t count = std::min(kRows, rows.size(0) - from);
+    y.narrow(0, from, count).copy_(out_(Gated(in_(rows.narrow(0, from, count)))));
+  }
+  return y.view(x.sizes());
 }
 
 AttentionLayer::AttentionLayer(const Scope& at, std::int64_t channels, std::int64_t context_dim)
