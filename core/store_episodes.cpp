@@ -94,6 +94,7 @@ std::optional<Episode> SelectEpisode(sqlite::Connection& connection, const std::
 
 void VisitEnded(sqlite::Connection& connection, const std::string& judge,
                 const std::function<void(const EndedEpisode&)>& see) {
+  connection.Run("PRAGMA cache_size = -131072");  // 128 MiB while it lasts: verdicts lie in another order than episodes
   auto row = connection.Query(
       "SELECT task, initial_state, policy, checkpoint, world, failed, "
       "(SELECT label FROM verdicts WHERE judge = ? AND episode = episodes.id ORDER BY id DESC LIMIT 1) FROM episodes",
@@ -102,6 +103,7 @@ void VisitEnded(sqlite::Connection& connection, const std::string& judge,
     see({row.View(0), row.View(1), row.View(2), row.View(3), row.View(4), row.Integer(5) != 0,
          row.IsNull(6) ? std::nullopt : std::optional(LabelFromName(row.Text(6)))});
   }
+  connection.Run("PRAGMA cache_size = -2000");  // SQLite's own
 }
 
 void SelectSteps(sqlite::Connection& connection, Episode& episode) {

@@ -21,9 +21,9 @@ namespace fs = std::filesystem;
 /// Names become file names and parts of messages' channels.
 std::string NameField(const Config& page, const std::string& key) {
   const std::string name = page.Get<std::string>(key);
-  const bool good = !name.empty() && name.size() <= 64 && name.front() != '.' && std::all_of(name.begin(), name.end(), [](unsigned char c) {
-    return std::isalnum(c) || c == '_' || c == '-' || c == '.';
-  });
+  const bool good = !name.empty() && name.size() <= 64 && name.front() != '.' &&
+                    std::all_of(name.begin(), name.end(),
+                                [](unsigned char c) { return std::isalnum(c) || c == '_' || c == '-' || c == '.'; });
   page.Require(good, key, "1 … 64 letters, digits, '_', '-' and '.', not beginning with '.'");
   return name;
 }
@@ -31,8 +31,8 @@ std::string NameField(const Config& page, const std::string& key) {
 /// Fields that only some types have: a page that names one of another type is wrong.
 void AllowOnlyFieldsOf(const std::string& type, const Config& page) {
   if (type == "evac") {
-    return page.AllowOnly({"name", "type", "role", "weights", "config", "statistics", "solver", "steps", "eta", "cfg", "cfg_rescale", "period_s",
-                           "pose_map", "threads_per_scene", "quirks", "cache"});
+    return page.AllowOnly({"name", "type", "role", "weights", "config", "statistics", "solver", "steps", "eta", "cfg",
+                           "cfg_rescale", "period_s", "pose_map", "threads_per_scene", "quirks", "cache"});
   }
   page.AllowOnly({"name", "type", "role", "profile"});
 }
@@ -44,7 +44,8 @@ SuiteWorld ReadWorld(const Config& page) {
   world.type = page.Get<std::string>("type");
   page.Require(world.type == "mujoco" || world.type == "echo" || world.type == "evac", "type", "mujoco, echo or evac");
   const std::string role = page.Get<std::string>("role", "evaluated");
-  if (page.Has("role")) page.Require(role == "real" || role == "evaluated", "role", "real (the reference) or evaluated");
+  if (page.Has("role"))
+    page.Require(role == "real" || role == "evaluated", "role", "real (the reference) or evaluated");
   world.is_real = role == "real";
   page.Require(!world.is_real || world.type != "evac", "role", "evaluated: what is imagined is no reference");
   if (world.type == "mujoco") world.profile = page.Path("profile");
@@ -58,7 +59,8 @@ SuitePolicy ReadPolicy(const Config& page) {
   SuitePolicy policy;
   policy.name = NameField(page, "name");
   policy.checkpoint = page.Has("checkpoint") ? NameField(page, "checkpoint") : "default";
-  page.Require(page.Has("command") != page.Has("join"), "command", "either a command line (a list) or `join: {url, token}`");
+  page.Require(page.Has("command") != page.Has("join"), "command",
+               "either a command line (a list) or `join: {url, token}`");
   if (page.Has("join")) {
     const Config join = page.Section("join");
     join.AllowOnly({"url", "token"});
@@ -78,7 +80,8 @@ std::vector<InitialState> ReadInitialStates(const Config& suite) {
   const int count = page.Get<int>("count");
   page.Require(count >= 1 && count <= 9999, "count", "1 … 9999 initial states per task");
   std::vector<InitialState> states;
-  for (int i = 0; i < count; ++i) states.push_back({fmt::format("{}-{:04d}", seed, i), SeedFor(SeedFor(seed, "initial state"), i)});
+  for (int i = 0; i < count; ++i)
+    states.push_back({fmt::format("{}-{:04d}", seed, i), SeedFor(SeedFor(seed, "initial state"), i)});
   return states;
 }
 
@@ -149,18 +152,20 @@ VideoOptions ReadVideo(const Config& suite) {
   video.crf = page.Get<int>("crf", video.crf);
   video.preset = page.Get<std::string>("preset", video.preset);
   video.scale = page.Get<int>("scale", video.scale);
-  page.Require(std::find(std::begin(kVideoPresets), std::end(kVideoPresets), video.preset) != std::end(kVideoPresets), "preset",
-               fmt::format("one of {}", fmt::join(kVideoPresets, ", ")));
+  page.Require(std::find(std::begin(kVideoPresets), std::end(kVideoPresets), video.preset) != std::end(kVideoPresets),
+               "preset", fmt::format("one of {}", fmt::join(kVideoPresets, ", ")));
   page.Require(video.crf >= 0 && video.crf <= 51, "crf", "0 (lossless) … 51");
   page.Require(video.scale >= 1 && video.scale <= 16, "scale", "1 … 16");
   return video;
 }
 
 template <typename Item, typename NameOf>
-void RequireDistinct(const std::vector<Item>& items, const Config& suite, const std::string& field, const NameOf& name_of) {
+void RequireDistinct(const std::vector<Item>& items, const Config& suite, const std::string& field,
+                     const NameOf& name_of) {
   std::set<std::string> names;
   for (const Item& item : items) {
-    if (!names.insert(name_of(item)).second) throw InvalidInput("{}: '{}' is there twice, wanted distinct names", suite.Where(field), name_of(item));
+    if (!names.insert(name_of(item)).second)
+      throw InvalidInput("{}: '{}' is there twice, wanted distinct names", suite.Where(field), name_of(item));
   }
 }
 
@@ -174,22 +179,27 @@ void CheckWhole(const Suite& suite, const Config& page) {
   page.Require(suite.recording.has_value() != !suite.tasks.empty(), "tasks", "either task pages or a `recording`");
   RequireDistinct(suite.worlds, page, "worlds", [](const SuiteWorld& world) { return world.name; });
   RequireDistinct(suite.tasks, page, "tasks", [](const Task& task) { return task.id; });
-  RequireDistinct(suite.policies, page, "policies", [](const SuitePolicy& policy) { return policy.name + "@" + policy.checkpoint; });
-  const auto reals = std::count_if(suite.worlds.begin(), suite.worlds.end(), [](const SuiteWorld& world) { return world.is_real; });
+  RequireDistinct(suite.policies, page, "policies",
+                  [](const SuitePolicy& policy) { return policy.name + "@" + policy.checkpoint; });
+  const auto reals =
+      std::count_if(suite.worlds.begin(), suite.worlds.end(), [](const SuiteWorld& world) { return world.is_real; });
   page.Require(reals <= 1, "worlds", "at most one world with role: real");
   for (const SuiteWorld& world : suite.worlds) {
     if (world.type == "evac") {
-      page.Require(suite.recording.has_value() || reals == 1, "worlds",
-                   "beside an evac world one with role: real, or a `recording`: imagined episodes start from its first frames");
+      page.Require(
+          suite.recording.has_value() || reals == 1, "worlds",
+          "beside an evac world one with role: real, or a `recording`: imagined episodes start from its first frames");
       continue;
     }
-    page.Require((world.type == "echo") == suite.recording.has_value(), "worlds", "echo worlds with a `recording`, mujoco worlds with task pages");
+    page.Require((world.type == "echo") == suite.recording.has_value(), "worlds",
+                 "echo worlds with a `recording`, mujoco worlds with task pages");
   }
 }
 
 Suite Build(const Config& page) {
-  page.AllowOnly({"suite", "description", "recording", "worlds", "tasks", "policies", "seeds", "initial_states", "chunk_size", "lanes", "threads",
-                  "error_budget", "image", "still", "judges", "video", "transport", "policy"});
+  page.AllowOnly({"suite", "description", "recording", "worlds", "tasks", "policies", "seeds", "initial_states",
+                  "chunk_size", "lanes", "threads", "error_budget", "image", "still", "judges", "video", "transport",
+                  "policy"});
   Suite suite;
   suite.name = NameField(page, "suite");
   suite.path = page.file();
@@ -217,23 +227,30 @@ Suite Build(const Config& page) {
   return suite;
 }
 
+std::string FromWorkingDirectory(const std::string& path) { return fs::absolute(path).lexically_normal().string(); }
+
 /// A path given on the command line is relative to where the user stands; one in the file to the file.
-std::string FromWorkingDirectory(const std::string& assignment) {
+std::string WithPathsFromHere(const std::string& assignment) {
   const std::size_t equals = assignment.find('=');
-  if (equals == std::string::npos) return assignment;
+  if (equals == std::string::npos || equals + 1 == assignment.size()) return assignment;
   const std::string field = assignment.substr(0, equals), value = assignment.substr(equals + 1);
   const std::string last = field.substr(field.rfind('.') + 1);
-  const bool is_path = last == "recording" || last == "profile" || last == "weights" || last == "config" || last == "statistics" ||
-                       last == "folder" || field.starts_with("tasks.");
-  if (!is_path || value.empty() || fs::path(value).is_absolute()) return assignment;
-  return field + "=" + fs::absolute(value).lexically_normal().string();
+  if (field == "tasks" && value.starts_with('[')) {
+    std::vector<std::string> tasks =
+        Config::FromText("tasks: " + value, "--set " + assignment).Get<std::vector<std::string>>("tasks");
+    for (std::string& task : tasks) task = FromWorkingDirectory(task);
+    return fmt::format("tasks=[\"{}\"]", fmt::join(tasks, "\", \""));
+  }
+  const bool is_path = last == "recording" || last == "profile" || last == "weights" || last == "config" ||
+                       last == "statistics" || last == "folder" || field.starts_with("tasks.");
+  return is_path ? field + "=" + FromWorkingDirectory(value) : assignment;
 }
 
 }  // namespace
 
 Suite ReadSuite(const fs::path& path, const std::vector<std::string>& assignments) {
   Config page = Config::FromFile(path);
-  for (const std::string& assignment : assignments) page.Set(FromWorkingDirectory(assignment));
+  for (const std::string& assignment : assignments) page.Set(WithPathsFromHere(assignment));
   return Build(page);
 }
 

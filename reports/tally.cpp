@@ -19,8 +19,7 @@ struct Counted {
 };
 using Cells = std::map<CellKey, Counted, std::less<>>;
 
-Counted& CellOf(const EndedEpisode& ended, Cells& cells) {
-  const CellView key(ended.task, ended.policy, ended.checkpoint, ended.world);
+Counted& CellOf(const CellView& key, Cells& cells) {
   const auto found = cells.find(key);
   return found != cells.end() ? found->second : cells[CellKey(key)];
 }
@@ -37,7 +36,16 @@ void CountOne(const EndedEpisode& ended, Counted& cell) {
 
 Cells CountAll(const Store& store, const std::string& judge) {
   Cells cells;
-  store.ForEachEnded(judge, [&](const EndedEpisode& ended) { CountOne(ended, CellOf(ended, cells)); });
+  Counted* cell = nullptr;  // episodes come a cell at a time, nearly
+  CellKey key;
+  store.ForEachEnded(judge, [&](const EndedEpisode& ended) {
+    const CellView its(ended.task, ended.policy, ended.checkpoint, ended.world);
+    if (!cell || its != CellView(key)) {
+      cell = &CellOf(its, cells);
+      key = CellKey(its);
+    }
+    CountOne(ended, *cell);
+  });
   return cells;
 }
 

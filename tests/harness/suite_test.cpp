@@ -109,6 +109,11 @@ TEST_F(SuiteTest, PathsInSetAreRelativeToTheWorkingDirectory) {
   const auto path = Write("suite.yaml", kSuite);
   const auto relative = std::filesystem::relative(folder_ / "rec");
   EXPECT_EQ(ReadSuite(path, {"recording=" + relative.string()}).recording, (folder_ / "rec").lexically_normal());
+  const std::filesystem::path source = EVAC_SOURCE_DIR;
+  const auto page = std::filesystem::relative(source / "worldmodel/sim/scenes/take_ham.yaml");
+  const Suite suite = ReadSuite(source / "apps/configs/demo.yaml", {"tasks=[" + page.string() + "]"});
+  ASSERT_EQ(suite.tasks.size(), 1u);
+  EXPECT_EQ(suite.tasks[0].id, "take_ham");
 }
 
 TEST_F(SuiteTest, TheStoredTextReadsAsTheSameSuite) {
