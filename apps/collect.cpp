@@ -3,14 +3,13 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <chrono>
 #include <map>
+#include <memory>
 #include <mutex>
 #include <nlohmann/json.hpp>
-#include <thread>
 
 #include "apps/collect_episode.h"
-#include "apps/progress_display.h"
+#include "apps/work_share.h"
 #include "core/error.h"
 #include "core/file.h"
 #include "judges/attempt.h"
@@ -40,73 +39,28 @@ void Claim(const CollectArguments& arguments, const Recipe& recipe) {
   }
 }
 
-/// "412 of 3000 episodes, 96 a minute, 26 min 57 s left", every few seconds.
-class CollectProgress {
- public:
-  CollectProgress(std::int64_t total, std::int64_t before) : total_(total), before_(before), done_(before) {}
-
-  void Count() {
-    ++done_;
-    const auto now = Clock::now();
-    if (now - shown_ < std::chrono::seconds(5) && done_ < total_) return;
-    shown_ = now;
-    const double spent_s = std::chrono::duration<double>(now - started_).count();
-    const double rate = static_cast<double>(done_ - before_) / std::max(1e-9, spent_s);
-    std::fputs(fmt::format("{} of {} episodes, {:.0f} a minute, {} left\n", done_, total_, 60 * rate,
-                           Duration(static_cast<double>(total_ - done_) / rate))
-                   .c_str(),
-               stderr);
-  }
-
- private:
-  using Clock = std::chrono::steady_clock;
-  std::int64_t total_, before_, done_;
-  Clock::time_point started_ = Clock::now(), shown_ = started_;
-};
-
-/// The jobs still to do, shared out among threads that each have a world.
-class Team {
- public:
-  Team(const CollectArguments& arguments, const Recipe& recipe, std::vector<std::int64_t> todo)
-      : arguments_(arguments),
-        recipe_(recipe),
-        todo_(std::move(todo)),
-        progress_(recipe.episodes, recipe.episodes - static_cast<std::int64_t>(todo_.size())) {}
-
-  void Work(int threads) {
-    std::vector<std::thread> team;
-    for (int i = 0; i < threads; ++i) team.emplace_back([this] { WorkAlone(); });
-    for (std::thread& one : team) one.join();
-    if (error_) std::rethrow_exception(error_);
-  }
-
- private:
-  void WorkAlone() try {
-    EpisodeCollector collector(recipe_, arguments_.out);
-    while (const std::optional<std::int64_t> index = Next()) {
-      collector.Collect(JobAt(recipe_, arguments_.seed, *index));
-      const std::lock_guard lock(mutex_);
-      progress_.Count();
-    }
-  } catch (...) {
-    const std::lock_guard lock(mutex_);
-    if (!error_) error_ = std::current_exception();
-  }
-
-  std::optional<std::int64_t> Next() {
-    const std::lock_guard lock(mutex_);
-    if (error_ || next_ == todo_.size()) return std::nullopt;
-    return todo_[next_++];
-  }
-
-  const CollectArguments& arguments_;
-  const Recipe& recipe_;
-  std::mutex mutex_;  ///< guards all below
-  std::vector<std::int64_t> todo_;
-  std::size_t next_ = 0;
-  CollectProgress progress_;
-  std::exception_ptr error_;
-};
+/// Collects what is still to do; each thread has a world of its own.
+void CollectAll(const CollectArguments& arguments, const Recipe& recipe, const std::vector<std::int64_t>& todo) {
+  const auto count = static_cast<std::int64_t>(todo.size());
+  CountProgress progress("episodes", recipe.episodes, recipe.episodes - count);
+  std::mutex mutex;
+  std::vector<std::unique_ptr<EpisodeCollector>> idle;  // guarded by mutex
+  const auto take = [&]() -> std::unique_ptr<EpisodeCollector> {
+    const std::lock_guard lock(mutex);
+    if (idle.empty()) return nullptr;
+    auto collector = std::move(idle.back());
+    idle.pop_back();
+    return collector;
+  };
+  const auto work = [&](std::int64_t i) {
+    std::unique_ptr<EpisodeCollector> collector = take();
+    if (!collector) collector = std::make_unique<EpisodeCollector>(recipe, arguments.out);
+    collector->Collect(JobAt(recipe, arguments.seed, todo[static_cast<std::size_t>(i)]));
+    const std::lock_guard lock(mutex);
+    idle.push_back(std::move(collector));
+  };
+  ShareOut(count, arguments.jobs, work, [&](std::int64_t) { progress.Count(); });
+}
 
 std::vector<CollectedEpisode> ReadRows(const CollectArguments& arguments, const Recipe& recipe) {
   std::vector<CollectedEpisode> rows;
@@ -178,9 +132,7 @@ void Collect(const CollectArguments& arguments) {
   for (std::int64_t index = 0; index < recipe.episodes; ++index) {
     if (!fs::exists(RowPath(PlaceOf(arguments.out, JobAt(recipe, arguments.seed, index).row)))) todo.push_back(index);
   }
-  const int cores = std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
-  const int threads = std::min(arguments.jobs > 0 ? arguments.jobs : cores, static_cast<int>(todo.size()));
-  Team(arguments, recipe, std::move(todo)).Work(threads);
+  CollectAll(arguments, recipe, todo);
   const std::vector<CollectedEpisode> rows = ReadRows(arguments, recipe);
   WriteManifest(arguments, recipe, rows);
   PrintFates(recipe, rows);

@@ -77,6 +77,13 @@ CollectTask ReadCollectTask(const Config& page) {
   return task;
 }
 
+void OverrideStillRule(const Config& page, Recipe& recipe) {
+  if (!page.Has("still")) return;
+  for (CollectTask& task : recipe.tasks) {
+    for (Task* one : {&task.task, &task.without}) one->still = ReadStillRule(page.Section("still"), one->still);
+  }
+}
+
 void ResizeCameras(const Config& page, Recipe& recipe) {
   if (!page.Has("image")) return;
   const Config image = page.Section("image");
@@ -157,7 +164,7 @@ Recipe ReadRecipe(const fs::path& path, const std::vector<std::string>& assignme
   Config page = Config::FromFile(path);
   for (const std::string& assignment : assignments) page.Set(assignment);
   page.AllowOnly({"recipe", "profile", "tasks", "mix", "episodes", "episodes_per_state", "chunk_size", "max_chunks",
-                  "image", "video"});
+                  "still", "image", "video"});
   Recipe recipe;
   recipe.name = page.Get<std::string>("recipe");
   recipe.profile = page.Path("profile");
@@ -166,6 +173,7 @@ Recipe ReadRecipe(const fs::path& path, const std::vector<std::string>& assignme
   page.Require(!recipe.tasks.empty(), "tasks", "at least one task");
   page.Require(!recipe.mix.empty(), "mix", "at least one behaviour");
   ReadNumbers(page, recipe);
+  OverrideStillRule(page, recipe);
   ResizeCameras(page, recipe);
   recipe.text = page.Text();
   recipe.hash = HashOf(page, recipe);

@@ -26,5 +26,6 @@ void AddImagine(CLI::App& app, ExitCode& exit_code);
 void AddTrain(CLI::App& app, ExitCode& exit_code);
 void AddEncode(CLI::App& app, ExitCode& exit_code);
 void AddCollect(CLI::App& app, ExitCode& exit_code);
+void AddPack(CLI::App& app, ExitCode& exit_code);
 
 }  // namespace evac

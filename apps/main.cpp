@@ -32,6 +32,7 @@ int main(int argc, char** argv) {
     evac::AddTrain(app, exit_code);
     evac::AddEncode(app, exit_code);
     evac::AddCollect(app, exit_code);
+    evac::AddPack(app, exit_code);
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
     return app.exit(error) == 0 ? 0 : static_cast<int>(evac::ExitCode::kInvalidInput);

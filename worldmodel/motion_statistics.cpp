@@ -1,0 +1,56 @@
+#include "worldmodel/motion_statistics.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "worldmodel/action_delta.h"
+
+namespace evac {
+namespace {
+
+constexpr double kLeast_m = 1e-5, kLeast_rad = 1e-4;  // per frame; below it a deviation is rounding
+
+std::string List(const std::array<double, 12>& values) {
+  std::string text;
+  for (const double value : values) text += fmt::format("{}{}", text.empty() ? "" : ", ", value);
+  return "[" + text + "]";
+}
+
+}  // namespace
+
+void MotionSums::Add(const std::vector<Arms>& track) {
+  for (std::size_t step = 1; step < track.size(); ++step) {
+    const ActionDelta delta = DeltaBetween(GrippersOf(track[step - 1]), GrippersOf(track[step]));
+    for (std::size_t i = 0; i < 12; ++i) {
+      const double value = delta[i / 6 * 7 + i % 6];
+      sum_[i] += value;
+      squares_[i] += value * value;
+    }
+    steps_ += 1;
+  }
+}
+
+ActionStatistics MotionSums::Statistics(const std::string& robot, double delta_frames) const {
+  ActionStatistics statistics;
+  statistics.robot = robot;
+  for (std::size_t i = 0; i < 12; ++i) {
+    const double mean = steps_ > 0 ? sum_[i] / steps_ : 0;
+    const double variance = steps_ > 0 ? squares_[i] / steps_ - mean * mean : 0;
+    const bool moves = squares_[i] > 0;
+    const double least = i % 6 < 3 ? kLeast_m : kLeast_rad;
+    statistics.mean[i] = mean / delta_frames;
+    statistics.deviation[i] = moves ? std::max(least, std::sqrt(std::max(0.0, variance)) / delta_frames) : 1;
+  }
+  return statistics;
+}
+
+std::string StatisticsPage(const ActionStatistics& statistics) {
+  return fmt::format(
+      "# Motion per frame of 30 Hz: left x, y, z (metres), roll, pitch, yaw (radians), then right. An arm that never "
+      "moved: 0 and 1.\nrobot: {}\nmean: {}\ndeviation: {}\n",
+      statistics.robot, List(statistics.mean), List(statistics.deviation));
+}
+
+}  // namespace evac

@@ -1,0 +1,31 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "core/types.h"
+#include "worldmodel/action_statistics.h"
+
+namespace evac {
+
+/// Sums over many recordings from which a robot's ActionStatistics come. Adding recordings in the same order gives the
+/// same bits.
+class MotionSums {
+ public:
+  void Add(const std::vector<Arms>& track);
+
+  /// Mean and deviation per frame of 30 Hz, as the network's deltas are normalised (spec 1.3): a step's mean and
+  /// deviation, divided by `delta_frames`. An arm that never moves has mean 0 and deviation 1; no deviation is below
+  /// 10 micrometres or .0001 rad a frame.
+  /// @param delta_frames  frames of 30 Hz that one step spans
+  ActionStatistics Statistics(const std::string& robot, double delta_frames) const;
+
+ private:
+  double steps_ = 0;
+  std::array<double, 12> sum_{}, squares_{};
+};
+
+/// A page as ReadActionStatistics reads it; every number comes back to the last bit.
+std::string StatisticsPage(const ActionStatistics& statistics);
+
+}  // namespace evac
