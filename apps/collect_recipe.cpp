@@ -125,7 +125,8 @@ void ReadNumbers(const Config& page, Recipe& recipe) {
   if (!page.Has("video")) return;
   const Config video = page.Section("video");
   video.AllowOnly({"crf", "scale"});
-  recipe.video = {video.Get<int>("crf", recipe.video.crf), video.Get<int>("scale", recipe.video.scale)};
+  recipe.video.crf = video.Get<int>("crf", recipe.video.crf);
+  recipe.video.scale = video.Get<int>("scale", recipe.video.scale);
   video.Require(recipe.video.crf >= 0 && recipe.video.crf <= 51, "crf", "0 … 51");
   video.Require(recipe.video.scale >= 1 && recipe.video.scale <= 8, "scale", "1 … 8");
 }

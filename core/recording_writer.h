@@ -31,8 +31,9 @@ struct RecordedEpisode {
 /// How the pictures become videos. H.264 in yuv420p halves the colour's resolution, which small pictures do not bear:
 /// drawn twice as large (`scale` 2, each pixel 2x2) every pixel keeps its own colour, and a mean over 2x2 gives it back.
 struct RecordingVideo {
-  int crf = 8;
+  int crf = 10;
   int scale = 2;
+  std::string preset = "superfast";  ///< of x264: pictures with a sensor's noise gain nothing from a slower one
 };
 
 /// Writes the episode's videos, camera pages (in pixels of the videos, a pose per step) and proprio_stats.h5; each file
