@@ -2,13 +2,12 @@
 
 #include <fmt/format.h>
 
-#include <atomic>
-#include <csignal>
 #include <cstdio>
 #include <memory>
 #include <set>
 
 #include "apps/factory.h"
+#include "apps/interrupts.h"
 #include "apps/progress_display.h"
 #include "core/seed.h"
 #include "harness/rollout.h"
@@ -20,37 +19,11 @@
 namespace evac {
 namespace {
 
-/// Set by a signal handler, which may run in any thread.
-std::atomic<bool> g_interrupted = false;
-static_assert(std::atomic<bool>::is_always_lock_free);
-
-constexpr int kInterrupts[] = {SIGINT, SIGTERM, SIGHUP};  ///< Ctrl-C, kill, the terminal is closed
-
-/// While it lives, the first Ctrl-C ends the run in order, the second at once. A closed terminal says so more than once
-/// (the kernel and the shell): that stays one.
-class CatchInterrupts {
- public:
-  CatchInterrupts() {
-    g_interrupted = false;
-    for (const int signal : kInterrupts) {
-      std::signal(signal, [](int caught) {
-        g_interrupted = true;
-        if (caught != SIGHUP) std::signal(caught, SIG_DFL);
-      });
-    }
-  }
-  ~CatchInterrupts() {
-    for (const int signal : kInterrupts) std::signal(signal, SIG_DFL);
-  }
-};
-
 /// On stderr, which may be a terminal that is closed by now.
 template <typename... Args>
 void Tell(fmt::format_string<Args...> format, Args&&... args) {
   std::fputs(fmt::format(format, std::forward<Args>(args)...).c_str(), stderr);
 }
-
-bool IsInterrupted() { return g_interrupted; }
 
 /// "12 repeats, 3 late_replies", or nothing where the wire was quiet.
 std::string Sentence(const Counters& counters) {

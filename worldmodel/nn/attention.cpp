@@ -5,10 +5,13 @@
 #include <cmath>
 
 #include "worldmodel/nn/attention_kernel.h"
+#include "worldmodel/nn/differentiable.h"
 #include "worldmodel/nn/kernels.h"
 
 namespace evac::nn {
 namespace {
+
+constexpr std::int64_t kSmallScores = 1 << 14;
 
 /// [N, L, C] → [N, heads, L, C / heads]
 Tensor SplitHeads(const Tensor& x, std::int64_t heads) {
@@ -19,6 +22,11 @@ Tensor SplitHeads(const Tensor& x, std::int64_t heads) {
 bool CanBeTiled(const Tensor& x) {
   return !at::GradMode::is_enabled() && x.is_cpu() && x.scalar_type() == at::kFloat && x.stride(2) == 1 &&
          (x.size(0) == 1 || x.stride(0) == x.size(1) * x.stride(1));
+}
+
+/// Whether one head's scores fit into the nearest cache: then they are worked on there.
+bool IsSmall(const Tensor& q, const Tensor& k) {
+  return HasFastGradient(q) && q.size(1) * k.size(1) <= kSmallScores;
 }
 
 kernels::TokenRows RowsOf(const Tensor& x) { return {x.data_ptr<float>(), x.stride(1)}; }
@@ -34,7 +42,10 @@ Tensor PlainAttention(const Tensor& q, const Tensor& k, const Tensor& v, std::in
 
 Tensor Attention(const Tensor& q, const Tensor& k, const Tensor& v, std::int64_t heads) {
   RECORD_FUNCTION("evac::attention", (std::vector<c10::IValue>{q, k, v}));  // for profiles: costs nothing otherwise
-  if (!CanBeTiled(q) || !CanBeTiled(k) || !CanBeTiled(v)) return PlainAttention(q, k, v, heads);
+  if (!CanBeTiled(q) || !CanBeTiled(k) || !CanBeTiled(v)) {
+    if (!IsSmall(q, k)) return PlainAttention(q, k, v, heads);
+    return FastAttention(q.unsqueeze(2), k.unsqueeze(2), v.unsqueeze(2), heads).squeeze(2);
+  }
   Tensor y = at::empty(q.sizes(), q.options());
   const kernels::AttentionShape shape{q.size(0), q.size(1), k.size(1), heads, q.size(2) / heads};
   kernels::TiledAttention(shape, RowsOf(q), RowsOf(k), RowsOf(v), y.data_ptr<float>());
@@ -50,6 +61,7 @@ Tensor TemporalAttention(const Tensor& q, const Tensor& k, const Tensor& v, std:
                                y.data_ptr<float>());
     return y;
   }
+  if (HasFastGradient(q)) return FastAttention(q, k, v, heads);
   const auto by_pixel = [&](const Tensor& x) { return x.transpose(1, 2).reshape({n * l, t, c}); };
   const Tensor y = PlainAttention(by_pixel(q), by_pixel(k), by_pixel(v), heads);
   return y.reshape({n, l, t, c}).transpose(1, 2).contiguous();

@@ -1,45 +1,16 @@
 #include "worldmodel/nn/kernels.h"
 
 #include <algorithm>
-#include <bit>
 #include <cmath>
 #include <vector>
 
+#include "worldmodel/nn/float_math.h"
 #include "worldmodel/nn/processors.h"
 
 namespace evac::nn::kernels {
 namespace {
 
 constexpr std::int64_t kBlockRows = 256;  // sums of so many rows are kept in float, those of blocks in double
-
-/// e^x to 2e-7, for x <= 88; below -87 it is 0 for all that is done with it.
-inline float Exponential(float x) {
-  const float bounded = std::max(x, -87.0F);
-  const float shifted = bounded * 1.44269504F + 12582912.0F;  // rounds to a whole number in the low bits
-  const float whole = shifted - 12582912.0F;
-  const float rest = (bounded - whole * 0.693359375F) + whole * 2.12194440e-4F;
-  float power = 1.9875691500e-4F;
-  power = power * rest + 1.3981999507e-3F;
-  power = power * rest + 8.3334519073e-3F;
-  power = power * rest + 4.1665795894e-2F;
-  power = power * rest + 1.6666665459e-1F;
-  power = power * rest + 5.0000001201e-1F;
-  power = power * rest * rest + rest + 1.0F;
-  return power * std::bit_cast<float>((static_cast<std::int32_t>(whole) + 127) << 23);
-}
-
-/// Error function to 1.5e-7 (Abramowitz and Stegun 7.1.26).
-inline float ErrorFunction(float x) {
-  const float size = std::fabs(x);
-  const float t = 1.0F / (1.0F + 0.3275911F * size);
-  float polynomial = 1.061405429F;
-  polynomial = polynomial * t - 1.453152027F;
-  polynomial = polynomial * t + 1.421413741F;
-  polynomial = polynomial * t - 0.284496736F;
-  polynomial = polynomial * t + 0.254829592F;
-  const float value = 1.0F - polynomial * t * Exponential(-size * size);
-  return x < 0 ? -value : value;
-}
 
 /// Sums over some rows, per channel, of x - shift or of its square.
 EVAC_EACH_PROCESSOR void SumRows(std::int64_t rows, std::int64_t channels, const float* x, float* sums) {

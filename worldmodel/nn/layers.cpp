@@ -2,6 +2,7 @@
 
 #include <ATen/record_function.h>
 
+#include "worldmodel/nn/differentiable.h"
 #include "worldmodel/nn/kernels.h"
 
 namespace evac::nn {
@@ -88,8 +89,7 @@ CausalConv::CausalConv(const Scope& at, std::int64_t channels)
 
 Tensor CausalConv::operator()(const Tensor& x) const {
   const Tensor kernel = ForProduct(product_, weight.flatten(3));  // (3, 1)
-  const Tensor in = InTypeOf(kernel, x), first = in.narrow(1, 0, 1);
-  const Tensor padded = at::cat({first, first, in}, 1);  // [N, T + 2, L, C]
+  const Tensor padded = FastCausalPad(InTypeOf(kernel, x));       // [N, T + 2, L, C]
   const Tensor y = at::conv2d(padded.permute({0, 3, 1, 2}), kernel, ForProduct(product_, bias));
   return y.permute({0, 2, 3, 1}).contiguous().to(x.scalar_type());
 }
@@ -101,6 +101,7 @@ Tensor GroupNorm::operator()(const Tensor& x, Activation activation) const {
   RECORD_FUNCTION("evac::group_norm", {});
   const bool silu = activation == Activation::kSilu;
   if (!CanUseKernels(x)) {
+    if (HasFastGradient(x)) return FastGroupNorm(x, weight, bias, {kGroups, epsilon_, silu});
     const Tensor y = DifferentiableGroupNorm(x, *this, epsilon_);
     return silu ? at::silu(y) : y;
   }
@@ -116,6 +117,7 @@ LayerNorm::LayerNorm(const Scope& at, std::int64_t channels)
     : weight(Precise(at.Take("weight", {channels}))), bias(Precise(at.Take("bias", {channels}))) {}
 
 Tensor LayerNorm::operator()(const Tensor& x) const {
+  if (x.scalar_type() == at::kBFloat16 && HasFastGradient(x)) return FastLayerNorm(x, weight, bias, kLayerNormEpsilon);
   return at::layer_norm(x, weight.sizes(), weight, bias, kLayerNormEpsilon);
 }
 

@@ -5,6 +5,7 @@
 #include <algorithm>
 
 #include "worldmodel/nn/attention.h"
+#include "worldmodel/nn/differentiable.h"
 #include "worldmodel/nn/kernels.h"
 
 namespace evac::nn {
@@ -47,7 +48,8 @@ Tensor FeedForward::operator()(const Tensor& x) const {
   if (!CanUseKernels(x)) {
     const Tensor both = in_(x);
     const std::int64_t half = both.size(-1) / 2;
-    return out_(both.narrow(-1, 0, half) * at::gelu(both.narrow(-1, half, half)));
+    if (HasFastGradient(both)) return out_(FastGatedGelu(both));
+  return out_(both.narrow(-1, 0, half) * at::gelu(both.narrow(-1, half, half)));
   }
   constexpr std::int64_t kRows = 4096;  // at a time: what lies between the products is eight times as wide as x
   const Tensor rows = x.view({-1, x.size(-1)});

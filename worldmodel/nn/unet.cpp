@@ -51,6 +51,7 @@ Tensor UNet::Resample::operator()(const Tensor& x) const { return conv(up ? Upsa
 
 UNet::UNet(const Scope& at, const UNetConfig& config)
     : config_(config),
+      product_(at.ProductType()),
       domain_embedding_(Precise(at.Take("domain_embedding.weight", {config.domains, 4 * config.model_channels}))),
       time_embed_(at / "time_embed", config.model_channels, 4 * config.model_channels),
       fps_embedding_(at / "fps_embedding", config.model_channels, 4 * config.model_channels),
@@ -133,8 +134,9 @@ PreparedContext UNet::Prepare(const Context& context) const {
   const std::int64_t images = config_.image_tokens, actions = config_.action_tokens, dim = config_.context_dim;
   CheckShape("context", context.tokens, {-1, images + actions, dim});
   const Tensor by_scene = context.tokens.reshape({-1, context.views, images + actions, dim});
-  const Tensor image = by_scene.narrow(2, 0, images).reshape({by_scene.size(0), context.views * images, dim});
-  const Tensor action = by_scene.select(1, 0).narrow(1, images, actions).contiguous();
+  const Tensor image =
+      InProductType(by_scene.narrow(2, 0, images).reshape({by_scene.size(0), context.views * images, dim}));
+  const Tensor action = InProductType(by_scene.select(1, 0).narrow(1, images, actions).contiguous());
   PreparedContext prepared;
   const auto prepare = [&](const Block& block) {
     for (const Layer& layer : block) {
@@ -151,6 +153,8 @@ PreparedContext UNet::Prepare(const Context& context) const {
                        domain_embedding_.index_select(0, context.domain.to(at::kLong));
   return prepared;
 }
+
+Tensor UNet::InProductType(const Tensor& x) const { return product_ ? x.to(*product_) : x; }
 
 Tensor UNet::Embedding(const Input& input, const Tensor& constant) const {
   const std::int64_t rows = input.x.size(0), frames = input.x.size(2);
@@ -184,9 +188,9 @@ Tensor UNet::operator()(const Input& input, const PreparedContext& context, cons
   CheckShape("diffusion steps", input.t, {input.x.size(0)});
   const std::int64_t frames = input.x.size(2);
   const Pass pass{
-      context, {input.x.size(0) / input.views, input.views, frames}, Embedding(input, context.embedding), observer};
+      context, {input.x.size(0) / input.views, input.views, frames}, InProductType(Embedding(input, context.embedding)), observer};
   std::vector<Tensor> skips;
-  Tensor h = ToRows(input.x);
+  Tensor h = InProductType(ToRows(input.x));
   for (std::size_t i = 0; i < input_blocks_.size(); ++i) {
     h = Run(input_blocks_[i], "input_blocks." + std::to_string(i), h, pass);
     if (i == 0) h = (*init_attention_)(h, pass.layout);
@@ -199,7 +203,7 @@ Tensor UNet::operator()(const Input& input, const PreparedContext& context, cons
     skips.pop_back();
     h = Run(output_blocks_[i], "output_blocks." + std::to_string(i), h, pass);
   }
-  return FromRows((*out_conv_)((*out_norm_)(h, Activation::kSilu)), frames);
+  return FromRows((*out_conv_)((*out_norm_)(h, Activation::kSilu)), frames).to(input.x.scalar_type());
 }
 
 }  // namespace evac::nn

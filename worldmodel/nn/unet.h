@@ -61,10 +61,12 @@ class UNet {
   void MakeOutput(const Scope& at);
   void AddTransformers(Block& block, const Scope& at, std::int64_t channels);
   bool HasAttention() const;
+  Tensor InProductType(const Tensor& x) const;
   Tensor Embedding(const Input& input, const Tensor& constant) const;
   Tensor Run(const Block& block, const std::string& name, const Tensor& x, const Pass& pass) const;
 
   UNetConfig config_;
+  ProductType product_;   ///< where it is not that of the weights, values between the layers are kept so too
   Tensor domain_embedding_;  ///< [domains, E]
   EmbeddingMlp time_embed_, fps_embedding_;
   std::vector<Block> input_blocks_;

@@ -24,6 +24,18 @@ FlatParameters::FlatParameters(std::vector<NamedTensor> parameters) : parameters
   std::vector<Tensor> parts;
   for (const NamedTensor& parameter : parameters_) parts.push_back(parameter.tensor.detach().flatten());
   values_ = at::cat(parts);
+  MakeWindows();
+}
+
+FlatParameters::FlatParameters(std::vector<NamedTensor> parameters, const FlatParameters& first)
+    : parameters_(std::move(parameters)), values_(first.values()) {
+  Check(parameters_);
+  if (Layout() != first.Layout()) throw TensorError("a replica of other parameters than those that are trained");
+  MakeWindows();
+}
+
+void FlatParameters::MakeWindows() {
+  const at::NoGradGuard no_gradients;
   gradients_ = at::zeros(values_.sizes(), values_.options());
   std::int64_t from = 0;
   for (NamedTensor& parameter : parameters_) {

@@ -21,6 +21,9 @@ class FlatParameters {
   /// @param parameters  floats, on one device; from now on they ask for gradients
   /// @throws TensorError naming a parameter that is not of floats, is named twice, or if there is none
   explicit FlatParameters(std::vector<NamedTensor> parameters);
+  /// A second set of the same names and shapes, which becomes windows into the first one's values and has gradients of
+  /// its own. @throws TensorError if they are others
+  FlatParameters(std::vector<NamedTensor> parameters, const FlatParameters& first);
 
   const Tensor& values() const { return values_; }        ///< [count]
   const Tensor& gradients() const { return gradients_; }  ///< [count]
@@ -32,6 +35,8 @@ class FlatParameters {
   std::vector<NamedTensor> Unflatten(const Tensor& flat) const;
 
  private:
+  void MakeWindows();
+
   std::vector<NamedTensor> parameters_;
   Tensor values_, gradients_;
 };

@@ -5,8 +5,10 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <future>
 #include <utility>
 
+#include "worldmodel/nn/threads.h"
 #include "worldmodel/train/csv_log.h"
 
 namespace evac::train {
@@ -81,14 +83,46 @@ Trainer::Trainer(std::vector<NamedTensor> parameters, const TrainerOptions& opti
   CsvLog::Trim(folder_ / "holdout.csv", "step,holdout", step_ + 1);
 }
 
+void Trainer::AddReplica(Replica replica) {
+  replicas_.push_back({FlatParameters(std::move(replica.parameters), parameters_), std::move(replica.loss)});
+}
+
+/// Every so-manieth part, one after the other; gradients are added up in the worker's own.
+double Trainer::LossOfParts(std::size_t worker, const TrainerCallbacks& callbacks, double done) const {
+  const auto& function = worker == 0 ? callbacks.loss : replicas_[worker - 1].loss;
+  const auto share = static_cast<double>(options_.accumulate);
+  double sum = 0;
+  for (auto part = static_cast<std::int64_t>(worker); part < options_.accumulate;
+       part += static_cast<std::int64_t>(replicas_.size()) + 1) {
+    const Tensor loss = function({options_.seed, step_, part, done});
+    (options_.accumulate > 1 ? loss / share : loss).backward();
+    sum += loss.item<double>() / share;
+  }
+  return sum;
+}
+
+double Trainer::LossOfStep(const TrainerCallbacks& callbacks) {
+  const double done = static_cast<double>(step_) / static_cast<double>(steps_);
+  std::vector<std::future<double>> others;
+  for (std::size_t worker = 1; worker <= replicas_.size(); ++worker) {
+    others.push_back(std::async(std::launch::async, [this, worker, done, &callbacks] {
+      nn::UseLibraryThreadsHere(1);
+      return LossOfParts(worker, callbacks, done);
+    }));
+  }
+  double loss = LossOfParts(0, callbacks, done);  // if it throws, the futures wait for the others
+  const at::NoGradGuard no_gradients;
+  for (std::size_t i = 0; i < others.size(); ++i) {
+    loss += others[i].get();
+    Tensor(state_.gradients).add_(replicas_[i].parameters.gradients());
+    Tensor(replicas_[i].parameters.gradients()).zero_();
+  }
+  return loss;
+}
+
 Trainer::StepOutcome Trainer::Step(const TrainerCallbacks& callbacks) {
   StepOutcome outcome;
-  const double done = static_cast<double>(step_) / static_cast<double>(steps_);
-  for (std::int64_t part = 0; part < options_.accumulate; ++part) {
-    const Tensor loss = callbacks.loss({options_.seed, step_, part, done});
-    (options_.accumulate > 1 ? loss / static_cast<double>(options_.accumulate) : loss).backward();
-    outcome.loss += loss.item<double>() / static_cast<double>(options_.accumulate);
-  }
+  outcome.loss = LossOfStep(callbacks);
   outcome.gradient_norm = Norm(state_.gradients);
   outcome.learning_rate = LearningRateAt(options_, step_, steps_);
   if (!std::isfinite(outcome.gradient_norm) || !std::isfinite(outcome.loss)) {

@@ -58,6 +58,12 @@ struct TrainerCallbacks {
   std::function<void(const TrainerProgress&)> on_progress = {};
 };
 
+/// A second copy of what is trained, for a thread of its own: parts of a step are computed side by side.
+struct Replica {
+  std::vector<NamedTensor> parameters;  ///< of the same names and shapes
+  std::function<Tensor(const StepPlace&)> loss;
+};
+
 struct TrainerSummary {
   std::int64_t step = 0, steps = 0;
   std::string why;  ///< "done", "interrupted", "no better for 5 hold-outs"
@@ -77,6 +83,10 @@ class Trainer {
   /// @throws TensorError for options that make no training, or if the folder holds another training's checkpoint
   Trainer(std::vector<NamedTensor> parameters, const TrainerOptions& options, std::filesystem::path folder);
 
+  /// From now on the parts of a step (`accumulate`) are shared out among the trainer's own loss and its replicas', each
+  /// in a thread that uses one core. The number of replicas decides in which order gradients are added up.
+  void AddReplica(Replica replica);
+
   /// Trains from the checkpoint's step, or from 0, to the end.
   /// @throws TensorError if the loss is not finite for 100 steps in a row
   TrainerSummary Run(const TrainerCallbacks& callbacks);
@@ -94,6 +104,8 @@ class Trainer {
   void Load();
   void Save() const;
   std::string Identity() const;
+  double LossOfParts(std::size_t worker, const TrainerCallbacks& callbacks, double done) const;
+  double LossOfStep(const TrainerCallbacks& callbacks);
   StepOutcome Step(const TrainerCallbacks& callbacks);
   void HoldOut(const TrainerCallbacks& callbacks);
   std::string WhyEnd(const TrainerCallbacks& callbacks) const;
@@ -103,7 +115,13 @@ class Trainer {
   const Tensor& Averaged() const { return state_.average.defined() ? state_.average : state_.values; }
   void With(const Tensor& weights, const std::function<void()>& function);
 
+  struct Worker {
+    FlatParameters parameters;
+    std::function<Tensor(const StepPlace&)> loss;
+  };
+
   FlatParameters parameters_;
+  std::vector<Worker> replicas_;
   TrainerOptions options_;
   std::filesystem::path folder_;
   AdamWState state_;

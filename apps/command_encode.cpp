@@ -1,0 +1,60 @@
+#include <fmt/format.h>
+
+#include <memory>
+#include <thread>
+
+#include "apps/commands.h"
+#include "core/hash.h"
+#include "worldmodel/evac_config.h"
+#include "worldmodel/nn/threads.h"
+#include "worldmodel/train/encode_shards.h"
+#include "worldmodel/train/weight_files.h"
+
+namespace evac {
+namespace {
+
+struct EncodeArguments {
+  std::string shards, config, codec;
+  int threads = 0;
+};
+
+ExitCode Encode(const EncodeArguments& arguments) {
+  const nn::ModelConfig config = ReadEvacConfig(arguments.config);
+  train::CheckpointWeights weights(arguments.codec);
+  const nn::Vae vae(nn::Scope(weights, train::kCodecPrefix), config.vae);
+  const nn::LibraryThreads threads(arguments.threads > 0
+                                       ? arguments.threads
+                                       : std::max(1, static_cast<int>(std::thread::hardware_concurrency())));
+  const std::string codec = Sha256HexOfFile(arguments.codec);
+  const std::vector<std::filesystem::path> shards = train::ShardPaths(arguments.shards);
+  std::size_t encoded = 0;
+  for (const std::filesystem::path& shard : shards) {
+    const train::EncodeOptions options{codec, Sha256HexOfFile(shard)};
+    if (train::IsEncoded(shard, options)) continue;
+    train::EncodeShard(vae, shard, options);
+    fmt::print(stderr, "{}: encoded\n", train::LatentsPath(shard).string());
+    ++encoded;
+  }
+  fmt::print("{}: latents of {} shards, {} of them new\n", arguments.shards, shards.size(), encoded);
+  return ExitCode::kOk;
+}
+
+}  // namespace
+
+void AddEncode(CLI::App& app, ExitCode& exit_code) {
+  const auto arguments = std::make_shared<EncodeArguments>();
+  CLI::App* command = app.add_subcommand("encode", "Write the latents of shards beside them, as training reads them");
+  command->add_option("SHARDS", arguments->shards, "a folder of `evac pack`")->required()->check(CLI::ExistingDirectory);
+  command->add_option("--config", arguments->config, "the page of the network's sizes")->required()->check(CLI::ExistingFile);
+  command->add_option("--codec", arguments->codec, "weights of the codec, alone or in a checkpoint")
+      ->required()
+      ->check(CLI::ExistingFile);
+  command->add_option("--threads", arguments->threads, "default: one per core")->check(CLI::Range(1, 1024));
+  command->footer(
+      "Example:\n"
+      "  evac encode out/shards --config apps/configs/desk_model.yaml --codec out/codec/codec.safetensors\n"
+      "Latents that are there, of this codec and these shards, are not made again.");
+  command->callback([arguments, &exit_code] { exit_code = Encode(*arguments); });
+}
+
+}  // namespace evac

@@ -1,0 +1,18 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "core/config.h"
+#include "worldmodel/train/settings.h"
+
+namespace evac {
+
+/// Reads one section ("codec", "world") of a page of training options into them; what is not there stays as the paper
+/// has it. Then `assignments` ("batch=16").
+/// @param path  empty: no page
+/// @throws InvalidInput naming file and field: unknown, of a wrong type
+void ReadTrainingPage(const std::string& path, const std::string& section, const std::vector<std::string>& assignments,
+                      const train::Settings& settings);
+
+}  // namespace evac

@@ -1,0 +1,109 @@
+#include <gtest/gtest.h>
+
+#include "tests/nn/support.h"
+#include "tests/support/temp_folder.h"
+#include "tests/train/synthetic_shards.h"
+#include "worldmodel/nn/weights.h"
+#include "worldmodel/train/encode_shards.h"
+#include "worldmodel/train/train_codec.h"
+#include "worldmodel/train/weight_files.h"
+
+namespace evac::train {
+namespace {
+
+nn::VaeConfig SmallCodec(std::int64_t patch_px) {
+  nn::VaeConfig config = nn::TinyConfig().vae;
+  config.patch_px = patch_px;
+  config.z_channels = 8;
+  config.scale_factor = 0.5;
+  return config;
+}
+
+struct Trained {
+  CodecQuality before, after;
+};
+Trained Train(const ShardSet& shards, const nn::VaeConfig& config, const CodecTrainingOptions& options, at::ScalarType products) {
+  nn::RandomWeights random(1);
+  TrainableWeights weights(random, products);
+  const nn::Vae vae(nn::Scope(weights, kCodecPrefix), config);
+  const CodecTraining training(shards, config, options);
+  TrainerOptions trainer;
+  trainer.steps = 60;
+  trainer.learning_rate = 5e-3;
+  trainer.clip_norm = 1;
+  Trained trained;
+  trained.before = MeasureCodec(vae, shards, 12);
+  const TempFolder out;
+  Trainer(weights.all(), trainer, out.path()).Run({.loss = [&](const StepPlace& at) { return training.Loss(vae, training.Batch(at)); }});
+  trained.after = MeasureCodec(vae, shards, 12);
+  return trained;
+}
+
+TEST(CodecTraining, PicturesAndMapsComeBackBetterThanBefore) {
+  const TempFolder folder;
+  WriteSyntheticShards(folder.path(), {});
+  const ShardSet shards(folder.path(), Split::kTrain);
+  const CodecTrainingOptions options{.batch = 8, .map_share = 0.4, .foreground_weight = 4, .contact_share = 0.3};
+  for (const at::ScalarType products : {at::kFloat, at::kBFloat16}) {
+    const Trained trained = Train(shards, SmallCodec(2), options, products);
+    EXPECT_GT(trained.after.psnr, trained.before.psnr + 3);
+    EXPECT_GT(trained.after.psnr_object, trained.before.psnr_object + 3);
+    EXPECT_GT(trained.after.psnr_maps, trained.before.psnr_maps + 3);
+  }
+}
+
+TEST(CodecTraining, NormalisedLatentsHaveUnitDeviationAndDecodeTheSame) {
+  const TempFolder folder;
+  WriteSyntheticShards(folder.path(), {});
+  const ShardSet shards(folder.path(), Split::kTrain);
+  const nn::VaeConfig config = SmallCodec(1);
+  nn::HashWeights hashes;
+  TrainableWeights weights(hashes);
+  const nn::Vae vae(nn::Scope(weights, kCodecPrefix), config);
+  const at::NoGradGuard no_gradients;
+  const Tensor pictures = PicturesFrom(shards.shards().front().frames.select(1, 0));
+  const auto latents = [&] { return vae.Encode(pictures).Sample({}) * config.scale_factor; };
+  const Tensor before = vae.Decode(latents());
+  NormaliseLatents(vae, shards, weights.all(), true);
+  const Tensor by_channel = latents().transpose(0, 1).flatten(1);
+  EXPECT_LT(by_channel.mean(1).abs().max().item<double>(), 1e-3);
+  EXPECT_LT((by_channel.std(1) - 1).abs().max().item<double>(), 1e-3);
+  EXPECT_LT(nn::LargestDifference(vae.Decode(latents()), before), 2e-4);
+  const Tensor noise = nn::Noise({pictures.size(0), 8, 8, 12}, 3);
+  EXPECT_LT(nn::LargestDifference(vae.Encode(pictures).Sample(noise) * config.scale_factor, latents()), 1e-5)
+      << "the posterior is a point";
+}
+
+TEST(EncodeShard, WritesTheLatentsOfEveryPictureAndMap) {
+  const TempFolder folder;
+  WriteSyntheticShards(folder.path(), {.views = 2});
+  nn::RandomWeights random(1);
+  const nn::VaeConfig config = SmallCodec(2);
+  const nn::Vae vae(nn::Scope(random, kCodecPrefix), config);
+  const auto paths = ShardPaths(folder.path());
+  const EncodeOptions options{"the codec's hash", "the shard's hash"};
+  EXPECT_FALSE(IsEncoded(paths[0], options));
+  for (const auto& path : paths) EncodeShard(vae, path, options);
+  EXPECT_TRUE(IsEncoded(paths[0], options));
+  EXPECT_FALSE(IsEncoded(paths[0], {"another codec", "the shard's hash"}));
+  ShardSet shards(folder.path(), Split::kHoldout);
+  shards.OpenLatents(8, config.Stride());
+  const Shard& shard = shards.shards().front();
+  const at::NoGradGuard no_gradients;
+  const Tensor map = vae.Encode(PicturesFrom(shard.maps[7])).Sample({}) * config.scale_factor;
+  EXPECT_LT(nn::LargestDifference(shard.map_latents[7], map), 2e-3) << "halves";
+  EXPECT_EQ(shards.codec(), "the codec's hash");
+}
+
+TEST(ShardSet, RefusesWhatNoTrainingCanRead) {
+  const TempFolder folder;
+  EXPECT_THROW(ShardSet(folder.path(), Split::kTrain), TensorError) << "the packing is not done";
+  WriteSyntheticShards(folder.path(), {});
+  EXPECT_THROW(ShardSet(folder.path(), Split::kTrain).OpenLatents(8, 4), TensorError) << "no latents yet";
+  const ShardSet shards(folder.path(), Split::kTrain);
+  EXPECT_EQ(shards.clips().size(), 6u);
+  EXPECT_EQ(shards.frame_count(), 54);
+}
+
+}  // namespace
+}  // namespace evac::train

@@ -1,0 +1,228 @@
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <fstream>
+
+#include "tests/nn/support.h"
+#include "tests/support/temp_folder.h"
+#include "tests/train/synthetic_shards.h"
+#include "worldmodel/frame_memory.h"
+#include "worldmodel/nn/imagine.h"
+#include "worldmodel/nn/weights.h"
+#include "worldmodel/ray_map.h"
+#include "worldmodel/train/encode_shards.h"
+#include "worldmodel/train/train_world.h"
+#include "worldmodel/train/weight_files.h"
+
+namespace evac::train {
+namespace {
+
+nn::ModelConfig SmallConfig(std::int64_t views) {
+  nn::ModelConfig config = nn::TinyConfig();
+  config.vae.channel_mult = {1, 1, 1};
+  config.vae.patch_px = 1;
+  config.unet.channel_mult = {1, 1};
+  config.vae.scale_factor = 1;
+  config.views = views;
+  return config;
+}
+
+/// Shards, a codec and its latents: where the training of a world model begins.
+struct Prepared {
+  explicit Prepared(std::int64_t views) : config(SmallConfig(views)) {
+    WriteSyntheticShards(folder / "shards", {.views = views});
+    CodecOptions options;
+    options.job.trainer.steps = 2;
+    options.job.trainer.learning_rate = 1e-3;
+    options.codec.batch = 4;
+    TrainCodec({folder / "shards", folder / "codec", config}, options);
+    CheckpointWeights weights(codec());
+    const nn::Vae vae(nn::Scope(weights, kCodecPrefix), config.vae);
+    for (const auto& shard : ShardPaths(folder / "shards")) EncodeShard(vae, shard, {"codec", "shard"});
+  }
+  std::filesystem::path codec() const { return folder / "codec" / "codec.safetensors"; }
+
+  TempFolder folder;
+  nn::ModelConfig config;
+};
+
+WorldOptions Quick(std::int64_t steps) {
+  WorldOptions options;
+  options.job.trainer.steps = steps;
+  options.job.trainer.learning_rate = 3e-3;
+  options.job.trainer.clip_norm = 1;
+  options.job.holdout_size = 6;
+  options.world.batch = 4;
+  options.world.windows.history = 6;
+  options.world.drop = 0;
+  return options;
+}
+
+/// The loss on the training's own windows, before and after some steps.
+std::pair<double, double> LossBeforeAndAfter(const Prepared& at, WorldOptions options) {
+  options.Resolve();
+  options.world.windows.chunk = at.config.chunk;
+  options.world.windows.memory = at.config.memory;
+  ShardSet shards(at.folder / "shards", Split::kTrain);
+  shards.OpenLatents(at.config.vae.z_channels, at.config.vae.Stride());
+  nn::RandomWeights random(3, nn::RandomWeights::LastLayers::kZero);
+  TrainableWeights weights(random, options.job.bf16 ? at::kBFloat16 : at::kFloat);
+  const nn::EvacModel model(weights, at.config);
+  const WorldTraining training(model, shards, options.world);
+  const std::vector<Window> windows = training.sampler().Spread(8);
+  const double before = training.Measure(windows);
+  const TempFolder out;
+  Trainer trainer(TrainedParameters(weights, at.config, options.world), options.job.trainer, out.path());
+  trainer.Run({.loss = [&](const StepPlace& place) { return training.Loss(place); }});
+  return {before, training.Measure(windows)};
+}
+
+TEST(TrainWorld, TheLossFallsWithOneView) {
+  const auto [before, after] = LossBeforeAndAfter(Prepared(1), Quick(30));
+  EXPECT_LT(after, 0.9 * before);
+}
+
+TEST(TrainWorld, TheLossFallsWithHeadAndWrist) {
+  const auto [before, after] = LossBeforeAndAfter(Prepared(2), Quick(30));
+  EXPECT_LT(after, 0.9 * before);
+}
+
+TEST(TrainWorld, TheLossFallsInBf16) {
+  WorldOptions options = Quick(30);
+  options.job.bf16 = true;
+  const auto [before, after] = LossBeforeAndAfter(Prepared(1), options);
+  EXPECT_LT(after, 0.9 * before);
+}
+
+TEST(TrainWorld, TheLossFallsWithEverythingThatThePaperLacks) {
+  WorldOptions options = Quick(30);
+  options.world.windows.rollout_share = 0.5;
+  options.world.windows.contact_share = 0.5;
+  options.world.windows.first_image = true;
+  options.memory_noise_kind = "uniform";
+  options.world.terminal_share = 0.3;
+  options.world.log_uniform = true;
+  options.step_weight = "clean";
+  options.world.object_weight = 4;
+  options.world.change_weight = 2;
+  options.world.self_memory_share = 0.5;
+  options.world.self_memory_from = 0.2;
+  options.world.train_action_resampler = true;
+  options.world.train_image_encoder = true;
+  Prepared at(1);
+  at.config.schedule.from_last_frame = true;
+  at.config.action_resampler.embedding_dim = 18;
+  const auto [before, after] = LossBeforeAndAfter(at, options);
+  EXPECT_LT(after, 0.9 * before);
+}
+
+std::string Bytes(const std::filesystem::path& path) {
+  std::ifstream file(path, std::ios::binary);
+  return {std::istreambuf_iterator<char>(file), {}};
+}
+
+TEST(TrainWorld, EndsInTheSameBytesWhenItWasKilledAndItsWeightsImagine) {
+  const Prepared at(1);
+  WorldOptions options = Quick(6);
+  options.job.trainer.holdout_every = 3;
+  options.job.trainer.checkpoint_every_s = 0;
+  options.job.trainer.average_decay = 0.9;
+  options.world.train_action_resampler = true;
+  const WorldStart start{at.codec()};
+  const JobPlace whole{at.folder / "shards", at.folder / "whole", at.config};
+  TrainWorld(whole, options, start, {});
+  int left = 0;
+  for (const int steps : {2, 1, 100}) {
+    left = steps;
+    JobPlace killed{at.folder / "shards", at.folder / "killed", at.config};
+    killed.interrupted = [&] { return left-- == 0; };
+    TrainWorld(killed, options, start, {});
+  }
+  EXPECT_EQ(Bytes(at.folder / "whole" / "weights.safetensors"), Bytes(at.folder / "killed" / "weights.safetensors"));
+  const nn::EvacModel model = nn::LoadModel(at.folder / "whole" / "weights.safetensors", at.config);
+  EXPECT_EQ(model.config().chunk, at.config.chunk) << "the file is a strict checkpoint of the network";
+}
+
+TEST(TrainWorld, GoesOnFromAnotherModelStrictlyButForWhatIsExcepted) {
+  const Prepared at(1);
+  TrainWorld({at.folder / "shards", at.folder / "first", at.config}, Quick(2), {at.codec()}, {});
+  WorldStart start{at.codec(), at.folder / "first" / "weights.safetensors"};
+  nn::ModelConfig other = at.config;
+  other.action_resampler.queries = 5;
+  const JobPlace place{at.folder / "shards", at.folder / "second", other};
+  EXPECT_THROW(TrainWorld(place, Quick(1), start, {}), TensorError);
+  start.init_except = {"cond_stage_model.latents"};
+  EXPECT_EQ(TrainWorld(place, Quick(1), start, {}).why, "done");
+}
+
+TEST(TrainWorld, RefusesLatentsOfAnotherCodec) {
+  const Prepared at(1);
+  WorldStart start{at.codec()};
+  start.codec_sha256 = "another";
+  EXPECT_THROW(TrainWorld({at.folder / "shards", at.folder / "out", at.config}, Quick(1), start, {}), TensorError);
+}
+
+TEST(TrainWorld, DrawsTruthAboveWhatIsImagined) {
+  const Prepared at(2);
+  WorldOptions options = Quick(2);
+  options.job.trainer.holdout_every = 2;
+  options.strip_steps = 2;
+  int looked = 0;
+  TrainWorld({at.folder / "shards", at.folder / "out", at.config}, options, {at.codec()},
+             [&](std::int64_t step, const Strips& strips) {
+               ++looked;
+               EXPECT_EQ(step, 2);
+               EXPECT_EQ(strips.picture.size(0), 6 * 2 * 2 * at.config.image_height_px) << "windows, views, two rows";
+               EXPECT_GT(strips.psnr, 0);
+             });
+  EXPECT_EQ(looked, 1);
+}
+
+TEST(Windows, RememberWhatRolloutsRemember) {
+  for (const std::int64_t last : {0, 16, 32, 61}) {
+    const auto wanted = SparseMemory(static_cast<std::size_t>(4 + last), 4);
+    const std::vector<std::int64_t> found = RolloutMemory(last, 4);
+    for (std::size_t j = 0; j < 4; ++j) {
+      const auto history = static_cast<std::int64_t>(wanted[j]);
+      EXPECT_EQ(found[j], history < 4 ? 0 : history - 3) << "the history is frame 0 four times, then 1, 2, …";
+    }
+  }
+}
+
+TEST(Windows, LieInTheirClipNewestLastAndHoldContactWhenAsked) {
+  const TempFolder folder;
+  WriteSyntheticShards(folder.path(), {.frames = 12});
+  const ShardSet shards(folder.path(), Split::kTrain);
+  const WindowSampler sampler(shards, {.chunk = 3, .memory = 4, .history = 8, .rollout_share = 0.5, .contact_share = 1});
+  Dice dice({1, 0, 0, 0}, 1);
+  for (int i = 0; i < 200; ++i) {
+    const Window window = sampler.Pick(dice);
+    EXPECT_TRUE(std::is_sorted(window.memory.begin(), window.memory.end()));
+    EXPECT_EQ(window.memory.back(), window.last);
+    EXPECT_LT(window.last + 3, window.clip->frames);
+    EXPECT_THAT(window.memory, testing::Contains(window.image));
+    const Tensor contact = shards.shards()[window.clip->shard].contact;
+    EXPECT_GT(contact.narrow(0, window.clip->first + window.last + 1, 3).sum().item<std::int64_t>(), 0);
+  }
+}
+
+TEST(Rays, AreThoseOfTheWorldThatImagines) {
+  Eigen::Matrix4f c2w = Eigen::Matrix4f::Identity();
+  c2w.block<3, 3>(0, 0) = (Eigen::AngleAxisf(0.4F, Eigen::Vector3f::UnitX()) * Eigen::AngleAxisf(-1.1F, Eigen::Vector3f::UnitZ())).matrix();
+  c2w.block<3, 1>(0, 3) = Eigen::Vector3f(0.2F, -0.5F, 1.1F);
+  Eigen::Matrix3f k;
+  k << 80, 0, 50, 0, 75, 30, 0, 0, 1;
+  const RayMap wanted = MakeRayMap(ScaledIntrinsics(k, 0.125, 0.125), c2w, 8, 12);
+  const Eigen::Matrix<float, 4, 4, Eigen::RowMajor> c2w_rows = c2w;
+  const Eigen::Matrix<float, 3, 3, Eigen::RowMajor> k_rows = k;
+  const Rays found = RaysOf(at::from_blob(const_cast<float*>(c2w_rows.data()), {1, 4, 4}, at::kFloat),
+                            at::from_blob(const_cast<float*>(k_rows.data()), {1, 3, 3}, at::kFloat), {64, 96}, {8, 12});
+  const Tensor direction = at::from_blob(const_cast<float*>(wanted.direction.data()), {3, 8, 12}, at::kFloat);
+  EXPECT_LT(nn::LargestDifference(found.direction[0], direction), 1e-6);
+  EXPECT_FLOAT_EQ(found.origin[0][1][4][5].item<float>(), -0.5F);
+}
+
+}  // namespace
+}  // namespace evac::train

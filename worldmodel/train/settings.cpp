@@ -1,0 +1,119 @@
+#include "worldmodel/train/settings.h"
+
+#include <cstdio>
+#include <set>
+
+namespace evac::train {
+namespace {
+
+void AddJob(Settings& settings, JobOptions& job) {
+  TrainerOptions& t = job.trainer;
+  const Settings shared = {{"steps", &t.steps},
+                           {"minutes", &t.minutes},
+                           {"learning_rate", &t.learning_rate},
+                           {"warmup_steps", &t.warmup_steps},
+                           {"decay_from", &t.decay_from},
+                           {"beta1", &t.adamw.beta1},
+                           {"beta2", &t.adamw.beta2},
+                           {"epsilon", &t.adamw.epsilon},
+                           {"weight_decay", &t.adamw.weight_decay},
+                           {"clip_norm", &t.clip_norm},
+                           {"average_decay", &t.average_decay},
+                           {"accumulate", &t.accumulate},
+                           {"holdout_every", &t.holdout_every},
+                           {"patience", &t.patience},
+                           {"checkpoint_every_s", &t.checkpoint_every_s},
+                           {"seed", &t.seed},
+                           {"bf16", &job.bf16},
+                           {"holdout_size", &job.holdout_size}};
+  settings.insert(settings.end(), shared.begin(), shared.end());
+}
+
+/// What may change from one process of a training to the next, and what the trainer compares itself.
+bool IsLengthOrLook(const std::string& name) {
+  static const std::set<std::string> kNames = {"steps", "minutes", "patience", "checkpoint_every_s", "strip_steps"};
+  return kNames.contains(name);
+}
+
+std::string Text(double number) {
+  char text[40];
+  std::snprintf(text, sizeof text, "%.17g", number);
+  return text;
+}
+
+std::string Text(const Setting& setting) {
+  return std::visit(
+      [](const auto* field) -> std::string {
+        using Type = std::decay_t<decltype(*field)>;
+        if constexpr (std::is_same_v<Type, std::string>) return *field;
+        else if constexpr (std::is_same_v<Type, double>) return Text(*field);
+        else return std::to_string(*field);
+      },
+      setting.field);
+}
+
+}  // namespace
+
+Settings SettingsOf(CodecOptions& options) {
+  CodecTrainingOptions& c = options.codec;
+  Settings settings = {{"batch", &c.batch},
+                       {"map_share", &c.map_share},
+                       {"squared_weight", &c.squared_weight},
+                       {"kl_weight", &c.kl_weight},
+                       {"latent_noise", &c.latent_noise},
+                       {"foreground_weight", &c.foreground_weight},
+                       {"foreground_radius", &c.foreground_radius},
+                       {"contact_share", &c.contact_share}};
+  AddJob(settings, options.job);
+  return settings;
+}
+
+Settings SettingsOf(WorldOptions& options) {
+  WorldTrainingOptions& w = options.world;
+  Settings settings = {{"batch", &w.batch},
+                       {"history", &w.windows.history},
+                       {"rollout_share", &w.windows.rollout_share},
+                       {"contact_share", &w.windows.contact_share},
+                       {"first_image", &w.windows.first_image},
+                       {"drop", &w.drop},
+                       {"memory_noise_kind", &options.memory_noise_kind},
+                       {"memory_noise", &w.memory_noise},
+                       {"memory_noise_share", &w.memory_noise_share},
+                       {"terminal_share", &w.terminal_share},
+                       {"log_uniform", &w.log_uniform},
+                       {"ratio_from", &w.ratio_from},
+                       {"ratio_to", &w.ratio_to},
+                       {"step_weight", &options.step_weight},
+                       {"step_weight_cap", &w.step_weight_cap},
+                       {"object_weight", &w.object_weight},
+                       {"object_radius", &w.object_radius},
+                       {"change_weight", &w.change_weight},
+                       {"self_memory_share", &w.self_memory_share},
+                       {"self_memory_from", &w.self_memory_from},
+                       {"train_action_resampler", &w.train_action_resampler},
+                       {"train_image_encoder", &w.train_image_encoder},
+                       {"strip_steps", &options.strip_steps}};
+  AddJob(settings, options.job);
+  return settings;
+}
+
+void WorldOptions::Resolve() {
+  if (memory_noise_kind != "published" && memory_noise_kind != "uniform")
+    throw TensorError("memory_noise_kind is '" + memory_noise_kind + "', wanted published or uniform");
+  world.memory_noise_kind = memory_noise_kind == "uniform" ? MemoryNoise::kUniform : MemoryNoise::kPublished;
+  if (step_weight != "velocity" && step_weight != "min_snr" && step_weight != "clean")
+    throw TensorError("step_weight is '" + step_weight + "', wanted velocity, min_snr or clean");
+  world.step_weight = step_weight == "min_snr" ? StepWeight::kMinSnr
+                      : step_weight == "clean" ? StepWeight::kClean
+                                               : StepWeight::kVelocity;
+}
+
+std::string IdentityOf(const Settings& settings) {
+  std::string text;
+  for (const Setting& setting : settings) {
+    if (!IsLengthOrLook(setting.name)) text += setting.name + " " + Text(setting) + "\n";
+  }
+  return text;
+}
+
+}  // namespace evac::train

@@ -1,0 +1,93 @@
+#include "worldmodel/train/train_codec.h"
+
+#include <algorithm>
+#include <cstdio>
+#include <deque>
+
+#include "worldmodel/nn/weights.h"
+#include "worldmodel/train/weight_files.h"
+
+namespace evac::train {
+namespace {
+
+std::string Decibel(double value) {
+  char text[24];
+  std::snprintf(text, sizeof text, "%.2f", value);
+  return text;
+}
+
+void CheckSizes(const ShardSet& shards, const nn::ModelConfig& config) {
+  nn::CheckShape("the shards' pictures", shards.shards().front().frames,
+                 {-1, config.views, config.image_height_px, config.image_width_px, 3});
+}
+
+void WriteCodec(const std::filesystem::path& path, const std::vector<NamedTensor>& weights, const CodecQuality& quality) {
+  std::vector<TensorView> views;
+  for (const NamedTensor& weight : weights) views.push_back(nn::ViewOf(weight.name, weight.tensor.detach()));
+  WriteTensorFile(path, views,
+                  {{"format", "pt"},
+                   {"psnr", Decibel(quality.psnr)},
+                   {"psnr_object", Decibel(quality.psnr_object)},
+                   {"psnr_maps", Decibel(quality.psnr_maps)}});
+}
+
+/// One copy of the codec that is trained, and its loss.
+struct CodecWorker {
+  CodecWorker(const ShardSet& shards, const nn::ModelConfig& config, const CodecOptions& options)
+      : random(options.job.trainer.seed),
+        weights(random, options.job.bf16 ? at::kBFloat16 : at::kFloat),
+        vae(nn::Scope(weights, kCodecPrefix), config.vae),
+        training(shards, config.vae, options.codec) {}
+  Tensor Loss(const StepPlace& at) const { return training.Loss(vae, training.Batch(at)); }
+
+  nn::RandomWeights random;
+  TrainableWeights weights;
+  nn::Vae vae;
+  CodecTraining training;
+};
+
+}  // namespace
+
+std::int64_t Workers(const JobPlace& place, const JobOptions& options) {
+  return std::clamp<std::int64_t>(place.threads, 1, options.trainer.accumulate);
+}
+
+TrainerSummary TrainCodec(const JobPlace& place, const CodecOptions& given) {
+  CodecOptions options = given;
+  const ShardSet shards(place.shards, Split::kTrain), holdout(place.shards, Split::kHoldout);
+  CheckSizes(shards, place.config);
+  std::deque<CodecWorker> workers;
+  for (std::int64_t i = 0; i < Workers(place, options.job); ++i) workers.emplace_back(shards, place.config, options);
+  const TrainableWeights& weights = workers.front().weights;
+  const nn::Vae& vae = workers.front().vae;
+  options.job.trainer.identity =
+      IdentityOf(SettingsOf(options)) + shards.metadata().at("recipe") + " workers " + std::to_string(workers.size());
+  Trainer trainer(weights.all(), options.job.trainer, place.out);
+  for (std::size_t i = 1; i < workers.size(); ++i)
+    trainer.AddReplica({workers[i].weights.all(), [&worker = workers[i]](const StepPlace& at) { return worker.Loss(at); }});
+  const auto say = [&](const char* when, const CodecQuality& quality) {
+    if (place.say)
+      place.say(std::string(when) + ": hold-out " + Decibel(quality.psnr) + " dB, around the object " +
+                Decibel(quality.psnr_object) + " dB, maps " + Decibel(quality.psnr_maps) + " dB");
+  };
+  TrainerSummary summary =
+      trainer.Run({.loss = [&](const StepPlace& at) { return workers.front().Loss(at); },
+                   .holdout =
+                       [&] {
+                         const CodecQuality quality = MeasureCodec(vae, holdout, options.job.holdout_size);
+                         say("codec", quality);
+                         return -quality.psnr;
+                       },
+                   .interrupted = place.interrupted,
+                   .on_progress = place.on_progress});
+  if (!summary.IsDone()) return summary;
+  trainer.WithBest([&] {
+    NormaliseLatents(vae, shards, weights.all(), options.codec.latent_noise > 0);
+    const CodecQuality quality = MeasureCodec(vae, holdout, options.job.holdout_size);
+    say("codec, latents normalised", quality);
+    WriteCodec(place.out / "codec.safetensors", weights.all(), quality);
+  });
+  return summary;
+}
+
+}  // namespace evac::train

@@ -1,0 +1,144 @@
+#include "worldmodel/train/train_world.h"
+
+#include <cstdio>
+#include <deque>
+
+#include "worldmodel/nn/weight_keys.h"
+#include "worldmodel/nn/weights.h"
+#include "worldmodel/train/weight_files.h"
+
+namespace evac::train {
+namespace {
+
+constexpr std::int64_t kStripWindows = 6;
+
+/// The sources of a start, kept together.
+struct Sources {
+  Sources(const WorldStart& start, std::uint64_t seed)
+      : random(seed, nn::RandomWeights::LastLayers::kZero), codec(start.codec), routed(Routes(start)) {}
+
+  std::vector<RoutedWeights::Route> Routes(const WorldStart& start) {
+    std::vector<RoutedWeights::Route> routes = {{kCodecPrefix, &codec}};
+    if (start.init.empty()) {
+      routes.push_back({"", &random});
+      return routes;
+    }
+    init.emplace(start.init);
+    for (const std::string& prefix : start.init_except) routes.push_back({prefix, &random});
+    routes.push_back({"", &*init});
+    return routes;
+  }
+
+  nn::RandomWeights random;
+  CheckpointWeights codec;
+  std::optional<CheckpointWeights> init;
+  RoutedWeights routed;
+};
+
+/// Leaves out what nothing reads: a lean checkpoint lacks it too.
+class OnlyRead final : public nn::ParameterSource {
+ public:
+  OnlyRead(nn::ParameterSource& source, const nn::ModelConfig& config)
+      : source_(source), dead_(nn::DeadKeys(nn::CheckpointKeys(config))) {}
+  Tensor Take(const std::string& key, at::IntArrayRef shape) override {
+    return dead_.contains(key) || nn::IsClipLeftover(key) ? Tensor() : source_.Take(key, shape);
+  }
+
+ private:
+  nn::ParameterSource& source_;
+  std::set<std::string> dead_;
+};
+
+/// One copy of the model that is trained, and its loss.
+struct WorldWorker {
+  WorldWorker(nn::ParameterSource& source, const ShardSet& shards, const nn::ModelConfig& config, const WorldOptions& options)
+      : weights(source, options.job.bf16 ? at::kBFloat16 : at::kFloat),
+        model(weights, config),
+        training(model, shards, options.world) {}
+
+  TrainableWeights weights;
+  nn::EvacModel model;
+  WorldTraining training;
+};
+
+void Save(const std::filesystem::path& path, const TrainableWeights& weights, const nn::ModelConfig& config,
+          const TensorMetadata& metadata) {
+  GivenWeights given(weights.all());
+  nn::SaveOptions options;
+  options.metadata.insert(metadata.begin(), metadata.end());
+  const std::vector<nn::ParameterShape> keys = nn::CheckpointKeys(config);
+  const std::set<std::string> dead = nn::DeadKeys(keys);
+  options.without.assign(dead.begin(), dead.end());
+  for (const auto& [key, shape] : keys) {
+    if (nn::IsClipLeftover(key)) options.without.push_back(key);
+  }
+  nn::SaveWeights(path, given, config, options);
+}
+
+void CheckShards(const ShardSet& shards, const nn::ModelConfig& config, const WorldStart& start) {
+  nn::CheckShape("the shards' pictures", shards.shards().front().frames,
+                 {-1, config.views, config.image_height_px, config.image_width_px, 3});
+  if (!start.codec_sha256.empty() && shards.codec() != start.codec_sha256)
+    throw TensorError(start.codec.string() + " did not make the shards' latents (they are of codec " + shards.codec() +
+                      "): wanted `evac encode` with this codec");
+}
+
+std::string Number(double value) {
+  char text[32];
+  std::snprintf(text, sizeof text, "%.6g", value);
+  return text;
+}
+
+}  // namespace
+
+TrainerSummary TrainWorld(const JobPlace& place, const WorldOptions& given, const WorldStart& start,
+                          const std::function<void(std::int64_t step, const Strips&)>& look) {
+  WorldOptions options = given;
+  options.Resolve();
+  options.world.windows.chunk = place.config.chunk;
+  options.world.windows.memory = place.config.memory;
+  ShardSet shards(place.shards, Split::kTrain), holdout(place.shards, Split::kHoldout);
+  shards.OpenLatents(place.config.vae.z_channels, place.config.vae.Stride());
+  holdout.OpenLatents(place.config.vae.z_channels, place.config.vae.Stride());
+  CheckShards(shards, place.config, start);
+  Sources sources(start, options.job.trainer.seed);
+  OnlyRead read(sources.routed, place.config);
+  std::deque<WorldWorker> workers;
+  for (std::int64_t i = 0; i < Workers(place, options.job); ++i)
+    workers.emplace_back(read, shards, place.config, options);
+  const TrainableWeights& weights = workers.front().weights;
+  const nn::EvacModel& model = workers.front().model;
+  const WorldTraining measuring(model, holdout, options.world);
+  const std::vector<Window> windows = measuring.sampler().Spread(options.job.holdout_size),
+                            drawn = measuring.sampler().Spread(kStripWindows);
+  options.job.trainer.identity = IdentityOf(SettingsOf(options)) + shards.metadata().at("recipe") + " " + shards.codec() +
+                                 " workers " + std::to_string(workers.size());
+  Trainer trainer(TrainedParameters(weights, place.config, options.world), options.job.trainer, place.out);
+  for (std::size_t i = 1; i < workers.size(); ++i)
+    trainer.AddReplica({TrainedParameters(workers[i].weights, place.config, options.world),
+                        [&worker = workers[i]](const StepPlace& at) { return worker.training.Loss(at); }});
+  const auto draw = [&](std::int64_t step) {
+    const Strips strips = DrawStrips(model, holdout, drawn, {.steps = options.strip_steps});
+    if (place.say)
+      place.say("step " + std::to_string(step) + ": imagined " + Number(strips.psnr) + " dB, a frozen copy " +
+                Number(strips.psnr_copy) + " dB");
+    if (look) look(step, strips);
+  };
+  const TrainerSummary summary = trainer.Run({.loss = [&](const StepPlace& at) { return workers.front().training.Loss(at); },
+                                              .holdout = [&] { return measuring.Measure(windows); },
+                                              .look = draw,
+                                              .interrupted = place.interrupted,
+                                              .on_progress = place.on_progress});
+  if (!summary.IsDone()) return summary;
+  trainer.WithBest([&] {
+    Save(place.out / "weights.safetensors", weights, place.config,
+         {{"steps", std::to_string(summary.step)},
+          {"seed", std::to_string(options.job.trainer.seed)},
+          {"holdout", summary.best ? Number(*summary.best) : ""},
+          {"recipe", shards.metadata().at("recipe")},
+          {"codec", shards.codec()}});
+  });
+  return summary;
+}
+
+}  // namespace evac::train

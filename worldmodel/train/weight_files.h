@@ -1,0 +1,42 @@
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "worldmodel/nn/evac_model.h"
+#include "worldmodel/nn/mapped_tensors.h"
+#include "worldmodel/train/flat_parameters.h"
+
+/// Where a training's first weights come from.
+namespace evac::train {
+
+/// Parameters of one file by key, strictly: a key that is missing or of another shape is an error.
+class CheckpointWeights final : public nn::ParameterSource {
+ public:
+  explicit CheckpointWeights(const std::filesystem::path& path);
+  Tensor Take(const std::string& key, at::IntArrayRef shape) override;
+  const TensorFile& file() const { return tensors_.file(); }
+
+ private:
+  nn::MappedTensors tensors_;
+};
+
+/// Several sources, each for the keys that begin with its prefix; the first that fits is asked.
+class RoutedWeights final : public nn::ParameterSource {
+ public:
+  struct Route {
+    std::string prefix;  ///< "": every key
+    nn::ParameterSource* source;
+  };
+  explicit RoutedWeights(std::vector<Route> routes) : routes_(std::move(routes)) {}
+  Tensor Take(const std::string& key, at::IntArrayRef shape) override;
+
+ private:
+  std::vector<Route> routes_;
+};
+
+/// The codec of a file that holds it alone or with a whole model.
+inline constexpr const char* kCodecPrefix = "first_stage_model";
+
+}  // namespace evac::train
