@@ -1,0 +1,86 @@
+#include "worldmodel/nn/differentiable.h"
+
+#include <ATen/ops/group_norm.h>
+#include <ATen/ops/layer_norm.h>
+#include <gtest/gtest.h>
+
+#include <functional>
+
+#include "tests/nn/support.h"
+#include "worldmodel/nn/attention.h"
+
+namespace evac::nn {
+namespace {
+
+using Function = std::function<Tensor(const std::vector<Tensor>&)>;
+
+/// What a function answers, and the gradients of a weighted sum of it.
+std::vector<Tensor> AnswerAndGradients(const Function& function, const std::vector<Tensor>& inputs) {
+  std::vector<Tensor> leaves;
+  for (const Tensor& input : inputs) leaves.push_back(input.clone().set_requires_grad(true));
+  const Tensor y = function(leaves);
+  std::vector<Tensor> results = {y.detach()};
+  (y.to(at::kFloat) * Noise(y.sizes(), 77)).sum().backward();
+  for (const Tensor& leaf : leaves) results.push_back(leaf.grad());
+  return results;
+}
+
+double RelativeDifference(const Tensor& a, const Tensor& b) {
+  return LargestDifference(a, b) / std::max(1e-12, b.to(at::kDouble).abs().max().item<double>());
+}
+
+/// As floats to rounding; in bf16, of which the first input is, to what bf16 can say.
+void ExpectSame(const Function& fast, const Function& plain, std::vector<Tensor> inputs, std::size_t halves) {
+  const std::vector<Tensor> wanted = AnswerAndGradients(plain, inputs), found = AnswerAndGradients(fast, inputs);
+  for (std::size_t i = 0; i < wanted.size(); ++i) EXPECT_LT(RelativeDifference(found[i], wanted[i]), 3e-6) << i;
+  for (std::size_t i = 0; i < halves; ++i) inputs[i] = inputs[i].to(at::kBFloat16);
+  const std::vector<Tensor> coarse = AnswerAndGradients(fast, inputs);
+  EXPECT_EQ(coarse.front().scalar_type(), at::kBFloat16);
+  for (std::size_t i = 0; i < wanted.size(); ++i) EXPECT_LT(RelativeDifference(coarse[i], wanted[i]), 3e-2) << i;
+}
+
+TEST(FastGradients, OfGroupNormAreThoseOfLibtorch) {
+  for (const bool silu : {false, true}) {
+    const auto fast = [&](const std::vector<Tensor>& in) { return FastGroupNorm(in[0], in[1], in[2], {32, 1e-5, silu}); };
+    const auto plain = [&](const std::vector<Tensor>& in) {
+      const Tensor turned = in[0].flatten(1, 2).transpose(1, 2).contiguous();
+      const Tensor y = at::group_norm(turned, 32, in[1], in[2], 1e-5).transpose(1, 2).reshape(in[0].sizes());
+      return silu ? at::silu(y) : y;
+    };
+    ExpectSame(fast, plain, {Noise({3, 11, 13, 64}, 1) * 2 + 1, Noise({64}, 2) * 0.3 + 1, Noise({64}, 3)}, 1);
+  }
+}
+
+TEST(FastGradients, OfLayerNormAreThoseOfLibtorch) {
+  ExpectSame([](const std::vector<Tensor>& in) { return FastLayerNorm(in[0], in[1], in[2], 1e-5); },
+             [](const std::vector<Tensor>& in) { return at::layer_norm(in[0], {40}, in[1], in[2], 1e-5); },
+             {Noise({5, 29, 40}, 1) * 3 - 1, Noise({40}, 2), Noise({40}, 3)}, 1);
+}
+
+TEST(FastGradients, OfGatedGeluAreThoseOfLibtorch) {
+  ExpectSame([](const std::vector<Tensor>& in) { return FastGatedGelu(in[0]); },
+             [](const std::vector<Tensor>& in) { return in[0].narrow(-1, 0, 24) * at::gelu(in[0].narrow(-1, 24, 24)); },
+             {Noise({7, 19, 48}, 1) * 2}, 1);
+}
+
+TEST(FastGradients, OfAttentionAreThoseOfLibtorch) {
+  const auto plain = [](const std::vector<Tensor>& in) {
+    const auto apart = [](const Tensor& x) { return x.transpose(1, 2).flatten(0, 1); };
+    const Tensor y = PlainAttention(apart(in[0]), apart(in[1]), apart(in[2]), 2);
+    return y.unflatten(0, {in[0].size(0), in[0].size(2)}).transpose(1, 2).contiguous();
+  };
+  const auto fast = [](const std::vector<Tensor>& in) { return FastAttention(in[0], in[1], in[2], 2); };
+  ExpectSame(fast, plain, {Noise({2, 20, 6, 48}, 1), Noise({2, 20, 6, 48}, 2), Noise({2, 20, 6, 48}, 3)}, 3);
+  ExpectSame(fast, plain, {Noise({3, 37, 1, 40}, 1), Noise({3, 5, 1, 40}, 2), Noise({3, 5, 1, 40}, 3)}, 3);
+}
+
+TEST(FastGradients, OfTheCausalPadCountTheFirstFrameThreeTimes) {
+  const auto plain = [](const std::vector<Tensor>& in) {
+    const Tensor first = in[0].narrow(1, 0, 1);
+    return at::cat({first, first, in[0]}, 1);
+  };
+  ExpectSame([](const std::vector<Tensor>& in) { return FastCausalPad(in[0]); }, plain, {Noise({2, 4, 3, 8}, 1)}, 1);
+}
+
+}  // namespace
+}  // namespace evac::nn
