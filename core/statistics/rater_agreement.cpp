@@ -163,8 +163,8 @@ Number KrippendorffAlpha(const Ratings& ratings, RatingMetric metric) {
   std::vector<double> values;
   for (const std::vector<double>& item : items) values.insert(values.end(), item.begin(), item.end());
   std::ranges::sort(values);
-  const auto repeated = std::ranges::unique(values);
-  values.erase(repeated.begin(), repeated.end());
+  const auto repeated = std::unique(values.begin(), values.end());
+  values.erase(repeated, values.end());
   if (values.size() == 1) return Undefined{"all ratings are equal"};
 
   const Eigen::MatrixXd observed = Coincidences(items, values);

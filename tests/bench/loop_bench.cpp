@@ -1,5 +1,6 @@
 // What the harness adds to a chunk, and what lanes bring: the numbers of docs/performance.md.
 #include <benchmark/benchmark.h>
+#include <sys/resource.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -164,9 +165,26 @@ BENCHMARK(OverheadPerChunk)
     ->Iterations(1)
     ->Unit(benchmark::kSecond);
 
-/// Episodes of the demo per minute, drawing and the policy's process included.
-void MujocoLanes(benchmark::State& state) {
-  const int lanes = static_cast<int>(state.range(0)), episodes = 8;
+/// Processor time of this process and of those it waited for.
+double ProcessorSeconds() {
+  double seconds = 0;
+  for (const int whose : {RUSAGE_SELF, RUSAGE_CHILDREN}) {
+    rusage usage{};
+    ::getrusage(whose, &usage);
+    for (const timeval& time : {usage.ru_utime, usage.ru_stime})
+      seconds += static_cast<double>(time.tv_sec) + 1e-6 * static_cast<double>(time.tv_usec);
+  }
+  return seconds;
+}
+
+struct LanesRun {
+  std::int64_t chunks = 0;
+  double wall_s = 0;
+};
+
+/// Eight episodes of the demo, drawing and the policy's process included, which have ended when it returns.
+LanesRun RunLanes(int lanes, benchmark::State& state) {
+  const int episodes = 8;
   const std::filesystem::path sim = std::filesystem::path(EVAC_SOURCE_DIR) / "worldmodel/sim";
   const TempFolder folder;
   const Task task = ReadTaskPage(sim / "scenes/take_bottle.yaml");
@@ -177,13 +195,23 @@ void MujocoLanes(benchmark::State& state) {
   RolloutOptions options;
   options.lanes = lanes;
   options.lane = {.chunk_size = 8, .policy_chunk_size = policy.spec.chunk_size, .latency = {}, .video = {.scale = 4}};
-  std::uint64_t chunks = 0;
+  LanesRun run;
   for (auto _ : state) {
+    const auto start = Clock::now();
     JobQueue jobs(Jobs(task, "real", episodes));
     RunEpisodes(policy.link, world, jobs, store, options);
+    run.wall_s += SecondsSince(start);
   }
-  for (const Episode& episode : store.Episodes()) chunks += static_cast<std::uint64_t>(episode.chunks);
-  state.counters["chunks_per_s"] = benchmark::Counter(static_cast<double>(chunks), benchmark::Counter::kIsRate);
+  for (const Episode& episode : store.Episodes()) run.chunks += episode.chunks;
+  return run;
+}
+
+/// What more lanes bring: never more than the processors that one lane leaves idle.
+void MujocoLanes(benchmark::State& state) {
+  const double before_s = ProcessorSeconds();
+  const LanesRun run = RunLanes(static_cast<int>(state.range(0)), state);
+  state.counters["chunks_per_s"] = static_cast<double>(run.chunks) / run.wall_s;
+  state.counters["processors_busy"] = (ProcessorSeconds() - before_s) / run.wall_s;
 }
 BENCHMARK(MujocoLanes)
     ->ArgName("lanes")
