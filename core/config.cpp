@@ -10,6 +10,7 @@
 
 #include "core/file.h"
 #include "core/hash.h"
+#include "core/utf8.h"
 
 namespace evac {
 namespace {
@@ -102,7 +103,21 @@ void DemandPlainKeys(const YAML::Node& node, const std::filesystem::path& file) 
   }
 }
 
+/// The YAML library would replace other bytes when it writes: the stored page would not be the page that was read.
+void DemandUtf8(const std::string& text, const std::filesystem::path& file) {
+  std::string_view rest = text;
+  while (!rest.empty()) {
+    const std::size_t length = Utf8Length(rest);
+    if (length == 0)
+      throw InvalidInput("{}:{}: found the byte 0x{:02x}, wanted UTF-8 text", file.string(),
+                         1 + std::count(text.begin(), text.end() - static_cast<std::ptrdiff_t>(rest.size()), '\n'),
+                         static_cast<unsigned char>(rest.front()));
+    rest.remove_prefix(length);
+  }
+}
+
 YAML::Node Parse(const std::string& text, const std::filesystem::path& file) {
+  DemandUtf8(text, file);
   try {
     YAML::Node node = YAML::Load(text);
     if (!node.IsMap())
@@ -146,6 +161,7 @@ void Config::Set(const std::string& assignment) {
   const std::size_t equals = assignment.find('=');
   if (equals == std::string::npos || equals == 0)
     throw InvalidInput("--set {}: wanted path.to.field=VALUE", assignment);
+  DemandUtf8(assignment, "--set");
   std::vector<std::string> keys;
   std::istringstream path(assignment.substr(0, equals));
   for (std::string key; std::getline(path, key, '.');) keys.push_back(key);

@@ -109,6 +109,12 @@ TEST(Config, WhatIsNoMappingIsRefusedWithItsLine) {
   EXPECT_THAT(MessageOf([] { Config::FromFile("no/such/page.yaml"); }), HasSubstr("no/such/page.yaml"));
 }
 
+TEST(Config, BytesThatAreNoUtf8AreRefusedWithTheirLine) {
+  EXPECT_THAT(MessageOf([] { Config::FromText("a: 1\nc\xEF mmand: 2\n", "p.yaml"); }),
+              AllOf(HasSubstr("p.yaml:2"), HasSubstr("0xef"), HasSubstr("UTF-8")));
+  EXPECT_EQ(Config::FromText("a: \xC3\xA9\n", "p.yaml").Get<std::string>("a"), "\xC3\xA9");
+}
+
 TEST(Config, AnAssignmentReplacesAFieldAnItemOrAddsAField) {
   Config page = Page();
   page.Set("lanes=9");
