@@ -1,9 +1,5 @@
 #include "worldmodel/clip.h"
 
-#include <ATen/core/grad_mode.h>
-#include <ATen/ops/from_blob.h>
-#include <ATen/ops/stack.h>
-
 #include <algorithm>
 #include <cmath>
 #include <limits>
