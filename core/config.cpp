@@ -86,33 +86,37 @@ void WriteCanonical(const YAML::Node& node, const std::string& field, std::ostri
   }
 }
 
+/// The YAML library would replace other bytes when it writes: the stored page would not be the page that was read.
+void DemandUtf8(const std::string& text, const std::filesystem::path& file) {
+  const std::size_t good = Utf8Prefix(text);
+  if (good == text.size()) return;
+  throw InvalidInput("{}:{}: found the byte 0x{:02x}, wanted UTF-8 text", file.string(),
+                     1 + std::count(text.begin(), text.begin() + static_cast<std::ptrdiff_t>(good), '\n'),
+                     static_cast<unsigned char>(text[good]));
+}
+
+/// An escape ("\_") may stand for such bytes too.
+void DemandUtf8(const YAML::Node& scalar, const std::filesystem::path& file) {
+  if (scalar.IsScalar() && Utf8Prefix(scalar.Scalar()) != scalar.Scalar().size())
+    throw InvalidInput("{}:{}: an escape stands for bytes that are no UTF-8", file.string(), scalar.Mark().line + 1);
+}
+
 /// YAML allows keys that are lists; its parser lets the first of two equal keys win. Neither can be meant.
-void DemandPlainKeys(const YAML::Node& node, const std::filesystem::path& file) {
+void DemandPlain(const YAML::Node& node, const std::filesystem::path& file) {
   std::set<std::string> keys;
+  DemandUtf8(node, file);
   for (const auto& item : node) {
     if (!node.IsMap()) {
-      DemandPlainKeys(item, file);
+      DemandPlain(item, file);
       continue;
     }
     const int line = item.first.Mark().line + 1;
     if (!item.first.IsScalar())
       throw InvalidInput("{}:{}: found {} as a key, wanted a text", file.string(), line, Shown(item.first));
+    DemandUtf8(item.first, file);
     if (!keys.insert(item.first.Scalar()).second)
       throw InvalidInput("{}:{}: field {} is given twice", file.string(), line, item.first.Scalar());
-    DemandPlainKeys(item.second, file);
-  }
-}
-
-/// The YAML library would replace other bytes when it writes: the stored page would not be the page that was read.
-void DemandUtf8(const std::string& text, const std::filesystem::path& file) {
-  std::string_view rest = text;
-  while (!rest.empty()) {
-    const std::size_t length = Utf8Length(rest);
-    if (length == 0)
-      throw InvalidInput("{}:{}: found the byte 0x{:02x}, wanted UTF-8 text", file.string(),
-                         1 + std::count(text.begin(), text.end() - static_cast<std::ptrdiff_t>(rest.size()), '\n'),
-                         static_cast<unsigned char>(rest.front()));
-    rest.remove_prefix(length);
+    DemandPlain(item.second, file);
   }
 }
 
@@ -122,7 +126,7 @@ YAML::Node Parse(const std::string& text, const std::filesystem::path& file) {
     YAML::Node node = YAML::Load(text);
     if (!node.IsMap())
       throw InvalidInput("{}: found {}, wanted a YAML mapping (key: value)", file.string(), Shown(node));
-    DemandPlainKeys(node, file);
+    DemandPlain(node, file);
     return node;
   } catch (const YAML::Exception& error) {
     throw InvalidInput("{}:{}: not YAML: {}", file.string(), error.mark.line + 1, error.msg);
@@ -161,7 +165,7 @@ void Config::Set(const std::string& assignment) {
   const std::size_t equals = assignment.find('=');
   if (equals == std::string::npos || equals == 0)
     throw InvalidInput("--set {}: wanted path.to.field=VALUE", assignment);
-  DemandUtf8(assignment, "--set");
+  DemandUtf8(assignment, std::filesystem::path("--set"));
   std::vector<std::string> keys;
   std::istringstream path(assignment.substr(0, equals));
   for (std::string key; std::getline(path, key, '.');) keys.push_back(key);

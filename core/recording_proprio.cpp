@@ -86,7 +86,14 @@ void CheckSizes(const Handle& data, const std::string& where) {
   if (bytes == 0 || bytes > kMaxNumberBytes)
     throw InvalidInput("{}: numbers of {} bytes, wanted at most {}", where, bytes, kMaxNumberBytes);
   const Handle creation(H5Dget_create_plist(data.id()), H5Pclose);
-  if (!creation.valid() || H5Pget_layout(creation.id()) != H5D_CHUNKED) return;
+  if (!creation.valid()) throw InvalidInput("{}: the data set cannot be read", where);
+  if (H5Pget_layout(creation.id()) != H5D_CHUNKED) {
+    const Handle space(H5Dget_space(data.id()), H5Sclose);
+    const hssize_t numbers = space.valid() ? H5Sget_simple_extent_npoints(space.id()) : -1;
+    if (numbers < 0 || H5Dget_storage_size(data.id()) / bytes < static_cast<hsize_t>(numbers))
+      throw InvalidInput("{}: it declares {} numbers and holds fewer", where, numbers);
+    return;
+  }
   std::array<hsize_t, 3> chunk = {1, 1, 1};
   const int rank = H5Pget_chunk(creation.id(), static_cast<int>(chunk.size()), chunk.data());
   hsize_t numbers = 1;

@@ -1,4 +1,6 @@
 #include <cmath>
+#include <cstdint>
+#include <limits>
 #include <nlohmann/json.hpp>
 
 #include "core/error.h"
@@ -24,6 +26,14 @@ Mount MountFromName(const std::string& name) {
     if (known == name) return mount;
   }
   throw InternalError("the store is damaged: '{}' is no camera mount", name);
+}
+
+/// The library converts any number to an int, whatever it is.
+int IntOf(const Json& json) {
+  const auto number = json.is_number_integer() ? json.get<std::int64_t>() : std::numeric_limits<std::int64_t>::max();
+  if (number < std::numeric_limits<int>::min() || number > std::numeric_limits<int>::max())
+    throw InternalError("the store is damaged: {} is no count", json.dump());
+  return static_cast<int>(number);
 }
 
 /// The upper three rows of the 4x4 matrix, row by row.
@@ -56,8 +66,8 @@ Json CameraToJson(const Camera& camera) {
 Camera CameraFromJson(const Json& json) {
   Camera camera;
   camera.name = json.at("name").get<std::string>();
-  camera.width_px = json.at("width_px").get<int>();
-  camera.height_px = json.at("height_px").get<int>();
+  camera.width_px = IntOf(json.at("width_px"));
+  camera.height_px = IntOf(json.at("height_px"));
   camera.fx_px = json.at("fx_px").get<double>();
   camera.fy_px = json.at("fy_px").get<double>();
   camera.cx_px = json.at("cx_px").get<double>();
@@ -87,7 +97,7 @@ Json StillToJson(const StillRule& still) {
 StillRule StillFromJson(const Json& json) {
   return {json.at("enabled").get<bool>(),        json.at("translation_m").get<double>(),
           json.at("rotation_rad").get<double>(), json.at("closure").get<double>(),
-          json.at("dwell_chunks").get<int>(),    json.at("min_chunks").get<int>()};
+          IntOf(json.at("dwell_chunks")),        IntOf(json.at("min_chunks"))};
 }
 
 Json ConditionToJson(const Condition& condition) {
@@ -193,7 +203,7 @@ Task DecodeTask(const std::string& text) {
     task.arms = json.at("arms").get<std::vector<std::string>>();
     task.cameras = CamerasFromJson(json.at("cameras"));
     task.period_s = json.at("period_s").get<double>();
-    task.max_chunks = json.at("max_chunks").get<int>();
+    task.max_chunks = IntOf(json.at("max_chunks"));
     task.still = StillFromJson(json.at("still"));
     task.workspace_m = {PointFromJson(json.at("workspace_m").at("min")),
                         PointFromJson(json.at("workspace_m").at("max"))};

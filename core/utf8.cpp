@@ -19,4 +19,14 @@ std::size_t Utf8Length(std::string_view text) {
   return 0;
 }
 
+std::size_t Utf8Prefix(std::string_view text) {
+  std::size_t at = 0;
+  while (at < text.size()) {
+    const std::size_t length = Utf8Length(text.substr(at));
+    if (length == 0) break;
+    at += length;
+  }
+  return at;
+}
+
 }  // namespace evac

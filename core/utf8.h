@@ -9,4 +9,7 @@ namespace evac {
 /// none: overlong forms, surrogates, beyond U+10FFFF, cut short (Unicode 15, table 3-7).
 std::size_t Utf8Length(std::string_view text);
 
+/// Length in bytes of the well-formed part at the front: the text's own length if all of it is UTF-8.
+std::size_t Utf8Prefix(std::string_view text);
+
 }  // namespace evac

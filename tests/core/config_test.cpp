@@ -112,6 +112,7 @@ TEST(Config, WhatIsNoMappingIsRefusedWithItsLine) {
 TEST(Config, BytesThatAreNoUtf8AreRefusedWithTheirLine) {
   EXPECT_THAT(MessageOf([] { Config::FromText("a: 1\nc\xEF mmand: 2\n", "p.yaml"); }),
               AllOf(HasSubstr("p.yaml:2"), HasSubstr("0xef"), HasSubstr("UTF-8")));
+  EXPECT_THAT(MessageOf([] { Config::FromText("a: 1\nb: [\"\\_\"]\n", "p.yaml"); }), HasSubstr("p.yaml:2: an escape"));
   EXPECT_EQ(Config::FromText("a: \xC3\xA9\n", "p.yaml").Get<std::string>("a"), "\xC3\xA9");
 }
 
