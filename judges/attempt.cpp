@@ -80,12 +80,13 @@ class Story {
   }
   bool IsHeldAtEnd() const { return forces_.back().BothHold(); }
 
-  /// After the last frame at which both fingers held it: how it came down.
+  /// How it came down after the last frame at which both fingers held it. A hand that is told to open lets go within the
+  /// period: what it was told a moment later says whether it meant to.
   bool Fell() const {
     std::size_t last = 0;
     for (std::size_t k = 0; k < frames(); ++k) last = forces_[k].BothHold() ? k : last;
-    const double told = attempt_.told[last].back().closure;
-    return Height(last) - Height(frames() - 1) > kFell_m || told > kClosed;
+    const double told_later = attempt_.told[std::min(last + 2, frames() - 1)].back().closure;
+    return Height(last) - Height(frames() - 1) > kFell_m || told_later > kClosed;
   }
 
   bool IsMoved() const {

@@ -60,8 +60,8 @@ struct Plotted {
 void PlotPush(const Surroundings& around, Plotted& plot) {
   SplitMix64& random = around.random;
   const Eigen::Vector2d forward = Direction(random.Uniform(0, 2 * kPi));
-  const Eigen::Vector2d aside = 0.02 * random.Normal() * Eigen::Vector2d(-forward.y(), forward.x());
-  const double begin_m = random.Uniform(0.08, 0.13), end_m = random.Uniform(0.02, 0.15);
+  const Eigen::Vector2d aside = 0.012 * random.Normal() * Eigen::Vector2d(-forward.y(), forward.x());
+  const double begin_m = random.Uniform(0.08, 0.13), end_m = random.Uniform(0.04, 0.15);
   const double height_m = std::max(kLowest_m, around.knowledge.grasp_m * random.Uniform(0.55, 1.0));
   const double yaw_rad = random.Uniform(-kPi / 2, kPi / 2);
   const bool closed = random.Uniform() < 0.7;

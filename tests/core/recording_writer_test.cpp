@@ -1,0 +1,118 @@
+#include "core/recording_writer.h"
+
+#include <gmock/gmock.h>
+
+#include <opencv2/imgproc.hpp>
+
+#include "core/error.h"
+#include "core/hash.h"
+#include "core/recording.h"
+#include "core/seed.h"
+#include "tests/support/temp_folder.h"
+
+namespace evac {
+namespace {
+
+constexpr int kSteps = 5, kWidth_px = 24, kHeight_px = 16;
+
+Camera MakeCamera(const std::string& name, Mount mount) {
+  Camera camera{name, kWidth_px, kHeight_px, 20, 21, 12, 8, mount, Eigen::Isometry3d::Identity()};
+  camera.mount_from_camera = Eigen::Translation3d(0.05, 0.01, -0.1) * Eigen::AngleAxisd(0.4, Eigen::Vector3d::UnitY());
+  return camera;
+}
+
+/// Small things of many colours on grey, as on a desk seen from afar.
+cv::Mat Colourful(std::uint64_t seed) {
+  SplitMix64 random(seed);
+  cv::Mat picture(kHeight_px, kWidth_px, CV_8UC3, cv::Scalar::all(180));
+  for (int i = 0; i < 12; ++i) {
+    const auto below = [&](int bound) { return static_cast<int>(random.Below(static_cast<std::uint64_t>(bound))); };
+    const cv::Rect thing(below(kWidth_px - 4), below(kHeight_px - 4), 1 + below(4), 1 + below(4));
+    picture(thing) = cv::Scalar(below(256), below(256), below(256));
+  }
+  return picture;
+}
+
+Arms ArmAt(int step, double closure) {
+  const Eigen::Isometry3d pose = Eigen::Translation3d(0.3 + 0.01 * step, -0.1, 0.2) *
+                                 Eigen::AngleAxisd(0.1 * step, Eigen::Vector3d(1, 2, 3).normalized());
+  return {{pose, closure}};
+}
+
+RecordedEpisode OneArmEpisode() {
+  RecordedEpisode episode;
+  episode.cameras = {MakeCamera("head", Mount::kBase), MakeCamera("hand_right", Mount::kRightGripper)};
+  for (int step = 0; step < kSteps; ++step) {
+    episode.arms.push_back(ArmAt(step, 0.6));
+    episode.told.push_back(ArmAt(step + 1, 1));
+    episode.pictures.push_back({Colourful(2 * static_cast<std::uint64_t>(step)), Colourful(2 * static_cast<std::uint64_t>(step) + 1)});
+  }
+  return episode;
+}
+
+double MeanDifference(const cv::Mat& a, const cv::Mat& b) {
+  cv::Mat difference;
+  cv::absdiff(a, b, difference);
+  const cv::Scalar mean = cv::mean(difference);
+  return (mean[0] + mean[1] + mean[2]) / 3;
+}
+
+TEST(RecordingWriter, AnEpisodeThatWasWrittenIsReadAsItWas) {
+  const TempFolder folder;
+  const TreePlace place{folder.path(), "take_bottle", "000007"};
+  const RecordedEpisode episode = OneArmEpisode();
+  WriteRecording(place, episode, {.crf = 4, .scale = 2});
+  const Recording read = ReadRecording(place.Folder(), {.read_told = true});
+  EXPECT_EQ(read.id, "take_bottle-000007");
+  EXPECT_DOUBLE_EQ(read.period_s, 0.1);
+  EXPECT_THAT(read.arm_names, testing::ElementsAre("right"));
+  ASSERT_EQ(read.arms.size(), kSteps);
+  ASSERT_EQ(read.told.size(), kSteps);
+  for (int step = 0; step < kSteps; ++step) {
+    const auto k = static_cast<std::size_t>(step);
+    EXPECT_TRUE(read.arms[k][0].base_from_gripper.isApprox(episode.arms[k][0].base_from_gripper, 1e-9));
+    EXPECT_TRUE(read.told[k][0].base_from_gripper.isApprox(episode.told[k][0].base_from_gripper, 1e-9));
+    EXPECT_NEAR(read.arms[k][0].closure, 0.6, 1e-12);
+    EXPECT_NEAR(read.told[k][0].closure, 1, 1e-12);
+  }
+  ASSERT_EQ(read.cameras.size(), 2u);
+  EXPECT_EQ(read.cameras[1].width_px, 2 * kWidth_px);
+  EXPECT_DOUBLE_EQ(read.cameras[1].fy_px, 42);
+  EXPECT_TRUE(read.cameras[1].mount_from_camera.isApprox(episode.cameras[1].mount_from_camera, 1e-9));
+}
+
+TEST(RecordingWriter, DrawnTwiceAsLargeTheColoursOfSmallThingsComeBackCloser) {
+  const TempFolder folder;
+  const RecordedEpisode episode = OneArmEpisode();
+  const auto difference_at = [&](int scale) {
+    const TreePlace place{folder.path(), "task", std::to_string(scale)};
+    WriteRecording(place, episode, {.crf = 4, .scale = scale});
+    const cv::Mat video = ReadRecording(place.Folder()).first_images[0];
+    cv::Mat picture;
+    cv::resize(video, picture, {kWidth_px, kHeight_px}, 0, 0, cv::INTER_AREA);
+    return MeanDifference(picture, episode.pictures[0][0]);
+  };
+  EXPECT_LT(difference_at(2), 0.7 * difference_at(1));
+}
+
+TEST(RecordingWriter, TheSameEpisodeGivesTheSameBytes) {
+  const TempFolder folder;
+  const auto hashes = [&](const std::string& name) {
+    const TreePlace place{folder / name, "task", "1"};
+    WriteRecording(place, OneArmEpisode(), {});
+    std::string all;
+    for (const auto& file : ReadRecording(place.Folder()).files) all += Sha256HexOfFile(file) + "\n";
+    return all;
+  };
+  EXPECT_EQ(hashes("a"), hashes("b"));
+}
+
+TEST(RecordingWriter, TracksOfDifferentLengthsAreRefused) {
+  const TempFolder folder;
+  RecordedEpisode episode = OneArmEpisode();
+  episode.told.pop_back();
+  EXPECT_THROW(WriteRecording({folder.path(), "task", "1"}, episode, {}), Error);
+}
+
+}  // namespace
+}  // namespace evac
