@@ -3,6 +3,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <array>
+#include <atomic>
 #include <cmath>
 #include <fstream>
 
@@ -194,6 +196,31 @@ TEST(Trainer, AccumulatedPartsAreOneStepOfTheirMean) {
   options.accumulate = 2;
   Trainer(parts.Parameters(), options, two.path()).Run({.loss = [&](const StepPlace& p) { return data(parts, p); }});
   EXPECT_TRUE(at::allclose(whole.All(), parts.All(), 1e-5, 1e-6));
+}
+
+TEST(Trainer, PartsOfAStepSideBySideAreThoseOneAfterTheOther) {
+  const TempFolder one, two;
+  TrainerOptions options = Quick(20);
+  options.accumulate = 2;
+  Regression alone, first, second;
+  Trainer(alone.Parameters(), options, one.path()).Run({.loss = [&](const StepPlace& p) { return alone.Loss(p); }});
+  Trainer both(first.Parameters(), options, two.path());
+  std::atomic<int> by_replica = 0;
+  both.AddReplica({second.Parameters(), [&](const StepPlace& p) {
+                     ++by_replica;
+                     return second.Loss(p);
+                   }});
+  both.Run({.loss = [&](const StepPlace& p) { return first.Loss(p); }});
+  EXPECT_EQ(by_replica, 20);
+  EXPECT_TRUE(at::equal(alone.All(), first.All()));
+  EXPECT_TRUE(at::equal(first.All(), second.All())) << "they share one vector of values";
+}
+
+TEST(Trainer, ReplicasOfOtherParametersAreRefused) {
+  const TempFolder folder;
+  Regression regression;
+  Trainer trainer(regression.Parameters(), Quick(3), folder.path());
+  EXPECT_THROW(trainer.AddReplica({{{"weight", at::zeros({3, 1})}}, {}}), TensorError);
 }
 
 TEST(Trainer, RefusesTheCheckpointOfAnotherTraining) {

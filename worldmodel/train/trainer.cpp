@@ -61,12 +61,13 @@ double LearningRateAt(const TrainerOptions& options, std::int64_t step, std::int
 }
 
 std::string TrainerProgress::Line() const {
-  std::string line = Text("%lld/%lld steps, loss %.5f", static_cast<long long>(step), static_cast<long long>(steps), loss);
+  std::string line = Text("%lld", static_cast<long long>(step));
+  if (steps > 0) line += Text("/%lld", static_cast<long long>(steps));
+  line += Text(" steps, loss %.5f", loss);
   if (holdout) line += Text(", hold-out %.5f", *holdout);
   if (best) line += Text(" (best %.5f)", *best);
-  if (steps_per_s > 0) {
-    line += Text(", %.2f steps/s, ", steps_per_s) + Duration(static_cast<double>(steps - step) / steps_per_s) + " left";
-  }
+  if (steps_per_s > 0) line += Text(", %.2f steps/s", steps_per_s);
+  if (steps_per_s > 0 && steps > 0) line += ", " + Duration(static_cast<double>(steps - step) / steps_per_s) + " left";
   return line;
 }
 
@@ -142,10 +143,13 @@ Trainer::StepOutcome Trainer::Step(const TrainerCallbacks& callbacks) {
 }
 
 void Trainer::PlanSteps() {
-  const std::int64_t timed = run_steps_ - kPlanFrom;
-  if (run_steps_ == kPlanFrom) run_started_ = Clock::now();
+  const std::int64_t timed = run_steps_ - timed_from_;
+  if (run_steps_ == kPlanFrom) {
+    run_started_ = Clock::now();
+    timed_from_ = run_steps_;
+  }
   const double seconds = SecondsSince(run_started_);
-  if (timed < 4 || (seconds < kPlanSeconds && seconds < options_.minutes * 6)) return;
+  if (run_steps_ <= kPlanFrom || timed < 4 || (seconds < kPlanSeconds && seconds < options_.minutes * 6)) return;
   const double rate = static_cast<double>(timed) / seconds;
   steps_ = std::max<std::int64_t>(step_ + 1, step_ + static_cast<std::int64_t>(rate * (options_.minutes * 60 - seconds)));
   planned_ = true;
@@ -189,8 +193,8 @@ void Trainer::Record(const StepOutcome& outcome, double seconds) {
 
 void Trainer::Report(const TrainerCallbacks& callbacks) const {
   if (!callbacks.on_progress) return;
-  const std::int64_t timed = run_steps_;
-  callbacks.on_progress({step_, steps_, smooth_loss_, static_cast<double>(timed) / SecondsSince(run_started_),
+  const auto timed = static_cast<double>(run_steps_ - timed_from_);
+  callbacks.on_progress({step_, planned_ ? steps_ : 0, smooth_loss_, timed / std::max(SecondsSince(run_started_), 1e-6),
                          last_score_, best_score_});
 }
 
@@ -203,7 +207,7 @@ std::string Trainer::WhyEnd(const TrainerCallbacks& callbacks) const {
 
 TrainerSummary Trainer::Run(const TrainerCallbacks& callbacks) {
   run_started_ = saved_ = Clock::now();
-  run_steps_ = 0;
+  run_steps_ = timed_from_ = 0;
   std::string why = WhyEnd(callbacks);
   while (why.empty()) {
     const Clock::time_point started = Clock::now();

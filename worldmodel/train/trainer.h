@@ -39,7 +39,7 @@ struct TrainerOptions {
 double LearningRateAt(const TrainerOptions& options, std::int64_t step, std::int64_t steps);
 
 struct TrainerProgress {
-  std::int64_t step = 0, steps = 0;  ///< done, in all
+  std::int64_t step = 0, steps = 0;  ///< done, in all; 0 while minutes are not yet turned into steps
   double loss = 0;                   ///< of the last steps, smoothed
   double steps_per_s = 0;
   std::optional<double> holdout, best;
@@ -130,7 +130,7 @@ class Trainer {
   std::int64_t best_step_ = 0, step_ = 0, steps_ = 0, holdouts_since_best_ = 0, not_finite_ = 0;
   bool planned_ = false;  ///< the number of steps stands
   double smooth_loss_ = 0;
-  std::int64_t run_steps_ = 0;      ///< by this process
+  std::int64_t run_steps_ = 0, timed_from_ = 0;  ///< by this process; those after which time is taken
   Clock::time_point run_started_, saved_;
 };
 
