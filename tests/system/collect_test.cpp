@@ -1,0 +1,136 @@
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <signal.h>
+#include <sys/wait.h>
+
+#include <set>
+
+#include "apps/collect_recipe.h"
+#include "core/error.h"
+#include "core/file.h"
+#include "core/hash.h"
+#include "core/recording.h"
+#include "core/seed.h"
+#include "core/tensor_file.h"
+#include "tests/support/command.h"
+#include "tests/support/temp_folder.h"
+#include "tests/system/process_support.h"
+
+namespace evac {
+namespace {
+
+namespace fs = std::filesystem;
+using system_test::WaitUntil;
+using testing::HasSubstr;
+
+const std::string kRecipe = EVAC_SOURCE_DIR "/apps/configs/desk_recipe.yaml";
+const std::string kModel = EVAC_SOURCE_DIR "/apps/configs/desk_model.yaml";
+
+/// Three-chunk episodes: enough to look, go there and write.
+std::vector<std::string> Words(const fs::path& out, const std::vector<std::string>& more = {}) {
+  std::vector<std::string> words = {Binary("evac"), "collect", kRecipe, "--out", out, "--seed", "5", "--set", "max_chunks=3"};
+  words.insert(words.end(), more.begin(), more.end());
+  return words;
+}
+
+std::string HashesBelow(const fs::path& root) {
+  std::set<fs::path> files;
+  for (const auto& entry : fs::recursive_directory_iterator(root)) {
+    if (entry.is_regular_file()) files.insert(fs::relative(entry.path(), root));
+  }
+  std::string all;
+  for (const fs::path& file : files) all += file.string() + " " + Sha256HexOfFile(root / file) + "\n";
+  return all;
+}
+
+TEST(CollectCommand, KilledAndGoneOnWithItGivesTheSameBytesForAnyNumberOfJobs) {
+  const TempFolder folder;
+  ASSERT_EQ(RunCommand(Words(folder / "whole", {"--episodes", "6", "--jobs", "2"})).exit_code, 0);
+  const fs::path cut = folder / "cut";
+  const pid_t pid = StartCommand(Words(cut, {"--episodes", "6", "--jobs", "1"}), folder / "log");
+  EXPECT_TRUE(WaitUntil([&] { return fs::exists(cut / "rows/take_toast/000001.json"); }));
+  ::kill(pid, SIGKILL);
+  ::waitpid(pid, nullptr, 0);
+  EXPECT_FALSE(fs::exists(cut / "manifest.csv"));
+  ASSERT_EQ(RunCommand(Words(cut, {"--episodes", "6", "--jobs", "1"})).exit_code, 0);
+  for (const auto& entry : fs::recursive_directory_iterator(cut)) {
+    if (entry.path().extension() == ".tmp") fs::remove(entry.path());  // of the file that was being written
+  }
+  EXPECT_EQ(HashesBelow(cut), HashesBelow(folder / "whole"));
+}
+
+TEST(CollectCommand, ACollectionIsARecordingTreeThatPacks) {
+  const TempFolder folder;
+  const CommandResult collected = RunCommand(Words(folder / "all", {"--episodes", "4"}));
+  ASSERT_EQ(collected.exit_code, 0) << collected.err;
+  EXPECT_THAT(collected.out, HasSubstr("4 episodes"));
+  const Recording recording = ReadRecording(folder / "all/observations/take_ham/000002", {.read_told = true});
+  EXPECT_THAT(recording.arm_names, testing::ElementsAre("right"));
+  EXPECT_EQ(recording.arms.size(), 25u);
+  EXPECT_EQ(recording.told.size(), 25u);
+  EXPECT_EQ(recording.cameras.size(), 2u);
+  const CommandResult packed = RunCommand({Binary("evac"), "pack", folder / "all", "--out", folder / "shards", "--config", kModel,
+                                           "--cameras", "head,hand_right", "--holdout", "0"});
+  ASSERT_EQ(packed.exit_code, 0) << packed.err;
+  const TensorFile shard = TensorFile::Open(folder / "shards/shard_00000.safetensors");
+  EXPECT_EQ(shard.Get("frames").shape, (std::vector<std::int64_t>{100, 2, 64, 96, 3}));
+  EXPECT_EQ(shard.metadata().at("arms"), "right");
+  EXPECT_EQ(shard.metadata().at("cameras"), "head,hand_right");
+}
+
+TEST(CollectCommand, RefusesAFolderThatHoldsAnotherCollection) {
+  const TempFolder folder;
+  ASSERT_EQ(RunCommand(Words(folder / "a", {"--episodes", "1"})).exit_code, 0);
+  const CommandResult other = RunCommand(Words(folder / "a", {"--episodes", "1", "--set", "video.crf=30"}));
+  EXPECT_EQ(other.exit_code, 2);
+  EXPECT_THAT(other.err, HasSubstr("holds another collection"));
+}
+
+TEST(Recipe, GrowsWithoutChangingWhatIsThere) {
+  const Recipe few = ReadRecipe(kRecipe, {"episodes=10"}), many = ReadRecipe(kRecipe, {"episodes=5000"});
+  EXPECT_EQ(few.hash, many.hash);
+  EXPECT_EQ(CollectedJson(JobAt(few, 7, 9).row), CollectedJson(JobAt(many, 7, 9).row));
+  EXPECT_NE(few.hash, ReadRecipe(kRecipe, {"max_chunks=11"}).hash);
+}
+
+TEST(Recipe, EpisodesOfOneStateBeginAlikeAndGoOnDifferently) {
+  const Recipe recipe = ReadRecipe(kRecipe, {});
+  const CollectedEpisode a = JobAt(recipe, 7, 0).row, b = JobAt(recipe, 7, 4).row, c = JobAt(recipe, 7, 12).row;
+  EXPECT_EQ(a.state_seed, b.state_seed);
+  EXPECT_NE(a.policy_seed, b.policy_seed);
+  EXPECT_NE(a.state_seed, c.state_seed);
+}
+
+TEST(Recipe, NoInitialStateIsOneOfASuites) {
+  const Recipe recipe = ReadRecipe(kRecipe, {});
+  std::set<std::uint64_t> collected;
+  for (std::uint64_t seed = 0; seed < 100; ++seed) {
+    for (std::int64_t index = 0; index < 400; ++index) collected.insert(JobAt(recipe, seed, index).row.state_seed);
+  }
+  for (std::uint64_t seed = 0; seed < 100; ++seed) {
+    for (std::uint64_t state = 0; state < 100; ++state) {
+      for (const CollectTask& task : recipe.tasks)  // as harness/suite.cpp and harness/scheduler.cpp seed them
+        ASSERT_FALSE(collected.contains(SeedFor(SeedFor(SeedFor(seed, "initial state"), state), task.task.id)));
+    }
+  }
+}
+
+TEST(Recipe, AMistakeIsNamedWithItsFieldBeforeAnythingRuns) {
+  const auto error_of = [](const std::string& assignment) -> std::string {
+    try {
+      ReadRecipe(kRecipe, {assignment});
+    } catch (const Error& error) {
+      return error.what();
+    }
+    return "it was read";
+  };
+  EXPECT_THAT(error_of("mix.0.noise_m=[0.1, 0]"), HasSubstr("noise_m"));
+  EXPECT_THAT(error_of("mix.0.noise_m=[0, 3]"), HasSubstr("noise-m"));
+  EXPECT_THAT(error_of("mix.0.courage=[0, 1]"), HasSubstr("courage"));
+  EXPECT_THAT(error_of("mix.0.policy=oracle"), HasSubstr("policy"));
+  EXPECT_THAT(error_of("tasks.0.object=cup"), HasSubstr("cup"));
+  EXPECT_THAT(error_of("mix.0.share=0"), HasSubstr("share"));
+}
+
+}  // namespace
+}  // namespace evac
