@@ -76,7 +76,8 @@ std::string TaskInfo(const Task& task, const std::vector<CollectedEpisode>& rows
   Json list = Json::array();
   for (const CollectedEpisode& row : rows) {
     if (row.task != task.id || row.frames == 0) continue;
-    const Json action = {{"start_frame", 0}, {"end_frame", row.frames - 1}, {"action_text", task.instruction}, {"skill", row.behaviour}};
+    const Json action = {
+        {"start_frame", 0}, {"end_frame", row.frames - 1}, {"action_text", task.instruction}, {"skill", row.behaviour}};
     list.push_back({{"episode_id", row.episode},
                     {"task_id", task.id},
                     {"task_name", task.instruction},

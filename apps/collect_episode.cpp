@@ -64,9 +64,7 @@ EpisodeTruth TruthOf(const CollectJob& job, const Task& task, const CollectedRun
   return truth;
 }
 
-const Task& TaskOf(const CollectJob& job) {
-  return job.behaviour->without_object ? job.task->without : job.task->task;
-}
+const Task& TaskOf(const CollectJob& job) { return job.behaviour->without_object ? job.task->without : job.task->task; }
 
 }  // namespace
 
@@ -135,6 +133,8 @@ CollectedEpisode EpisodeCollector::Collect(const CollectJob& job) {
   return row;
 }
 
-TreePlace PlaceOf(const std::filesystem::path& out, const CollectedEpisode& row) { return {out, row.task, row.episode}; }
+TreePlace PlaceOf(const std::filesystem::path& out, const CollectedEpisode& row) {
+  return {out, row.task, row.episode};
+}
 
 }  // namespace evac

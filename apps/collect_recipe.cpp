@@ -51,7 +51,8 @@ Behaviour ReadBehaviour(const Config& page) {
   behaviour.does = page.Get<std::string>("does", "");
   behaviour.without_object = page.Get<bool>("without_object", false);
   page.Require(behaviour.share > 0 && std::isfinite(behaviour.share), "share", "a positive number");
-  page.Require(behaviour.policy == "visual_pick" || behaviour.policy == "explorer", "policy", "visual_pick or explorer");
+  page.Require(behaviour.policy == "visual_pick" || behaviour.policy == "explorer", "policy",
+               "visual_pick or explorer");
   page.Require((behaviour.policy == "explorer") == page.Has("does"), "does", "it with policy explorer, and only there");
   if (page.Has("does")) ExplorationFromName(behaviour.does);
   static const std::set<std::string> kOwn = {"name", "share", "policy", "does", "without_object"};
@@ -181,7 +182,8 @@ Recipe ReadRecipe(const fs::path& path, const std::vector<std::string>& assignme
   for (const Behaviour& behaviour : recipe.mix) {  // both ends of every range are values that the policy takes
     for (const bool high : {false, true}) {
       CollectJob job{&recipe.tasks.front(), &behaviour, {}};
-      for (const auto& [name, range] : behaviour.parameters) job.row.parameters[name] = high ? range.second : range.first;
+      for (const auto& [name, range] : behaviour.parameters)
+        job.row.parameters[name] = high ? range.second : range.first;
       MakePolicy(job, recipe.chunk_size);
     }
   }

@@ -87,8 +87,9 @@ void LeaveOutOtherRobots(Packing& packing) {
   std::erase_if(packing.sources, [&](const PackSource& source) {
     const std::size_t found = source.track.front().size();
     if (found == arms) return false;
-    packing.left_out.push_back({source.folder, "other_robot", fmt::format("{}: {} arms, wanted {} as in {}", source.folder.string(),
-                                                                         found, arms, packing.sources.front().folder.string())});
+    packing.left_out.push_back({source.folder, "other_robot",
+                                fmt::format("{}: {} arms, wanted {} as in {}", source.folder.string(), found, arms,
+                                            packing.sources.front().folder.string())});
     return true;
   });
 }
@@ -125,10 +126,10 @@ void PlanShards(const PackArguments& arguments, Packing& packing) {
 }
 
 std::string RecipeOf(const PackArguments& arguments, const Packing& packing) {
-  std::string all = fmt::format("evac-shard 1 seed {} crops {} hold-out {} clips {} period {} size {}x{} maps {}", arguments.seed,
-                                arguments.crops, arguments.hold_out, arguments.clips_per_shard, arguments.period_s,
-                                packing.clip.picture_px.width, packing.clip.picture_px.height,
-                                PoseMapWords(packing.clip.pose_map));
+  std::string all =
+      fmt::format("evac-shard 1 seed {} crops {} hold-out {} clips {} period {} size {}x{} maps {}", arguments.seed,
+                  arguments.crops, arguments.hold_out, arguments.clips_per_shard, arguments.period_s,
+                  packing.clip.picture_px.width, packing.clip.picture_px.height, PoseMapWords(packing.clip.pose_map));
   for (const std::string& camera : packing.how.cameras) all += " " + camera;
   for (const PackSource& source : packing.sources) all += "\n" + source.name + " " + source.sha256;
   return Sha256Hex(all + "\n" + StatisticsPage(packing.clip.statistics));
@@ -175,13 +176,17 @@ Clip Make(const PlannedClip& planned, const PackArguments& arguments, const Pack
   const Recording recording = ReadForPacking(source.folder, packing.how);
   std::optional<EpisodeTruth> truth;
   if (source.row) truth = ReadTruth(TruthPath(*PlaceOf(source.folder)), source.frames, recording.cameras.size());
-  const ClipSource read = ReadClipSource(recording, truth ? &*truth : nullptr, source.row ? source.row->video_scale : 1);
+  const ClipSource read =
+      ReadClipSource(recording, truth ? &*truth : nullptr, source.row ? source.row->video_scale : 1);
   const cv::Size picture_px = read.pictures.front().front().size();
-  SplitMix64 random(SeedFor(SeedFor(SeedFor(arguments.seed, "crop"), source.name), static_cast<std::uint64_t>(planned.crop)));
-  const Crop crop = planned.crop == 0 ? Crop{0, 0, picture_px.width, picture_px.height} : RandomCrop(picture_px, random);
+  SplitMix64 random(
+      SeedFor(SeedFor(SeedFor(arguments.seed, "crop"), source.name), static_cast<std::uint64_t>(planned.crop)));
+  const Crop crop =
+      planned.crop == 0 ? Crop{0, 0, picture_px.width, picture_px.height} : RandomCrop(picture_px, random);
   Clip clip = MakeClip(read, crop, packing.clip);
   clip.recording = static_cast<std::int64_t>(planned.source);
-  clip.task = static_cast<std::int32_t>(std::find(packing.tasks.begin(), packing.tasks.end(), source.task) - packing.tasks.begin());
+  clip.task = static_cast<std::int32_t>(std::find(packing.tasks.begin(), packing.tasks.end(), source.task) -
+                                        packing.tasks.begin());
   clip.outcome = static_cast<std::int8_t>(!source.row ? -1 : source.row->success ? 1 : 0);
   return clip;
 }
@@ -237,8 +242,9 @@ void WriteIndex(const PackArguments& arguments, const Packing& packing) {
                       {"sha256", Sha256HexOfFile(path)}});
   }
   for (const PackSource& source : packing.sources) recordings.push_back(source.name);
-  const Json page = {{"format", "evac-shards"}, {"version", 1},          {"recipe", packing.recipe},
-                     {"tasks", packing.tasks},  {"recordings", recordings}, {"shards", shards}};
+  const Json page = {{"format", "evac-shards"},  {"version", 1},
+                     {"recipe", packing.recipe}, {"tasks", packing.tasks},
+                     {"recordings", recordings}, {"shards", shards}};
   WriteFileAtomically(arguments.out / "shards.json", page.dump(1) + "\n");
 }
 

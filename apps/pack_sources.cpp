@@ -27,7 +27,8 @@ bool LooksLikeRecording(const fs::path& folder) {
   return fs::exists(folder / "action.npy") || fs::exists(folder / "proprio_stats.h5") || PlaceOf(folder).has_value();
 }
 
-std::string HashOfFiles(const Recording& recording, const std::optional<CollectedEpisode>& row, const fs::path& folder) {
+std::string HashOfFiles(const Recording& recording, const std::optional<CollectedEpisode>& row,
+                        const fs::path& folder) {
   std::string all;
   for (const fs::path& file : recording.files) all += file.filename().string() + Sha256HexOfFile(file);
   if (row) all += CollectedJson(*row) + Sha256HexOfFile(TruthPath(*PlaceOf(folder)));

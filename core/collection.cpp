@@ -112,11 +112,11 @@ std::string CollectedCsvHeading() {
 }
 
 std::string CollectedCsvLine(const CollectedEpisode& episode) {
-  return fmt::format("{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{}\n", episode.index, episode.task, episode.episode,
-                     episode.initial_state, episode.behaviour, episode.policy, Cell(Sentence(episode.parameters)),
-                     episode.without, episode.success ? 1 : 0, episode.fate, episode.stop, episode.frames,
-                     episode.contact_frames, episode.state_seed, episode.world_seed, episode.policy_seed,
-                     Cell(episode.reason));
+  return fmt::format("{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{}\n", episode.index, episode.task,
+                     episode.episode, episode.initial_state, episode.behaviour, episode.policy,
+                     Cell(Sentence(episode.parameters)), episode.without, episode.success ? 1 : 0, episode.fate,
+                     episode.stop, episode.frames, episode.contact_frames, episode.state_seed, episode.world_seed,
+                     episode.policy_seed, Cell(episode.reason));
 }
 
 fs::path RowPath(const TreePlace& place) { return place.root / "rows" / place.task / (place.episode + ".json"); }

@@ -114,7 +114,8 @@ double AddVideoCamera(const Context& context, const std::string& name, double pe
   const fs::path path = VideoOf(context.folders, name);
   if (!fs::exists(path))
     throw InvalidInput("{}: missing: camera {} has no video", path.string(), name).Called("missing_camera");
-  const VideoFacts facts = Calling("broken_video", [&] { return LookThrough(path, context.options.count_video_frames); });
+  const VideoFacts facts =
+      Calling("broken_video", [&] { return LookThrough(path, context.options.count_video_frames); });
   CheckVideo(facts, path, context, period_s);
   recording.videos.push_back(path);
   recording.first_images.push_back(facts.first);

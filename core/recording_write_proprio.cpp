@@ -6,7 +6,7 @@
 namespace evac {
 namespace {
 
-constexpr double kClosedGripper = 120;      // AgiBot's raw reading of a closed gripper, in `state`; in `action` it is 1
+constexpr double kClosedGripper = 120;  // AgiBot's raw reading of a closed gripper, in `state`; in `action` it is 1
 constexpr std::size_t kGrowth_bytes = 1 << 20;
 
 hid_t Demand(hid_t id, const char* step) {
@@ -17,7 +17,8 @@ hid_t Demand(hid_t id, const char* step) {
 /// An HDF5 file in memory. Its objects carry no times, so that the same numbers are the same bytes.
 class MemoryH5 {
  public:
-  MemoryH5() : access_(H5Pcreate(H5P_FILE_ACCESS)), links_(H5Pcreate(H5P_LINK_CREATE)), data_(H5Pcreate(H5P_DATASET_CREATE)) {
+  MemoryH5()
+      : access_(H5Pcreate(H5P_FILE_ACCESS)), links_(H5Pcreate(H5P_LINK_CREATE)), data_(H5Pcreate(H5P_DATASET_CREATE)) {
     H5Pset_fapl_core(access_, kGrowth_bytes, /*backing_store=*/0);
     H5Pset_create_intermediate_group(links_, 1);
     H5Pset_obj_track_times(data_, 0);
@@ -32,7 +33,8 @@ class MemoryH5 {
 
   void Add(const std::string& name, const std::vector<hsize_t>& shape, const std::vector<double>& values) {
     const hid_t space = H5Screate_simple(static_cast<int>(shape.size()), shape.data(), nullptr);
-    const hid_t set = Demand(H5Dcreate2(file_, name.c_str(), H5T_IEEE_F64LE, space, links_, data_, H5P_DEFAULT), "add a track");
+    const hid_t set =
+        Demand(H5Dcreate2(file_, name.c_str(), H5T_IEEE_F64LE, space, links_, data_, H5P_DEFAULT), "add a track");
     const herr_t written = H5Dwrite(set, H5T_NATIVE_DOUBLE, H5S_ALL, H5S_ALL, H5P_DEFAULT, values.data());
     H5Dclose(set);
     H5Sclose(space);

@@ -38,7 +38,8 @@ std::string ExtrinsicsPage(const Camera& camera, const std::vector<Arms>& arms) 
 }
 
 void WriteVideo(const fs::path& path, const RecordedEpisode& episode, std::size_t view, const RecordingVideo& video) {
-  VideoWriter writer(path, {.period_s = episode.period_s, .crf = video.crf, .preset = video.preset, .scale = video.scale});
+  VideoWriter writer(path,
+                     {.period_s = episode.period_s, .crf = video.crf, .preset = video.preset, .scale = video.scale});
   for (const std::vector<cv::Mat>& pictures : episode.pictures) writer.Append(pictures[view]);
   writer.Finish();
 }

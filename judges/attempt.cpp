@@ -12,17 +12,17 @@
 namespace evac {
 namespace {
 
-constexpr double kHolding_n = 0.5;       // of each finger
-constexpr double kTouching_n = 0.02;     // of any
-constexpr double kHeld_s = 0.3;          // both fingers, to count as a grasp
-constexpr double kLifted_m = 0.03;       // above where it was at first, while held
-constexpr double kFell_m = 0.06;         // lower at the end than where it was let go
+constexpr double kHolding_n = 0.5;    // of each finger
+constexpr double kTouching_n = 0.02;  // of any
+constexpr double kHeld_s = 0.3;       // both fingers, to count as a grasp
+constexpr double kLifted_m = 0.03;    // above where it was at first, while held
+constexpr double kFell_m = 0.06;      // lower at the end than where it was let go
 constexpr double kMoved_m = 0.015;
 constexpr double kTipped_deg = 25;
-constexpr double kLow_m = 0.20;          // of the gripper: where there are things to take
+constexpr double kLow_m = 0.20;  // of the gripper: where there are things to take
 constexpr double kClosed = 0.9, kOpen = 0.5;
 constexpr double kNearMiss_m = 0.04, kEmpty_m = 0.12, kCame_m = 0.05;
-constexpr double kAround_s = 0.4;        // before and after a moment that matters
+constexpr double kAround_s = 0.4;  // before and after a moment that matters
 
 struct Forces {
   double left_n = 0, right_n = 0, other_n = 0;  ///< of the two fingers, and of the rest of the arm
@@ -48,8 +48,9 @@ Forces ForcesOn(const std::string& body, const PrivilegedFrame& frame) {
     if (contact.a != body && contact.b != body) continue;
     const std::string& other = contact.a == body ? contact.b : contact.a;
     if (!IsArm(other)) continue;
-    (other == "finger_left" ? forces.left_n : other == "finger_right" ? forces.right_n : forces.other_n) +=
-        contact.force_n;
+    (other == "finger_left"    ? forces.left_n
+     : other == "finger_right" ? forces.right_n
+                               : forces.other_n) += contact.force_n;
   }
   return forces;
 }
@@ -71,7 +72,9 @@ class Story {
   const std::vector<Forces>& forces() const { return forces_; }
   std::optional<std::size_t> closed_low() const { return closed_low_; }
 
-  bool IsTouched() const { return std::any_of(forces_.begin(), forces_.end(), [](auto& f) { return f.Touch(); }); }
+  bool IsTouched() const {
+    return std::any_of(forces_.begin(), forces_.end(), [](auto& f) { return f.Touch(); });
+  }
   bool IsHeldByBoth() const {
     return LongestRun([&](std::size_t k) { return forces_[k].BothHold(); }) >= held_frames_;
   }
@@ -80,8 +83,8 @@ class Story {
   }
   bool IsHeldAtEnd() const { return forces_.back().BothHold(); }
 
-  /// How it came down after the last frame at which both fingers held it. A hand that is told to open lets go within the
-  /// period: what it was told a moment later says whether it meant to.
+  /// How it came down after the last frame at which both fingers held it. A hand that is told to open lets go within
+  /// the period: what it was told a moment later says whether it meant to.
   bool Fell() const {
     std::size_t last = 0;
     for (std::size_t k = 0; k < frames(); ++k) last = forces_[k].BothHold() ? k : last;
@@ -97,9 +100,7 @@ class Story {
   }
 
   /// Horizontal distance of the hand from the object.
-  double Distance(std::size_t k) const {
-    return (gripper_m_[k] - base_from_object_[k].translation()).head<2>().norm();
-  }
+  double Distance(std::size_t k) const { return (gripper_m_[k] - base_from_object_[k].translation()).head<2>().norm(); }
   bool CameNear() const {
     for (std::size_t k = 0; k < frames(); ++k) {
       if (gripper_m_[k].z() < kLow_m && Distance(k) < kCame_m) return true;
@@ -200,9 +201,9 @@ std::vector<std::uint8_t> Contact(const Story& story, double period_s) {
 }  // namespace
 
 const char* Name(Fate fate) {
-  static constexpr const char* kNames[] = {"success",      "drop",      "misplaced",   "still_held",
-                                           "slip",         "wrong_object", "near_miss", "empty_grasp",
-                                           "pretended_grasp", "push",   "no_grasp",    "untouched"};
+  static constexpr const char* kNames[] = {"success",      "drop",      "misplaced",   "still_held",      "slip",
+                                           "wrong_object", "near_miss", "empty_grasp", "pretended_grasp", "push",
+                                           "no_grasp",     "untouched"};
   static_assert(std::size(kNames) == kFates);
   return kNames[static_cast<int>(fate)];
 }

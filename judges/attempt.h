@@ -11,9 +11,9 @@ namespace evac {
 /// One attempt at a task in a world that has physics, as far as what became of it depends on it.
 struct Attempt {
   const Task& task;
-  const std::string& object;     ///< the body that the task is about
-  const PrivilegedTrack& track;  ///< [T], T >= 1
-  const std::vector<Arms>& told; ///< [T] where the arms were told to be by then; the right arm, the last, works
+  const std::string& object;      ///< the body that the task is about
+  const PrivilegedTrack& track;   ///< [T], T >= 1
+  const std::vector<Arms>& told;  ///< [T] where the arms were told to be by then; the right arm, the last, works
 };
 
 /// What became of an attempt, told from what happened and never from what was meant.
@@ -37,8 +37,9 @@ const char* Name(Fate fate);
 
 struct WhatHappened {
   Fate fate = Fate::kUntouched;
-  std::string reason;                 ///< the oracle's sentence
-  std::vector<std::uint8_t> contact;  ///< [T]: 1 within .4 s of a first touch, a grasp, a release, or a hand that closes low
+  std::string reason;  ///< the oracle's sentence
+  std::vector<std::uint8_t>
+      contact;  ///< [T]: 1 within .4 s of a first touch, a grasp, a release, or a hand that closes low
 };
 
 /// @throws InvalidInput if the track has no such object, or the rubric names a body that it has not.

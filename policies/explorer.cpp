@@ -13,10 +13,10 @@ namespace evac {
 namespace {
 
 constexpr double kPi = std::numbers::pi;
-constexpr double kLowest_m = 0.026;   // fingertips just above a board that lies on the table
-constexpr double kHover_m = 0.24;     // above everything that stands there
+constexpr double kLowest_m = 0.026;  // fingertips just above a board that lies on the table
+constexpr double kHover_m = 0.24;    // above everything that stands there
 constexpr double kClosing_s = 0.55;
-constexpr double kSamples = 40;       // of places until one is far enough from the thing
+constexpr double kSamples = 40;  // of places until one is far enough from the thing
 
 /// Where the working arm may be sent without reaching across the workspace's edge.
 struct Region {
@@ -34,7 +34,9 @@ class Sketch {
  public:
   Sketch(const Eigen::Isometry3d& start, const SpeedLimits& limits) : path_(start, limits) {}
 
-  void MoveTo(const Eigen::Vector2d& xy_m, double z_m, double yaw_rad) { path_.MoveTo(PointingDown(xy_m, z_m, yaw_rad)); }
+  void MoveTo(const Eigen::Vector2d& xy_m, double z_m, double yaw_rad) {
+    path_.MoveTo(PointingDown(xy_m, z_m, yaw_rad));
+  }
   void Pause(double duration_s) { path_.Pause(duration_s); }
   double now_s() const { return path_.duration_s(); }
   Timeline& path() { return path_; }
@@ -65,7 +67,8 @@ void PlotPush(const Surroundings& around, Plotted& plot) {
   const double height_m = std::max(kLowest_m, around.knowledge.grasp_m * random.Uniform(0.55, 1.0));
   const double yaw_rad = random.Uniform(-kPi / 2, kPi / 2);
   const bool closed = random.Uniform() < 0.7;
-  const Eigen::Vector2d from_m = around.thing.xy_m + aside - begin_m * forward, to_m = around.thing.xy_m + aside + end_m * forward;
+  const Eigen::Vector2d from_m = around.thing.xy_m + aside - begin_m * forward,
+                        to_m = around.thing.xy_m + aside + end_m * forward;
   if (closed) plot.hand.emplace_back(0.2, 1);
   plot.sketch.MoveTo(from_m, kHover_m, yaw_rad);
   plot.sketch.MoveTo(from_m, height_m, yaw_rad);
@@ -105,7 +108,8 @@ void PlotWaypoints(const Surroundings& around, double lowest_m, double highest_m
     const Eigen::Vector2d xy_m = Somewhere(random);
     const double z_m = random.Uniform(lowest_m, highest_m), yaw_rad = random.Uniform(-kPi / 2, kPi / 2);
     plot.sketch.MoveTo(xy_m, z_m, yaw_rad);
-    if (random.Uniform() < 0.5) plot.hand.emplace_back(plot.sketch.now_s() - random.Uniform(0, 0.5), closure = 1 - closure);
+    if (random.Uniform() < 0.5)
+      plot.hand.emplace_back(plot.sketch.now_s() - random.Uniform(0, 0.5), closure = 1 - closure);
     if (random.Uniform() < 0.3) plot.sketch.Pause(random.Uniform(0.1, 0.6));
   }
 }
@@ -156,10 +160,18 @@ Explorer::Plan Explorer::MakePlan(const Episode& episode, const Observation& obs
   const Eigen::Isometry3d home = observation.arms.back().base_from_gripper;
   Plotted plot{Sketch(home, limits), {}};
   switch (options_.does) {
-    case Exploration::kPush: PlotPush(around, plot); break;
-    case Exploration::kWrongObject: PlotWrongObject(around, plot); break;
-    case Exploration::kRoam: PlotWaypoints(around, 0.20, 0.34, plot); break;
-    case Exploration::kRandom: PlotWaypoints(around, kLowest_m, 0.22, plot); break;
+    case Exploration::kPush:
+      PlotPush(around, plot);
+      break;
+    case Exploration::kWrongObject:
+      PlotWrongObject(around, plot);
+      break;
+    case Exploration::kRoam:
+      PlotWaypoints(around, 0.20, 0.34, plot);
+      break;
+    case Exploration::kRandom:
+      PlotWaypoints(around, kLowest_m, 0.22, plot);
+      break;
   }
   if (random.Uniform() < 0.5) plot.sketch.path().MoveTo(home);
   Plan plan{plot.sketch.path(), {}};

@@ -28,8 +28,8 @@ struct ExplorerOptions {
 };
 
 /// Shows a world what other policies never do. It looks once, with the head camera, for the things that visual_pick
-/// knows, makes one plan, follows it and rests; where it goes is random. Its plan is a function of the first picture and
-/// Reset's seed.
+/// knows, makes one plan, follows it and rests; where it goes is random. Its plan is a function of the first picture
+/// and Reset's seed.
 class Explorer : public Policy {
  public:
   /// @throws InvalidInput naming an option out of its range.
@@ -53,10 +53,10 @@ class Explorer : public Policy {
   struct Episode {
     Task task;
     std::uint64_t seed = 0;
-    std::optional<Plan> plan;    ///< none before the first look
+    std::optional<Plan> plan;  ///< none before the first look
     std::optional<ArmState> left;
-    double closure = 0;          ///< last told
-    int told = 0;                ///< targets given
+    double closure = 0;  ///< last told
+    int told = 0;        ///< targets given
   };
 
   Plan MakePlan(const Episode& episode, const Observation& observation) const;

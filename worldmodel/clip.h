@@ -30,10 +30,10 @@ struct Clip {
   std::int8_t outcome = -1;
   Crop crop;
   std::size_t length = 0, views = 0;
-  std::vector<std::uint8_t> frames, maps;     ///< [T, V, H, W, 3]
-  std::vector<float> actions, deltas;         ///< [T, 16], [T, 14]
-  std::vector<float> c2w, k, object_px;       ///< [T, V, 4, 4], [T, V, 3, 3], [T, V, 2]
-  std::vector<std::uint8_t> contact;          ///< [T]
+  std::vector<std::uint8_t> frames, maps;  ///< [T, V, H, W, 3]
+  std::vector<float> actions, deltas;      ///< [T, 16], [T, 14]
+  std::vector<float> c2w, k, object_px;    ///< [T, V, 4, 4], [T, V, 3, 3], [T, V, 2]
+  std::vector<std::uint8_t> contact;       ///< [T]
 };
 
 struct ClipOptions {
@@ -45,10 +45,10 @@ struct ClipOptions {
 
 /// One recording, all of it in memory.
 struct ClipSource {
-  std::vector<Arms> arms;                       ///< [T]: told where that is known and wanted, else measured
-  std::vector<Camera> cameras;                  ///< V, of the pictures' sizes
-  std::vector<std::vector<cv::Mat>> pictures;   ///< [T][V]
-  EpisodeTruth truth;                           ///< in pixels of the pictures; NaN and 0 where nothing is known
+  std::vector<Arms> arms;                      ///< [T]: told where that is known and wanted, else measured
+  std::vector<Camera> cameras;                 ///< V, of the pictures' sizes
+  std::vector<std::vector<cv::Mat>> pictures;  ///< [T][V]
+  EpisodeTruth truth;                          ///< in pixels of the pictures; NaN and 0 where nothing is known
 };
 
 /// Decodes the recording's pictures, `shrink` video pixels to one, and puts cameras and truth into their pixels.

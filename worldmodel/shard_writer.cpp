@@ -36,12 +36,18 @@ std::vector<TensorDeclaration> Declarations(std::int64_t clips, std::int64_t fra
                                             const cv::Size& size_px) {
   using enum TensorType;
   const std::vector<std::int64_t> pictures = {frames, views, size_px.height, size_px.width, 3};
-  return {Declare("clip_start", kI64, {clips + 1}),   Declare("clip_id", kI64, {clips}),
-          Declare("crop", kI32, {clips, 4}),          Declare("task", kI32, {clips}),
-          Declare("actions", kF32, {frames, 16}),     Declare("deltas", kF32, {frames, 14}),
-          Declare("c2w", kF32, {frames, views, 4, 4}), Declare("k", kF32, {frames, views, 3, 3}),
-          Declare("object_px", kF32, {frames, views, 2}), Declare("outcome", kI8, {clips}),
-          Declare("contact", kU8, {frames}),          Declare("frames", kU8, pictures),
+  return {Declare("clip_start", kI64, {clips + 1}),
+          Declare("clip_id", kI64, {clips}),
+          Declare("crop", kI32, {clips, 4}),
+          Declare("task", kI32, {clips}),
+          Declare("actions", kF32, {frames, 16}),
+          Declare("deltas", kF32, {frames, 14}),
+          Declare("c2w", kF32, {frames, views, 4, 4}),
+          Declare("k", kF32, {frames, views, 3, 3}),
+          Declare("object_px", kF32, {frames, views, 2}),
+          Declare("outcome", kI8, {clips}),
+          Declare("contact", kU8, {frames}),
+          Declare("frames", kU8, pictures),
           Declare("maps", kU8, pictures)};  // larger numbers first: all are aligned
 }
 

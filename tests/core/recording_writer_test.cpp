@@ -45,7 +45,8 @@ RecordedEpisode OneArmEpisode() {
   for (int step = 0; step < kSteps; ++step) {
     episode.arms.push_back(ArmAt(step, 0.6));
     episode.told.push_back(ArmAt(step + 1, 1));
-    episode.pictures.push_back({Colourful(2 * static_cast<std::uint64_t>(step)), Colourful(2 * static_cast<std::uint64_t>(step) + 1)});
+    episode.pictures.push_back(
+        {Colourful(2 * static_cast<std::uint64_t>(step)), Colourful(2 * static_cast<std::uint64_t>(step) + 1)});
   }
   return episode;
 }

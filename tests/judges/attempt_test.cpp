@@ -16,7 +16,7 @@ struct Moment {
   Vector3d object_m{0.44, -0.12, 0.0};
   Vector3d gripper_m{0.30, 0.0, 0.30};
   double closure = 0;
-  double fingers_n = 0;  ///< of each finger on the object
+  double fingers_n = 0;        ///< of each finger on the object
   double other_fingers_n = 0;  ///< of each finger on the plate
   double tilt_rad = 0;
 };
@@ -26,7 +26,8 @@ Task CarryTask() {
   Task task;
   task.id = "carry";
   task.rubric.version = "1";
-  const Condition there{"displacement", "thing", "", 0.15, std::nullopt}, low{"height", "thing", "", std::nullopt, 0.01};
+  const Condition there{"displacement", "thing", "", 0.15, std::nullopt},
+      low{"height", "thing", "", std::nullopt, 0.01};
   const Condition free{"contact", "thing", "finger_left", std::nullopt, 0.05};
   task.rubric.stages = {{"release", "", {there, low, free}, 0.2, true}};
   return task;
@@ -78,7 +79,10 @@ const Moment kLifted{.object_m = kThing_m + kUp_m, .gripper_m = kThing_m + kUp_m
 
 TEST(Attempt, CarriedPlacedAndLetGoIsASuccess) {
   EXPECT_EQ(AttemptMaker()
-                .For(5, kHome).For(2, kOpenAtThing).For(5, kHolding).For(5, kLifted)
+                .For(5, kHome)
+                .For(2, kOpenAtThing)
+                .For(5, kHolding)
+                .For(5, kLifted)
                 .For(5, {.object_m = kPlace_m, .gripper_m = kPlace_m, .closure = 1, .fingers_n = 5})
                 .For(5, {.object_m = kPlace_m})
                 .fate(),
@@ -93,11 +97,13 @@ TEST(Attempt, WhatFallsFarOrOutOfAClosedHandWasDropped) {
 }
 
 TEST(Attempt, WhatIsPutDownElsewhereIsMisplaced) {
-  const Moment opening{.object_m = kThing_m + Vector3d(0, 0, 0.04), .gripper_m = kThing_m, .closure = 0.3, .fingers_n = 5};
+  const Moment opening{
+      .object_m = kThing_m + Vector3d(0, 0, 0.04), .gripper_m = kThing_m, .closure = 0.3, .fingers_n = 5};
   EXPECT_EQ(AttemptMaker().For(5, kHolding).For(5, kLifted).For(3, opening).For(5, kHome).fate(), Fate::kMisplaced);
   Moment still_closed = opening;  // it lets go within the period in which it is told to
   still_closed.closure = 1;
-  EXPECT_EQ(AttemptMaker().For(5, kHolding).For(5, kLifted).For(3, still_closed).For(5, kHome).fate(), Fate::kMisplaced);
+  EXPECT_EQ(AttemptMaker().For(5, kHolding).For(5, kLifted).For(3, still_closed).For(5, kHome).fate(),
+            Fate::kMisplaced);
 }
 
 TEST(Attempt, InTheHandAtTheEndIsStillHeld) {

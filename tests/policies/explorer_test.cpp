@@ -9,7 +9,8 @@
 namespace evac {
 namespace {
 
-constexpr Exploration kAll[] = {Exploration::kPush, Exploration::kWrongObject, Exploration::kRoam, Exploration::kRandom};
+constexpr Exploration kAll[] = {Exploration::kPush, Exploration::kWrongObject, Exploration::kRoam,
+                                Exploration::kRandom};
 
 Task ReadTask(const std::string& name) {
   return ReadTaskPage(EVAC_SOURCE_DIR "/worldmodel/sim/scenes/" + name + ".yaml");
@@ -75,7 +76,8 @@ TEST(Explorer, APushGoesThroughWhereTheThingUsuallyIsAndNotAboveIt) {
   const Task task = ReadTask("take_ham");
   double nearest_m = 1;
   for (const Arms& arms : Targets(Exploration::kPush, task, 1, 12))
-    nearest_m = std::min(nearest_m, (arms[0].base_from_gripper.translation() - Eigen::Vector3d(0.44, -0.14, 0.03)).norm());
+    nearest_m =
+        std::min(nearest_m, (arms[0].base_from_gripper.translation() - Eigen::Vector3d(0.44, -0.14, 0.03)).norm());
   EXPECT_LT(nearest_m, 0.06);
 }
 

@@ -28,7 +28,8 @@ const std::string kModel = EVAC_SOURCE_DIR "/apps/configs/desk_model.yaml";
 
 /// Three-chunk episodes: enough to look, go there and write.
 std::vector<std::string> Words(const fs::path& out, const std::vector<std::string>& more = {}) {
-  std::vector<std::string> words = {Binary("evac"), "collect", kRecipe, "--out", out, "--seed", "5", "--set", "max_chunks=3"};
+  std::vector<std::string> words = {Binary("evac"), "collect", kRecipe, "--out",       out,
+                                    "--seed",       "5",       "--set", "max_chunks=3"};
   words.insert(words.end(), more.begin(), more.end());
   return words;
 }
@@ -69,8 +70,8 @@ TEST(CollectCommand, ACollectionIsARecordingTreeThatPacks) {
   EXPECT_EQ(recording.arms.size(), 25u);
   EXPECT_EQ(recording.told.size(), 25u);
   EXPECT_EQ(recording.cameras.size(), 2u);
-  const CommandResult packed = RunCommand({Binary("evac"), "pack", folder / "all", "--out", folder / "shards", "--config", kModel,
-                                           "--cameras", "head,hand_right", "--holdout", "0"});
+  const CommandResult packed = RunCommand({Binary("evac"), "pack", folder / "all", "--out", folder / "shards",
+                                           "--config", kModel, "--cameras", "head,hand_right", "--holdout", "0"});
   ASSERT_EQ(packed.exit_code, 0) << packed.err;
   const TensorFile shard = TensorFile::Open(folder / "shards/shard_00000.safetensors");
   EXPECT_EQ(shard.Get("frames").shape, (std::vector<std::int64_t>{100, 2, 64, 96, 3}));

@@ -43,8 +43,9 @@ class PackCommand : public testing::Test {
   void Add(const std::string& name, const SyntheticClip& clip) { clip.Write(OneFolder(folder_ / ("data/" + name))); }
 
   std::vector<std::string> Words(const std::string& out, const std::vector<std::string>& more = {}) const {
-    std::vector<std::string> words = {Binary("evac"), "pack", folder_ / "data", "--out", folder_ / out, "--config",
-                                      folder_ / "tiny.yaml", "--clips-per-shard", "2", "--holdout", "0"};
+    std::vector<std::string> words = {
+        Binary("evac"),      "pack", folder_ / "data", "--out", folder_ / out, "--config", folder_ / "tiny.yaml",
+        "--clips-per-shard", "2",    "--holdout",      "0"};
     words.insert(words.end(), more.begin(), more.end());
     return words;
   }
@@ -74,8 +75,8 @@ TEST_F(PackCommand, LeavesBrokenRecordingsOutAndCountsThemByKind) {
   fs::remove(folder_ / "data/no_camera/head_color.mp4");
   const CommandResult result = RunCommand(Words("out"));
   ASSERT_EQ(result.exit_code, 0) << result.err;
-  EXPECT_THAT(result.err, AllOf(HasSubstr("4 recordings left out"), HasSubstr("1 missing_camera"), HasSubstr("1 moving_camera"),
-                                HasSubstr("1 not_finite"), HasSubstr("1 short_video")));
+  EXPECT_THAT(result.err, AllOf(HasSubstr("4 recordings left out"), HasSubstr("1 missing_camera"),
+                                HasSubstr("1 moving_camera"), HasSubstr("1 not_finite"), HasSubstr("1 short_video")));
   const std::string table = ReadFile(folder_ / "out/left_out.csv");
   EXPECT_THAT(table, AllOf(HasSubstr("short_video"), HasSubstr("5 frames, wanted one for each of the 9 steps")));
 }
@@ -126,7 +127,8 @@ TEST(AgiBotExamples, HaveNoVideoAndAreLeftOutByThatName) {
   if (!fs::exists(examples)) GTEST_SKIP() << examples << " is not there";
   const TempFolder folder;
   WriteText(folder / "tiny.yaml", kTiny);
-  const CommandResult result = RunCommand({Binary("evac"), "pack", examples, "--out", folder / "out", "--config", folder / "tiny.yaml"});
+  const CommandResult result =
+      RunCommand({Binary("evac"), "pack", examples, "--out", folder / "out", "--config", folder / "tiny.yaml"});
   EXPECT_EQ(result.exit_code, 2);
   EXPECT_THAT(result.err, AllOf(HasSubstr("2 recordings left out: 2 no_video"), HasSubstr("there is no video")));
 }

@@ -40,7 +40,8 @@ ClipSource Source(const Eigen::Vector2d& dot_px) {
     cv::Mat picture(kHeight_px, kWidth_px, CV_8UC3, cv::Scalar::all(0));
     picture.at<cv::Vec3b>(static_cast<int>(dot_px.y()), static_cast<int>(dot_px.x())) = cv::Vec3b(255, 255, 255);
     source.pictures.push_back({picture});
-    source.truth.object_px.insert(source.truth.object_px.end(), {static_cast<float>(dot_px.x()), static_cast<float>(dot_px.y())});
+    source.truth.object_px.insert(source.truth.object_px.end(),
+                                  {static_cast<float>(dot_px.x()), static_cast<float>(dot_px.y())});
     source.truth.contact.push_back(step == 2);
   }
   return source;
@@ -99,7 +100,8 @@ TEST(Clip, DeltasAreTheStepsIntoEachFrameAsTheWorldModelIsTold) {
   const ClipSource source = Source({40.5, 30.5});
   const Clip clip = MakeClip(source, {0, 0, kWidth_px, kHeight_px}, Options());
   for (int i = 0; i < 14; ++i) EXPECT_EQ(clip.deltas[static_cast<std::size_t>(i)], 0);
-  const auto wanted = Normalised(DeltaBetween(GrippersOf(source.arms[2]), GrippersOf(source.arms[3])), AgiBotWorldStatistics(), 3);
+  const auto wanted =
+      Normalised(DeltaBetween(GrippersOf(source.arms[2]), GrippersOf(source.arms[3])), AgiBotWorldStatistics(), 3);
   for (std::size_t i = 0; i < 14; ++i) EXPECT_EQ(clip.deltas[3 * 14 + i], wanted[i]);
 }
 
@@ -161,7 +163,9 @@ TEST(Shard, HoldsItsClipsOneAfterTheOther) {
   EXPECT_EQ(file.metadata().at("format"), "evac-shard");
   EXPECT_EQ(file.metadata().at("version"), "1");
   EXPECT_EQ(file.Get("frames").shape, (std::vector<std::int64_t>{2 * kSteps, 1, kHeight_px, kWidth_px, 3}));
-  const auto numbers = [&](const char* name) { return reinterpret_cast<const std::int64_t*>(file.Get(name).bytes.data()); };
+  const auto numbers = [&](const char* name) {
+    return reinterpret_cast<const std::int64_t*>(file.Get(name).bytes.data());
+  };
   EXPECT_EQ(numbers("clip_start")[2], 2 * kSteps);
   EXPECT_EQ(numbers("clip_id")[1], 7);
   EXPECT_EQ(std::to_integer<int>(file.Get("outcome").bytes[0]), 255) << "-1: unknown";
