@@ -211,7 +211,8 @@ TrainerSummary Trainer::Run(const TrainerCallbacks& callbacks) {
   std::string why = WhyEnd(callbacks);
   while (why.empty()) {
     const Clock::time_point started = Clock::now();
-    Record(Step(callbacks), SecondsSince(started));
+    const StepOutcome outcome = Step(callbacks);
+    Record(outcome, SecondsSince(started));
     ++step_;
     ++run_steps_;
     if (!planned_) PlanSteps();
