@@ -15,7 +15,7 @@ namespace {
 
 constexpr double kRawFrames_hz = 30;  ///< of the statistics
 
-ImaginerOptions OptionsOf(const SuiteEvac& evac, int height_px, int threads_per_scene) {
+ImaginerOptions OptionsOf(const SuiteEvac& evac, nn::ModelConfig config, int threads_per_scene) {
   const auto has = [&](const char* quirk) {
     return std::find(evac.quirks.begin(), evac.quirks.end(), quirk) != evac.quirks.end();
   };
@@ -29,7 +29,8 @@ ImaginerOptions OptionsOf(const SuiteEvac& evac, int height_px, int threads_per_
   options.sampler.residual_noise = has("residual_noise");
   if (evac.statistics) options.conditioning.statistics = ReadActionStatistics(*evac.statistics);
   options.conditioning.stride = evac.period_s * kRawFrames_hz;
-  if (evac.pose_map_scales) options.conditioning.pose_map = PoseMapOptions::ForHeight(height_px);
+  config.pose_map.scaled |= evac.pose_map_scales;
+  options.conditioning.pose_map = PoseMapOptions::Of(config);
   options.conditioning.pose_map.draw_behind_camera = has("draw_behind_camera");
   options.decoded_start = has("decoded_start");
   options.identity = fmt::format("{} threads {}", evac.hash, threads_per_scene);
@@ -84,7 +85,7 @@ std::unique_ptr<World> MakeEvacWorld(const SuiteWorld& world, const Suite& suite
   const nn::ModelConfig config = ReadEvacConfig(evac.config);
   const int threads = Threads(suite);
   const ImaginerOptions options =
-      OptionsOf(evac, static_cast<int>(config.image_height_px), evac.all_threads_per_scene ? threads : 1);
+      OptionsOf(evac, config, evac.all_threads_per_scene ? threads : 1);
   nn::KeepFreedMemory();
   return std::make_unique<EvacWorld>(Imaginer(Load(evac, config), options), FirstSceneOf(suite, store, world.name),
                                      EvacWorldOptions{world.name, threads, evac.all_threads_per_scene});

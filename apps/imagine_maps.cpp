@@ -44,8 +44,9 @@ ReferenceQuirks ReferenceQuirks::Named(const std::string& names) {
 }
 
 PoseMapOptions MapOptions(const ImagineArguments& arguments, const nn::ModelConfig& config) {
-  PoseMapOptions options;
-  if (arguments.scaled_maps) options = PoseMapOptions::ForHeight(static_cast<int>(config.image_height_px));
+  nn::ModelConfig drawn = config;
+  drawn.pose_map.scaled |= arguments.scaled_maps;
+  PoseMapOptions options = PoseMapOptions::Of(drawn);
   options.draw_behind_camera = ReferenceQuirks::Named(arguments.quirks).draw_behind_camera;
   return options;
 }

@@ -14,7 +14,6 @@
 namespace evac {
 namespace {
 
-constexpr double kClosedGripper = 120;  // AgiBot's raw reading
 constexpr int kCropParts = 8;           // a crop leaves out at most an eighth before it, and an eighth after
 
 /// Uniform in low … high, both included.
@@ -106,19 +105,6 @@ Camera Cropped(const Camera& camera, const Crop& crop, const cv::Size& picture_p
   part.width_px = crop.width_px;
   part.height_px = crop.height_px;
   return Resized(part, picture_px.width, picture_px.height);
-}
-
-std::vector<float> ActionRow(const Arms& arms) {
-  std::vector<float> row;
-  if (arms.size() == 1) row = {0, 0, 0, 0, 0, 0, 1, 0};
-  for (const ArmState& arm : arms) {
-    const Eigen::Vector3d& xyz_m = arm.base_from_gripper.translation();
-    const Eigen::Quaterniond turn(arm.base_from_gripper.linear());
-    for (const double value : {xyz_m.x(), xyz_m.y(), xyz_m.z(), turn.x(), turn.y(), turn.z(), turn.w(),
-                               kClosedGripper * arm.closure})
-      row.push_back(static_cast<float>(value));
-  }
-  return row;
 }
 
 ClipSource ReadClipSource(const Recording& recording, const EpisodeTruth* truth, int shrink) {

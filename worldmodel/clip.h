@@ -61,8 +61,4 @@ ClipSource ReadClipSource(const Recording& recording, const EpisodeTruth* truth,
 /// @param crop  in pixels of view 0's picture
 Clip MakeClip(const ClipSource& source, const Crop& crop, const ClipOptions& options);
 
-/// 16 numbers per step: xyz, quaternion xyzw, gripper (0 open … 120 closed), left then right; an absent arm: zeros and
-/// (0, 0, 0, 1).
-std::vector<float> ActionRow(const Arms& arms);
-
 }  // namespace evac

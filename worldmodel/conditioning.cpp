@@ -9,6 +9,8 @@
 namespace evac {
 namespace {
 
+constexpr double kClosedGripper = 120;  // AgiBot's raw reading
+
 Eigen::Matrix3f Intrinsics(const Camera& camera) {
   Eigen::Matrix3d k;
   k << camera.fx_px, 0, camera.cx_px, 0, camera.fy_px, camera.cy_px, 0, 0, 1;
@@ -47,21 +49,38 @@ std::vector<cv::Mat> DrawPoseMaps(const Arms& arms, std::span<const Camera> came
   return maps;
 }
 
+std::vector<float> ActionRow(const Arms& arms) {
+  std::vector<float> row;
+  if (arms.size() == 1) row = {0, 0, 0, 0, 0, 0, 1, 0};
+  for (const ArmState& arm : arms) {
+    const Eigen::Vector3d& xyz_m = arm.base_from_gripper.translation();
+    const Eigen::Quaterniond turn(arm.base_from_gripper.linear());
+    for (const double value : {xyz_m.x(), xyz_m.y(), xyz_m.z(), turn.x(), turn.y(), turn.z(), turn.w(),
+                               kClosedGripper * arm.closure})
+      row.push_back(static_cast<float>(value));
+  }
+  return row;
+}
+
 ChunkConditioning Condition(const ImaginedScene& scene, std::vector<std::size_t> memory, std::span<const Arms> targets,
                             const nn::ModelConfig& config, const ConditioningOptions& options) {
   const auto chunk = static_cast<std::size_t>(config.chunk);
   if (targets.empty() || targets.size() > chunk)
     throw InternalError("{} targets in a chunk, wanted 1 … {}", targets.size(), chunk);
   ChunkConditioning conditioning;
-  for (const std::size_t frame : memory)
-    conditioning.rays.push_back(Rays(scene.frames.at(frame).arms, scene.cameras, config));
+  const auto add = [&](const Arms& arms) {
+    const std::vector<float> row = ActionRow(arms);
+    conditioning.arms.insert(conditioning.arms.end(), row.begin(), row.end());
+    conditioning.rays.push_back(Rays(arms, scene.cameras, config));
+  };
+  for (const std::size_t frame : memory) add(scene.frames.at(frame).arms);
   const Arms* before = &scene.frames.back().arms;
   for (std::size_t k = 0; k < chunk; ++k) {
     const Arms& arms = targets[std::min(k, targets.size() - 1)];
     const ActionDelta delta = DeltaBetween(GrippersOf(*before), GrippersOf(arms));
     conditioning.deltas.push_back(Normalised(delta, options.statistics, options.stride));
     conditioning.pose_maps.push_back(DrawPoseMaps(arms, scene.cameras, options.pose_map));
-    conditioning.rays.push_back(Rays(arms, scene.cameras, config));
+    add(arms);
     before = &arms;
   }
   conditioning.memory = std::move(memory);

@@ -46,6 +46,7 @@ struct ChunkConditioning {
   std::vector<DeltaRow> deltas;           ///< [K]: from each frame to the next; to be replaced only by a quirk
   Pictures pose_maps;                     ///< [K][V]: of the frames to imagine alone
   std::vector<std::vector<RayMap>> rays;  ///< [N + K][V], latent pixels
+  std::vector<float> arms;                ///< [N + K, 16]: ActionRow of each frame
   std::size_t count = 0;                  ///< targets given, 1 … K: what lies beyond is padding
 };
 
@@ -56,5 +57,9 @@ ChunkConditioning Condition(const ImaginedScene& scene, std::vector<std::size_t>
 
 /// The maps of the arms at one moment, one per camera.
 std::vector<cv::Mat> DrawPoseMaps(const Arms& arms, std::span<const Camera> cameras, const PoseMapOptions& options);
+
+/// 16 numbers per step: xyz, quaternion xyzw, gripper (0 open … 120 closed), left then right; an absent arm: zeros and
+/// (0, 0, 0, 1).
+std::vector<float> ActionRow(const Arms& arms);
 
 }  // namespace evac

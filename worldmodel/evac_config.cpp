@@ -57,10 +57,11 @@ void ReadResampler(const Config& page, nn::ResamplerConfig& resampler) {
 void ReadOurUNet(const Config& page, nn::UNetConfig& unet) {
   page.AllowOnly({"in_channels", "out_channels", "model_channels", "channel_mult", "num_res_blocks",
                   "attention_resolutions", "num_head_channels", "transformer_depth", "context_dim",
-                  "init_attention_heads", "domains"});
+                  "init_attention_heads", "domains", "frame_actions"});
   ReadUNet(page, unet);
   Read(page, "init_attention_heads", unet.init_attention_heads);
   Read(page, "domains", unet.domains);
+  Read(page, "frame_actions", unet.frame_actions);
 }
 
 void ReadOurVae(const Config& page, nn::VaeConfig& vae) {
@@ -105,9 +106,15 @@ void ReadOurSchedule(const Config& page, nn::ScheduleConfig& schedule) {
   Read(page, "from_last_frame", schedule.from_last_frame);
 }
 
+void ReadPoseMap(const Config& page, nn::PoseMapConfig& pose_map) {
+  page.AllowOnly({"scaled", "drop_line_m"});
+  Read(page, "scaled", pose_map.scaled);
+  if (page.Has("drop_line_m")) pose_map.drop_line_m = page.Get<double>("drop_line_m");
+}
+
 nn::ModelConfig ReadOurs(const Config& page) {
   page.AllowOnly({"chunk", "memory", "views", "image_height_px", "image_width_px", "fps", "domain", "schedule", "unet",
-                  "vae", "action_resampler", "image_resampler", "image_encoder"});
+                  "vae", "action_resampler", "image_resampler", "image_encoder", "pose_map"});
   nn::ModelConfig config;
   Read(page, "chunk", config.chunk);
   Read(page, "memory", config.memory);
@@ -116,6 +123,7 @@ nn::ModelConfig ReadOurs(const Config& page) {
   Read(page, "image_width_px", config.image_width_px);
   Read(page, "fps", config.fps);
   Read(page, "domain", config.domain);
+  if (page.Has("pose_map")) ReadPoseMap(page.Section("pose_map"), config.pose_map);
   if (page.Has("schedule")) ReadOurSchedule(page.Section("schedule"), config.schedule);
   if (page.Has("unet")) ReadOurUNet(page.Section("unet"), config.unet);
   if (page.Has("vae")) ReadOurVae(page.Section("vae"), config.vae);

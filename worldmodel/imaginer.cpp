@@ -214,6 +214,7 @@ ChunkLatents Imaginer::DenoiseAnew(const ImaginedScene& scene, const ChunkCondit
   request.direction = request.direction.to(device);
   request.origin = request.origin.to(device);
   request.deltas = DeltasOf(conditioning.deltas).to(device);
+  request.arms = TensorOf(conditioning.arms, {1, config().Frames(), 16}).to(device);
 
   std::uint32_t step = 0;  // first the noise from which the chunk is denoised, then the sampler's
   const auto draw = [&](std::int64_t frames) {

@@ -23,9 +23,10 @@ constexpr std::uint32_t kAnchors[2][9] = {
 constexpr double kDarkestRedBlue = 0.05098039215686274;  // as matplotlib writes 13 / 255: a bit less
 const cv::Scalar kAxisColours[2][3] = {{{0, 0, 255}, {255, 255, 0}, {0, 255, 255}},
                                        {{255, 0, 255}, {255, 0, 0}, {0, 255, 0}}};
+const cv::Scalar kDropColours[2] = {{0, 160, 255}, {255, 160, 0}};
 
-/// The pose the released model's picture shows, in the camera's frame.
-Eigen::Matrix4f CameraFromTool(const DrawnGripper& gripper, const PoseMapView& view) {
+/// The pose the released model's picture shows, in the frame `to`.
+Eigen::Matrix4f FromTool(const DrawnGripper& gripper, const Eigen::Matrix4f& to_from_base) {
   const float i = gripper.quat_xyzw[0], j = gripper.quat_xyzw[1], k = gripper.quat_xyzw[2], r = gripper.quat_xyzw[3];
   const float s = 2.0F / (r * r + i * i + j * j + k * k);
   Eigen::Matrix4f pose = Eigen::Matrix4f::Identity();
@@ -35,7 +36,7 @@ Eigen::Matrix4f CameraFromTool(const DrawnGripper& gripper, const PoseMapView& v
   pose.topRightCorner<3, 1>() = gripper.xyz_m;
   Eigen::Matrix4f tool = Eigen::Matrix4f::Identity();
   tool(2, 3) = kToolLength_m;
-  return Eigen::Matrix4f(Eigen::Matrix4f(view.camera_from_base * pose) * tool);
+  return Eigen::Matrix4f(Eigen::Matrix4f(to_from_base * pose) * tool);
 }
 
 /// Towards zero, as a cast does; what no integer holds becomes the lowest, as x86 casts it.
@@ -81,7 +82,7 @@ std::vector<Placed> Visible(std::span<const DrawnGripper> grippers, const PoseMa
                             const PoseMapOptions& options) {
   std::vector<Placed> visible;
   for (const DrawnGripper& gripper : grippers) {
-    const Eigen::Matrix4f camera_from_tool = CameraFromTool(gripper, view);
+    const Eigen::Matrix4f camera_from_tool = FromTool(gripper, view.camera_from_base);
     const auto point = [&](float x, float y, float z) {
       return Eigen::Vector3f((camera_from_tool * Eigen::Vector4f(x, y, z, 1)).head<3>());
     };
@@ -96,6 +97,19 @@ std::vector<Placed> Visible(std::span<const DrawnGripper> grippers, const PoseMa
     visible.push_back(placed);
   }
   return visible;
+}
+
+/// Straight down from the tool to a height, with a mark where it ends.
+void DrawDropLine(const Placed& placed, const PoseMapView& view, const PoseMapOptions& options, cv::Mat& map) {
+  const Eigen::Vector3f tool = FromTool(*placed.gripper, Eigen::Matrix4f::Identity()).topRightCorner<3, 1>();
+  const Eigen::Vector4f foot(tool.x(), tool.y(), static_cast<float>(*options.drop_line_m), 1);
+  const Eigen::Vector3f end = (view.camera_from_base * foot).head<3>();
+  const Projected shown = Project(InFront(placed.origin, end), view.intrinsics);
+  const cv::Scalar& colour = kDropColours[static_cast<int>(placed.gripper->side)];
+  const cv::Point from(static_cast<int>(placed.at.u), static_cast<int>(placed.at.v));
+  const cv::Point to(Bounded(shown.u), Bounded(shown.v));
+  cv::line(map, from, to, colour, options.thickness_px, cv::LINE_8);
+  if (end[2] >= kNear_m) cv::circle(map, to, options.thickness_px, colour, cv::FILLED);
 }
 
 }  // namespace
@@ -114,6 +128,12 @@ PoseMapOptions PoseMapOptions::ForHeight(int height_px) {
   };
   const PoseMapOptions published;
   return {scaled(published.radius_px), scaled(published.thickness_px), false};
+}
+
+PoseMapOptions PoseMapOptions::Of(const nn::ModelConfig& config) {
+  PoseMapOptions options = config.pose_map.scaled ? ForHeight(static_cast<int>(config.image_height_px)) : PoseMapOptions();
+  options.drop_line_m = config.pose_map.drop_line_m;
+  return options;
 }
 
 std::array<std::uint8_t, 3> ClosureColour(Side side, float closure) {
@@ -146,6 +166,9 @@ cv::Mat DrawPoseMap(std::span<const DrawnGripper> grippers, const PoseMapView& v
     const auto colour = ClosureColour(placed.gripper->side, placed.gripper->gripper / kClosedGripper);
     const cv::Point centre(static_cast<int>(placed.at.u), static_cast<int>(placed.at.v));
     cv::circle(map, centre, options.radius_px, cv::Scalar(colour[0], colour[1], colour[2]), cv::FILLED);
+  }
+  for (const Placed& placed : visible) {
+    if (options.drop_line_m) DrawDropLine(placed, view, options, map);
   }
   for (const Placed& placed : visible) {
     const cv::Point from(static_cast<int>(placed.at.u), static_cast<int>(placed.at.v));

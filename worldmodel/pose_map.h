@@ -2,10 +2,12 @@
 
 #include <Eigen/Core>
 #include <array>
+#include <optional>
 #include <opencv2/core.hpp>
 #include <span>
 
 #include "worldmodel/action_delta.h"
+#include "worldmodel/nn/model_config.h"
 
 /// The grippers' poses drawn into a view, as the network was trained to read them (EVAC, Sec. 3.2; spec 2).
 namespace evac {
@@ -33,12 +35,16 @@ struct PoseMapOptions {
   int thickness_px = 8;  ///< of the axes
   /// Quirk draw_behind_camera: the reference knows no depth and draws mirrored what is behind the camera.
   bool draw_behind_camera = false;
+  /// Height in metres, base frame, to which a line is drawn straight down from each gripper. Not in the paper.
+  std::optional<double> drop_line_m = std::nullopt;
 
   /// The same in parts of a picture of this height: for other sizes than the published 320.
   static PoseMapOptions ForHeight(int height_px);
+  /// As the network's page says for its picture.
+  static PoseMapOptions Of(const nn::ModelConfig& config);
 };
 
-/// Discs first (left, right), then the axes x, y, z of both. A gripper whose origin is out of the picture is not drawn;
+/// Discs first (left, right), then the lines to the table if wanted, then the axes x, y, z of both. A gripper whose origin is out of the picture is not drawn;
 /// one behind the camera neither; an axis whose end is behind it ends at the picture's near side.
 /// @returns [height_px, width_px, 3] RGB, 50 where nothing is drawn
 cv::Mat DrawPoseMap(std::span<const DrawnGripper> grippers, const PoseMapView& view, const PoseMapOptions& options);

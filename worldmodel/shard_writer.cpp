@@ -81,7 +81,9 @@ void WriteShard(const std::filesystem::path& path, std::span<const Clip> clips, 
 }
 
 std::string PoseMapWords(const PoseMapOptions& options) {
-  return fmt::format("radius_px={} thickness_px={}", options.radius_px, options.thickness_px);
+  std::string words = fmt::format("radius_px={} thickness_px={}", options.radius_px, options.thickness_px);
+  if (options.drop_line_m) words += fmt::format(" drop_line_m={}", *options.drop_line_m);
+  return words;
 }
 
 }  // namespace evac

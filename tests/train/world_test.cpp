@@ -113,6 +113,7 @@ TEST(TrainWorld, TheLossFallsWithEverythingThatThePaperLacks) {
   options.world.train_image_encoder = true;
   Prepared at(1);
   at.config.schedule.from_last_frame = true;
+  at.config.unet.frame_actions = true;
   at.config.action_resampler.embedding_dim = 18;
   const auto [before, after] = LossBeforeAndAfter(at, options);
   EXPECT_LT(after, 0.9 * before);

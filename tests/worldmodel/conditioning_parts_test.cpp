@@ -76,6 +76,27 @@ TEST(PoseMap, AxesPointWhereAnIndependentProjectionPutsTheirEnds) {
   EXPECT_EQ(map.at<cv::Vec3b>(half_y), cv::Vec3b(255, 0, 0));
 }
 
+TEST(PoseMap, ALineGoesStraightDownToWhatAnIndependentProjectionSaysOfTheTable) {
+  Eigen::Isometry3d base_from_camera = Eigen::Isometry3d::Identity();  // at 1 m, looking down along the table
+  base_from_camera.linear() << 0, 0, 1, -1, 0, 0, 0, -1, 0;
+  base_from_camera.translation() = Eigen::Vector3d(0, 0, 1);
+  const Eigen::Vector3d fingers(1.2, 0.1, 0.9);
+  const DrawnGripper gripper =
+      Drawn(Side::kRight, PoseAt(fingers - Eigen::Vector3d(0, 0, 0.23), Eigen::Quaterniond::Identity()));
+  PoseMapOptions options;
+  options.radius_px = 1;
+  options.thickness_px = 3;
+  const PoseMapView view = ViewOf(base_from_camera);
+  const cv::Mat without = DrawPoseMap(std::span(&gripper, 1), view, options);
+  options.drop_line_m = 0.6;
+  const cv::Mat with = DrawPoseMap(std::span(&gripper, 1), view, options);
+  const Eigen::Vector3d foot = base_from_camera.inverse() * Eigen::Vector3d(1.2, 0.1, 0.6);
+  const Eigen::Vector3f pixel = view.intrinsics * foot.cast<float>();
+  const cv::Point at(static_cast<int>(pixel.x() / pixel.z()), static_cast<int>(pixel.y() / pixel.z()));
+  EXPECT_EQ(with.at<cv::Vec3b>(at), cv::Vec3b(255, 160, 0));
+  EXPECT_EQ(without.at<cv::Vec3b>(at), cv::Vec3b(50, 50, 50));
+}
+
 TEST(PoseMap, AGripperBehindTheCameraIsDrawnOnlyWithTheQuirkDrawBehindCamera) {
   const DrawnGripper gripper = Drawn(Side::kLeft, PoseAt({0, 0, -1.23}, Eigen::Quaterniond::Identity()));
   PoseMapView view = ViewOf(Eigen::Isometry3d::Identity());

@@ -6,6 +6,7 @@
 #include <algorithm>
 
 #include "worldmodel/nn/dpm_solver.h"
+#include "worldmodel/nn/frame_actions.h"
 
 namespace evac::nn {
 namespace {
@@ -52,6 +53,7 @@ Conditioning Condition(const EvacModel& model, const ChunkRequest& request) {
   concat.direction = request.direction;
   concat.origin = request.origin;
   conditioning.tokens = model.ContextTokens(model.ImageTokens(request.image), model.ActionTokens(request.deltas));
+  if (model.config().unet.frame_actions) conditioning.frames = FrameActions(request.arms, conditioning.memory);
   return conditioning;
 }
 
@@ -71,7 +73,8 @@ Denoise MakeDenoise(const EvacModel& model, const Conditioning& conditioning) {
   const auto constant = [&](std::int64_t value) { return at::full({rows / views}, value, at::kLong); };
   const at::Device device = conditioning.tokens.device();
   PreparedContext context = model.unet().Prepare({conditioning.tokens, constant(model.config().fps).to(device),
-                                                  constant(model.config().domain).to(device), views});
+                                                  constant(model.config().domain).to(device), views,
+                                                  conditioning.frames});
   return [&model, concat = conditioning.concat, context = std::move(context), views, rows, memory](const Tensor& x_t,
                                                                                                    std::int64_t t) {
     const Tensor steps = at::full({rows}, t, at::kLong).to(x_t.device());

@@ -19,6 +19,7 @@ struct ChunkRequest {
   Tensor direction;  ///< [BV, 3, T, h, w]
   Tensor origin;     ///< [BV, 3, T, h, w]
   Tensor deltas;     ///< [B, any, 14], normalised
+  Tensor arms = {};  ///< [B, T, 16] rows as in frame_actions.h; read if the network has `frame_actions`
 };
 
 /// Everything random, drawn by the caller.
@@ -32,6 +33,7 @@ struct Conditioning {
   std::int64_t views = 1, memory = 0;  ///< V, N
   Concat concat;
   Tensor tokens;  ///< [BV, image tokens + action tokens, context_dim]
+  Tensor frames = {};  ///< [B, T, kFrameActionNumbers] or undefined
 };
 
 Conditioning Condition(const EvacModel& model, const ChunkRequest& request);

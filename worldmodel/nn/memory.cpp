@@ -1,5 +1,7 @@
 #include "worldmodel/nn/memory.h"
 
+#include <cstdlib>  // says whether this is glibc
+
 #ifdef __GLIBC__
 #include <malloc.h>
 #endif

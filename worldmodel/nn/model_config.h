@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -23,6 +24,8 @@ struct UNetConfig {
   std::int64_t domains = 30;        ///< rows of the table of robots
   std::int64_t image_tokens = 256;  ///< per view, first in the context
   std::int64_t action_tokens = 16;  ///< after them
+  /// Each frame's arms are added to its time embedding (frame_actions.h). Not in the paper.
+  bool frame_actions = false;
 };
 
 /// The latent codec: AutoencoderKL of Stable Diffusion.
@@ -78,6 +81,14 @@ struct ScheduleConfig {
   bool from_last_frame = false;
 };
 
+/// How pose maps are drawn (spec 2).
+struct PoseMapConfig {
+  bool scaled = false;  ///< radius and thickness in parts of the picture's height: 50 and 8 of 320. Published: in pixels
+  /// Height in metres, base frame, to which a line is drawn straight down from each gripper: which point of the table it
+  /// is above, which one camera alone does not show. Not in the paper.
+  std::optional<double> drop_line_m;
+};
+
 struct ModelConfig {
   UNetConfig unet;
   VaeConfig vae;
@@ -87,6 +98,7 @@ struct ModelConfig {
   ResamplerConfig image_resampler{.embedding_dim = 1280, .queries = 256};  ///< CLIP's tokens → 256 tokens
   ImageEncoderConfig image_encoder;
   ScheduleConfig schedule;
+  PoseMapConfig pose_map;
   std::int64_t chunk = 16;  ///< K: frames imagined at once
   std::int64_t memory = 4;  ///< N: frames remembered
   std::int64_t views = 1;   ///< V

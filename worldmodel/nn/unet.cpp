@@ -4,6 +4,8 @@
 
 #include <algorithm>
 
+#include "worldmodel/nn/frame_actions.h"
+
 namespace evac::nn {
 namespace {
 
@@ -56,6 +58,8 @@ UNet::UNet(const Scope& at, const UNetConfig& config)
       time_embed_(at / "time_embed", config.model_channels, 4 * config.model_channels),
       fps_embedding_(at / "fps_embedding", config.model_channels, 4 * config.model_channels),
       width_(config.model_channels) {
+  if (config.frame_actions)
+    frame_embedding_.emplace(at / "frame_action_embedding", kFrameActionNumbers, 4 * config.model_channels);
   MakeInput(at / "input_blocks");
   init_attention_.emplace(
       at / "init_attn" / "0",
@@ -151,21 +155,28 @@ PreparedContext UNet::Prepare(const Context& context) const {
   for (const Block& block : output_blocks_) prepare(block);
   prepared.embedding = fps_embedding_(SinusoidEmbedding(context.fps, config_.model_channels)) +
                        domain_embedding_.index_select(0, context.domain.to(at::kLong));
+  if (frame_embedding_) {
+    if (!context.frames.defined()) throw TensorError("the network wants the arms of each frame, found none");
+    CheckShape("arms of each frame", context.frames, {prepared.embedding.size(0), -1, kFrameActionNumbers});
+    prepared.frames = (*frame_embedding_)(context.frames);
+  }
   return prepared;
 }
 
 Tensor UNet::InProductType(const Tensor& x) const { return product_ ? x.to(*product_) : x; }
 
-Tensor UNet::Embedding(const Input& input, const Tensor& constant) const {
+Tensor UNet::Embedding(const Input& input, const PreparedContext& context) const {
   const std::int64_t rows = input.x.size(0), frames = input.x.size(2);
   const auto embed = [&](const Tensor& t) {
     return time_embed_(SinusoidEmbedding(t, config_.model_channels)).unsqueeze(1);
   };
-  const std::int64_t width = constant.size(1);
+  const std::int64_t width = context.embedding.size(1);
   const Tensor memory = embed(at::zeros({rows}, input.t.options())).expand({rows, input.memory, width});
   const Tensor chunk = embed(input.t).expand({rows, frames - input.memory, width});
-  const Tensor per_view = constant.repeat_interleave(input.views, 0).unsqueeze(1);  // [BV, 1, E]
-  return at::silu(at::cat({memory, chunk}, 1) + per_view).reshape({rows * frames, width});
+  Tensor per_frame = context.embedding.unsqueeze(1);  // [B, 1, E] or [B, T, E]
+  if (context.frames.defined()) per_frame = per_frame + context.frames;
+  return at::silu(at::cat({memory, chunk}, 1) + per_frame.repeat_interleave(input.views, 0))
+      .reshape({rows * frames, width});
 }
 
 Tensor UNet::Run(const Block& block, const std::string& name, const Tensor& x, const Pass& pass) const {
@@ -188,7 +199,7 @@ Tensor UNet::operator()(const Input& input, const PreparedContext& context, cons
   CheckShape("diffusion steps", input.t, {input.x.size(0)});
   const std::int64_t frames = input.x.size(2);
   const Pass pass{
-      context, {input.x.size(0) / input.views, input.views, frames}, InProductType(Embedding(input, context.embedding)), observer};
+      context, {input.x.size(0) / input.views, input.views, frames}, InProductType(Embedding(input, context)), observer};
   std::vector<Tensor> skips;
   Tensor h = InProductType(ToRows(input.x));
   for (std::size_t i = 0; i < input_blocks_.size(); ++i) {

@@ -15,6 +15,7 @@ namespace evac::nn {
 struct PreparedContext {
   std::vector<std::vector<KeyValue>> keys_values;  ///< [spatial transformer][layer]
   Tensor embedding;                                ///< [B, E]: frame rate and robot
+  Tensor frames;                                   ///< [B, T, E]: arms of each frame, or undefined
 };
 
 /// Called with "input_blocks.1.0", …, and what that module answered, in the layout of the reference's module.
@@ -29,6 +30,7 @@ class UNet {
     Tensor fps;     ///< [B] integers
     Tensor domain;  ///< [B] integers: rows of the table of robots
     std::int64_t views = 1;
+    Tensor frames = {};  ///< [B, T, kFrameActionNumbers]; read if the network has `frame_actions`
   };
   PreparedContext Prepare(const Context& context) const;
 
@@ -62,13 +64,14 @@ class UNet {
   void AddTransformers(Block& block, const Scope& at, std::int64_t channels);
   bool HasAttention() const;
   Tensor InProductType(const Tensor& x) const;
-  Tensor Embedding(const Input& input, const Tensor& constant) const;
+  Tensor Embedding(const Input& input, const PreparedContext& context) const;
   Tensor Run(const Block& block, const std::string& name, const Tensor& x, const Pass& pass) const;
 
   UNetConfig config_;
   ProductType product_;   ///< where it is not that of the weights, values between the layers are kept so too
   Tensor domain_embedding_;  ///< [domains, E]
   EmbeddingMlp time_embed_, fps_embedding_;
+  std::optional<EmbeddingMlp> frame_embedding_;
   std::vector<Block> input_blocks_;
   std::optional<TemporalTransformer> init_attention_;
   Block middle_;

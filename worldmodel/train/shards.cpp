@@ -38,6 +38,7 @@ Shard Read(const std::filesystem::path& path, const nn::MappedTensors& file) {
   const std::int64_t clips = shard.clip_start.size(0) - 1;
   shard.task = Checked(file, "task", at::kInt, {clips});
   shard.outcome = Checked(file, "outcome", at::kChar, {clips});
+  shard.actions = Checked(file, "actions", at::kFloat, {f, 16});
   shard.deltas = Checked(file, "deltas", at::kFloat, {f, 14});
   shard.c2w = Checked(file, "c2w", at::kFloat, {f, v, 4, 4});
   shard.k = Checked(file, "k", at::kFloat, {f, v, 3, 3});

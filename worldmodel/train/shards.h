@@ -26,6 +26,7 @@ struct Shard {
   Tensor clip_start;          ///< [clips + 1] long
   Tensor task, outcome;       ///< [clips] int, char
   Tensor frames, maps;        ///< [F, V, H, W, 3] bytes
+  Tensor actions;             ///< [F, 16]
   Tensor deltas;              ///< [F, 14]
   Tensor c2w;                 ///< [F, V, 4, 4] base_from_camera
   Tensor k;                   ///< [F, V, 3, 3] pixels of the stored picture

@@ -20,7 +20,8 @@ Tensor Imagine(const nn::EvacModel& model, const WorldBatch& batch, const StripO
                                  batch.pose_maps.narrow(2, n, chunk),
                                  batch.direction,
                                  batch.origin,
-                                 batch.deltas};
+                                 batch.deltas,
+                                 batch.arms};
   std::vector<std::int64_t> shape = batch.latents.sizes().vec();
   const auto step = [&] { return steps.Normal(batch.latents.sizes()); };
   shape[2] = chunk;

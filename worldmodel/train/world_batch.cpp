@@ -43,8 +43,8 @@ WorldBatch MakeWorldBatch(const ShardSet& shards, const std::vector<Window>& win
   const auto memory = static_cast<std::int64_t>(first.memory.size());
   const std::int64_t chunk = first.chunk;
   const std::int64_t views = shards.views(), height = shards.height_px(), width = shards.width_px();
-  WorldBatch batch{static_cast<std::int64_t>(windows.size()), views, memory, {}, {}, {}, {}, {}, {}, {}};
-  std::vector<Tensor> latents, maps, directions, origins, images, deltas, objects;
+  WorldBatch batch{static_cast<std::int64_t>(windows.size()), views, memory, {}, {}, {}, {}, {}, {}, {}, {}};
+  std::vector<Tensor> latents, maps, directions, origins, images, deltas, arms, objects;
   for (const Window& window : windows) {
     const Shard& shard = shards.shards()[window.clip->shard];
     const Tensor rows = RowsOf(window);
@@ -56,6 +56,7 @@ WorldBatch MakeWorldBatch(const ShardSet& shards, const std::vector<Window>& win
     origins.push_back(rays.origin.unflatten(0, {memory + chunk, views}));
     images.push_back(PicturesFrom(shard.frames[window.clip->first + window.image]));
     deltas.push_back(shard.deltas.narrow(0, window.clip->first + window.last + 1, chunk));
+    arms.push_back(shard.actions.index_select(0, rows));
     objects.push_back(shard.object_px.index_select(0, rows));
   }
   batch.latents = ByView(latents);
@@ -65,6 +66,7 @@ WorldBatch MakeWorldBatch(const ShardSet& shards, const std::vector<Window>& win
   batch.origin = ByView(origins);
   batch.images = at::cat(images);
   batch.deltas = at::stack(deltas);
+  batch.arms = at::stack(arms);
   const double per_px = static_cast<double>(batch.latents.size(4)) / static_cast<double>(width);
   batch.object = at::stack(objects).permute({0, 2, 3, 1}).flatten(0, 1) * per_px;
   return batch;

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "worldmodel/nn/frame_actions.h"
 #include "worldmodel/nn/weight_keys.h"
 
 namespace evac::train {
@@ -91,7 +92,9 @@ WorldTraining::Drops WorldTraining::DrawDrops(const WorldBatch& batch, Dice& dic
 
 nn::UNet::Context WorldTraining::ContextOf(const Tensor& tokens, const WorldBatch& batch) const {
   const auto constant = [&](std::int64_t value) { return at::full({batch.scenes}, value, at::kLong); };
-  return {tokens, constant(model_.config().fps), constant(model_.config().domain), batch.views};
+  nn::UNet::Context context{tokens, constant(model_.config().fps), constant(model_.config().domain), batch.views};
+  if (model_.config().unet.frame_actions) context.frames = nn::FrameActions(batch.arms, batch.memory);
+  return context;
 }
 
 Tensor WorldTraining::TokensOf(const WorldBatch& batch) const {
@@ -142,6 +145,7 @@ Tensor WorldTraining::LossOf(const WorldBatch& given, const Drops& drops, const 
                           n,
                           std::nullopt,
                           Weight(batch, t)};
+  if (step.context.frames.defined()) step.context.frames = step.context.frames * PerRow(drops.actions, 3);
   if (noisy_memory && options_.memory_noise_kind == MemoryNoise::kPublished) {
     std::vector<float> angles;
     for (std::int64_t i = 0; i < rows * n; ++i) angles.push_back(static_cast<float>(dice.Uniform(-1.57, 1.57)));

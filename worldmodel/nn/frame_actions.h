@@ -1,0 +1,19 @@
+#pragma once
+
+#include "worldmodel/nn/tensor.h"
+
+/// Where the arms are at each frame, for networks that are told frame by frame (`unet.frame_actions`). Not in the paper,
+/// whose network sees poses as pictures and their changes as a set of tokens: it has to find out which frame a change
+/// belongs to. Small networks that train for hours learn to grasp sooner with it.
+namespace evac::nn {
+
+constexpr std::int64_t kFrameActionNumbers = 52;
+
+/// Per arm: position, the first two columns of its rotation, closure; position and closure counted from the newest
+/// memory frame; waves of the position of .25 m and .0625 m.
+/// @param rows    [B, T, 16]: left xyz (m), quaternion xyzw, gripper (0 open … 120 closed), then right; base frame
+/// @param memory  N: the newest is row N - 1
+/// @returns       [B, T, kFrameActionNumbers], of the order of 1
+Tensor FrameActions(const Tensor& rows, std::int64_t memory);
+
+}  // namespace evac::nn
