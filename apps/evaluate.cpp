@@ -68,6 +68,11 @@ void RetryFailed(Store& store) {
   }
 }
 
+/// Before whatever may take seconds: who waits at the keyboard is not to wait for it.
+void EndIfInterrupted() {
+  if (IsInterrupted()) throw InternalError("interrupted");
+}
+
 /// One run's state while it goes from pairing to pairing.
 class Evaluation {
  public:
@@ -105,7 +110,9 @@ class Evaluation {
     std::unique_ptr<World> world = MakeWorld(suite_world, suite_, &store_);
     std::set<std::string> seen;
     for (const Job& job : MissingJobs(JobsOf(suite_, shard_, suite_world, policy), store_)) {
-      if (seen.insert(job.key.pair.task).second) CheckStart(*world, *job.task, job.initial);
+      if (!seen.insert(job.key.pair.task).second) continue;
+      EndIfInterrupted();
+      CheckStart(*world, *job.task, job.initial);
     }
     return world;
   }
@@ -116,6 +123,7 @@ class Evaluation {
     std::set<std::string> seen;
     for (const Job& job : MissingJobs(JobsOf(suite_, shard_, suite_world, suite_policy), store_)) {
       if (!seen.insert(job.key.pair.task).second) continue;
+      EndIfInterrupted();
       std::string certain;
       for (const Suspicion& suspicion : ProbeStart(policy.policy(), world, job)) {
         const std::string sentence = fmt::format("policy {}@{}, task {}, first chunk: {}", suite_policy.name, suite_policy.checkpoint,

@@ -10,6 +10,7 @@
 #include <unistd.h>
 
 #include <cmath>
+#include <cstdio>
 #include <cstdlib>
 #include <filesystem>
 #include <map>
@@ -143,6 +144,8 @@ class FaultyPolicy {
   bool Spoil(const std::string& fault, const observation_t& asked, chunk_t& reply) {
     if (fault == "die") ::kill(::getpid(), SIGKILL);
     if (fault == "hang") {
+      fmt::print("hangs\n");
+      std::fflush(stdout);
       for (;;) ::pause();
     }
     if (fault == "late") ::usleep(static_cast<useconds_t>(options_.late_s * 1e6));

@@ -6,6 +6,7 @@
 
 #include <fstream>
 
+#include "core/file.h"
 #include "tests/support/temp_folder.h"
 #include "tests/system/process_support.h"
 #include "tests/system/run_support.h"
@@ -38,6 +39,38 @@ double Patience_s() {
   return load > std::thread::hardware_concurrency() ? 20 : 2;
 }
 
+/// The bottle's page under that many names: what a world must try out before its first episode. @returns a YAML list.
+std::string PagesOfManyTasks(const std::filesystem::path& folder, int count) {
+  const std::filesystem::path scenes = EVAC_SOURCE_DIR "/worldmodel/sim/scenes";
+  std::filesystem::copy(scenes, folder, std::filesystem::copy_options::recursive);
+  const std::string page = ReadFile(scenes / "take_bottle.yaml"), id = "id: take_bottle\n";
+  std::string list;
+  for (int i = 0; i < count; ++i) {
+    std::string other = page;
+    other.replace(other.find(id), id.size(), fmt::format("id: take_bottle_{}\n", i));
+    const std::filesystem::path file = folder / fmt::format("take_bottle_{}.yaml", i);
+    std::ofstream(file) << other;
+    list += (list.empty() ? "" : ", ") + file.string();
+  }
+  return "[" + list + "]";
+}
+
+TEST(Interrupts, WhileTheWorldTriesOutItsTasksItDoesNotTryTheOthersFirst) {
+  const TempFolder folder;
+  const Mark mark(folder.path().string());
+  const std::string tasks = PagesOfManyTasks(folder / "pages", 150);
+  const pid_t pid = StartCommand(RunWords(kFaults, folder / "run", {"tasks=" + tasks}), folder / "log");
+  ASSERT_TRUE(WaitUntil([&] { return !mark.Processes("evac-draw").empty(); }));
+  const auto before = Clock::now();
+  ::kill(pid, SIGINT);
+  int status = 0;
+  ::waitpid(pid, &status, 0);
+  EXPECT_LE(std::chrono::duration<double>(Clock::now() - before).count(), Patience_s());
+  EXPECT_TRUE(WIFEXITED(status) && WEXITSTATUS(status) == 4) << status;
+  EXPECT_NE(ReadFile(folder / "log").find("interrupted"), std::string::npos) << ReadFile(folder / "log");
+  EXPECT_TRUE(mark.Processes().empty()) << "something is left running";
+}
+
 struct Interruption {
   const char* name;
   int signal;           ///< 0: the terminal is closed
@@ -67,8 +100,9 @@ TEST_P(Interrupted, StopsWithinTwoSecondsLeavesNothingRunningAndGoesOnWhereItWas
     }
     return std::filesystem::exists(videos / (hangs ? "3-0000-s1.mp4.tmp" : "3-0001-s1.mp4.tmp"));
   }));
-  if (hangs)
-    std::this_thread::sleep_for(std::chrono::seconds(2));  // until it has come to the request that it never answers
+  const std::filesystem::path log = folder / "run/logs/faulty@default.log";
+  ASSERT_TRUE(!hangs || WaitUntil([&] { return ReadFile(log).find("hangs") != std::string::npos; }))
+      << "it never came to the request that it does not answer";
   const auto before = Clock::now();
   const bool is_ctrl_c = GetParam().signal == SIGINT;
   EXPECT_EQ(is_ctrl_c ? ::write(terminal, "\x03", 1) : 1, 1);  // reaches all of the terminal's processes

@@ -1,6 +1,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "core/file.h"
 #include "tests/support/temp_folder.h"
 #include "tests/system/process_support.h"
 #include "tests/system/run_support.h"
@@ -30,6 +31,8 @@ TEST(Neighbours, TwoRunsAtOnceAndAStrayPolicyOfYesterdayDoNotHearEachOther) {
   }
   EXPECT_EQ(List(folder / "one"), List(folder / "alone"));
   EXPECT_EQ(List(folder / "other"), List(folder / "alone"));
+  for (const char* log : {"one.log", "other.log"})
+    EXPECT_THAT(ReadFile(folder / log), testing::Not(testing::HasSubstr("foreign_replies"))) << "it heard the other";
   EXPECT_EQ(mark.Processes(), std::vector<pid_t>{stray}) << "the runs ended all that was theirs, and nothing else";
   KillAll({stray});
   ::waitpid(stray, nullptr, 0);
