@@ -240,6 +240,15 @@ void Store::AddLooks(const std::vector<SequentialLook>& looks) {
 
 std::vector<SequentialLook> Store::Looks() const { return database_->Read(rows::SelectLooks); }
 
+void Store::AddGateRecord(const GateRecord& record, const std::vector<SequentialLook>& looks) {
+  database_->Write([&](auto& connection) {
+    rows::InsertGateRecord(connection, record);
+    for (const SequentialLook& look : looks) rows::InsertLook(connection, look);
+  });
+}
+
+std::vector<GateRecord> Store::GateRecords() const { return database_->Read(rows::SelectGateRecords); }
+
 void Store::Count(const std::string& policy, const Counters& counters) {
   database_->Write([&](auto& connection) { rows::AddToCounters(connection, policy, counters); });
 }

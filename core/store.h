@@ -63,6 +63,15 @@ struct SequentialLook {
   bool operator==(const SequentialLook&) const = default;
 };
 
+/// What a gate decided of this run, append-only: the same key gets the stored decision again.
+struct GateRecord {
+  std::string key;       ///< what the decision follows from: rules, baseline, data
+  std::string gate;      ///< the name of the rules
+  std::string outcome;   ///< pass, fail, inconclusive
+  std::string document;  ///< the decision, JSON (docs/formats/gate_json.md)
+  bool operator==(const GateRecord&) const = default;
+};
+
 /// How one episode ended, for one judge: what rates are counted from. Its texts live as long as the call that gets it.
 struct EndedEpisode {
   std::string_view task, initial_state, policy, checkpoint, world;
@@ -150,6 +159,11 @@ class Store {
   void AddLooks(const std::vector<SequentialLook>& looks);
   /// Every look ever taken, oldest first.
   std::vector<SequentialLook> Looks() const;
+
+  /// A decision and the looks it took, both or neither. @throws InternalError if there is a decision with that key.
+  void AddGateRecord(const GateRecord& record, const std::vector<SequentialLook>& looks);
+  /// In the order they were made.
+  std::vector<GateRecord> GateRecords() const;
 
   /// Adds to the run's counters.
   void Count(const std::string& policy, const Counters& counters);

@@ -55,5 +55,7 @@ void InsertRealTrial(sqlite::Connection& connection, const RealTrial& trial);
 std::vector<RealTrial> SelectRealTrials(sqlite::Connection& connection);
 void InsertLook(sqlite::Connection& connection, const SequentialLook& look);
 std::vector<SequentialLook> SelectLooks(sqlite::Connection& connection);
+void InsertGateRecord(sqlite::Connection& connection, const GateRecord& record);
+std::vector<GateRecord> SelectGateRecords(sqlite::Connection& connection);
 
 }  // namespace evac::rows

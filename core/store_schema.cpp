@@ -112,7 +112,20 @@ constexpr const char* kVersion3 = R"sql(
 CREATE INDEX verdicts_of_judge ON verdicts (judge, episode, id, label);
 )sql";
 
-constexpr const char* kSteps[] = {kVersion1, kVersion2, kVersion3};
+/// What gates decided of the run.
+constexpr const char* kVersion4 = R"sql(
+CREATE TABLE gate_decisions (
+  id INTEGER PRIMARY KEY AUTOINCREMENT,
+  key TEXT NOT NULL UNIQUE, gate TEXT NOT NULL,
+  outcome TEXT NOT NULL CHECK (outcome IN ('pass', 'fail', 'inconclusive')), document TEXT NOT NULL);
+
+CREATE TRIGGER gate_decisions_stay_as_they_are BEFORE UPDATE ON gate_decisions
+BEGIN SELECT RAISE(ABORT, 'gate decisions are never changed'); END;
+CREATE TRIGGER gate_decisions_stay BEFORE DELETE ON gate_decisions
+BEGIN SELECT RAISE(ABORT, 'gate decisions are never deleted'); END;
+)sql";
+
+constexpr const char* kSteps[] = {kVersion1, kVersion2, kVersion3, kVersion4};
 
 std::int64_t Pragma(sqlite::Connection& connection, const char* sql) {
   sqlite::Statement statement = connection.Query(sql);

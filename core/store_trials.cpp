@@ -49,4 +49,17 @@ std::vector<SequentialLook> SelectLooks(sqlite::Connection& connection) {
   return looks;
 }
 
+void InsertGateRecord(sqlite::Connection& connection, const GateRecord& record) {
+  connection.Run("INSERT INTO gate_decisions (key, gate, outcome, document) VALUES (?, ?, ?, ?)", record.key,
+                 record.gate, record.outcome, record.document);
+}
+
+std::vector<GateRecord> SelectGateRecords(sqlite::Connection& connection) {
+  std::vector<GateRecord> records;
+  if (!HasTable(connection, "gate_decisions")) return records;
+  for (auto row = connection.Query("SELECT key, gate, outcome, document FROM gate_decisions ORDER BY id"); row.Step();)
+    records.push_back({row.Text(0), row.Text(1), row.Text(2), row.Text(3)});
+  return records;
+}
+
 }  // namespace evac::rows

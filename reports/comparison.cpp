@@ -211,6 +211,7 @@ WorldComparison Compare(const std::vector<JudgedEpisode>& episodes, const Compar
   for (std::size_t i = 0; tasks.size() > 1 && i < tasks.size(); ++i) {
     comparison.by_task.push_back(CorrelateOutcomes(worlds.tasks[i], {tasks[i]}, options));
   }
+  for (TaskPoints& task : tasks) comparison.by_state.push_back(std::move(task.outcomes));
   comparison.agreement = OverallAgreement(episodes, comparison, bootstrap.confidence);
   return comparison;
 }

@@ -44,6 +44,7 @@ struct WorldComparison {
   CorrelationGroup correlation;           ///< over all points: what `evac correlate` says of this world
   std::vector<CorrelationGroup> by_task;  ///< within each task, where the run has several
   Estimate agreement;  ///< share of all counted pairs with the same outcome, clustered by initial state
+  std::vector<TaskOutcomes> by_state;  ///< what `correlation` was resampled from, a task each
 };
 
 /// What is compared, and in which order it is shown.

@@ -67,6 +67,22 @@ std::string CsvReader::QuotedCell(const CsvRow& row) {
   return cell;
 }
 
+std::string CsvLine(const std::vector<std::string>& cells) {
+  std::string line;
+  for (const std::string& cell : cells) {
+    if (&cell != &cells.front()) line += ',';
+    const bool is_plain = cell.find_first_of(",\"\r\n") == std::string::npos && Trimmed(cell).size() == cell.size();
+    if (is_plain && !(cell.empty() && cells.size() == 1)) {
+      line += cell;
+      continue;
+    }
+    line += '"';
+    for (const char c : cell) line += c == '"' ? std::string("\"\"") : std::string(1, c);
+    line += '"';
+  }
+  return line + "\n";
+}
+
 std::string_view Trimmed(std::string_view cell) {
   const std::size_t first = cell.find_first_not_of(" \t");
   if (first == std::string_view::npos) return {};

@@ -35,6 +35,10 @@ class CsvReader {
   int line_ = 1;
 };
 
+/// The cells as one row of RFC 4180, ended by LF: quoted where a comma, a quote, a line end or an outer blank asks for
+/// it, so that CsvReader gives back the same cells.
+std::string CsvLine(const std::vector<std::string>& cells);
+
 /// Without blanks around it.
 std::string_view Trimmed(std::string_view cell);
 /// As a message shows it: in quotes, cut after 60 bytes.

@@ -4,6 +4,8 @@
 
 #include "reports/estimate_json.h"
 #include "reports/findings.h"
+#include "reports/gate_data.h"
+#include "reports/gate_decision.h"
 
 namespace evac {
 namespace {
@@ -91,6 +93,16 @@ Json ComparisonsJson(const RunSummary& summary) {
   return json;
 }
 
+Json GatesJson(const RunSummary& summary) {
+  Json json = Json::array();
+  if (summary.data.gates.empty()) return json;
+  for (const ShownGate& gate : LastGates(summary.data.gates, DataHash(summary.data))) {
+    json.push_back(JsonOf(gate.decision));
+    json.back()["current"] = gate.is_current;
+  }
+  return json;
+}
+
 Json EpisodesJson(const RunSummary& summary) {
   Json json = Json::array();
   for (const JudgedEpisode& judged : summary.episodes) {
@@ -146,6 +158,7 @@ Json ProvenanceJson(const RunSummary& summary, const std::string& program) {
 std::string ReportJson(const RunSummary& summary, const std::string& program) {
   Json json = {{"schema", kReportJsonSchema}, {"findings", FindingsJson(summary)}, {"rates", RatesJson(summary)}};
   json["comparisons"] = ComparisonsJson(summary);
+  json["gates"] = GatesJson(summary);
   json["episodes"] = EpisodesJson(summary);
   json["counters"] = summary.data.counters;
   json["provenance"] = ProvenanceJson(summary, program);

@@ -96,7 +96,7 @@ std::vector<WorldComparison> ComparisonsOf(const RunSummary& summary) {
 
 RunData ReadRun(const Store& store) {
   return {store.run(),      store.Tasks(),           store.Worlds(),          store.Policies(),
-          store.Episodes(), store.CurrentVerdicts(), store.CountersByPolicy()};
+          store.Episodes(), store.CurrentVerdicts(), store.CountersByPolicy(), store.GateRecords()};
 }
 
 std::int64_t RateCell::Apart() const {

@@ -24,6 +24,15 @@ std::string PercentWithInterval(const Estimate& rate) {
   return fmt::format("{} [{}, {}]", Percent(*rate.value), Points(rate.interval->low), Points(rate.interval->high));
 }
 
+std::string PointsWithInterval(const Estimate& difference) {
+  const auto points = [](double share) { return fmt::format("{:.0f}", std::round(100 * share) + 0.0); };
+  if (!difference.value) return "undefined: " + difference.value.reason();
+  const double value = std::round(100 * *difference.value);
+  const std::string text = value == 0 ? "0 points" : fmt::format("{:+.0f} points", value);
+  if (!difference.interval) return text + " (interval undefined: " + difference.interval.reason() + ")";
+  return fmt::format("{} [{}, {}]", text, points(difference.interval->low), points(difference.interval->high));
+}
+
 std::string NumberWithInterval(const Estimate& estimate) {
   if (!estimate.value) return "undefined: " + estimate.value.reason();
   if (!estimate.interval)

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <functional>
+#include <span>
 
 #include "core/error.h"
 #include "core/seed.h"
@@ -11,9 +12,6 @@
 
 namespace evac {
 namespace {
-
-/// How often each state of each task is taken: [tasks][states]. All 1 is the data as they are.
-using Weights = std::vector<std::vector<std::int64_t>>;
 
 using Statistic = std::function<Number(const RatePairs&)>;
 
@@ -31,43 +29,70 @@ void Check(const std::vector<TaskOutcomes>& tasks, const BootstrapOptions& optio
   }
 }
 
-Count Weighted(const std::vector<Count>& states, const std::vector<std::int64_t>& weights) {
-  Count total;
-  for (std::size_t i = 0; i < states.size(); ++i) {
-    total.successes += weights[i] * states[i].successes;
-    total.trials += weights[i] * states[i].trials;
-  }
-  return total;
-}
-
-/// The rates under these weights; points without trials in one of the worlds are left out.
-RatePairs WeightedRates(const std::vector<TaskOutcomes>& tasks, const Weights& weights) {
-  RatePairs rates;
-  for (std::size_t t = 0; t < tasks.size(); ++t) {
-    for (const PointOutcomes& point : tasks[t].points) {
-      const Count real = Weighted(point.real, weights[t]), sim = Weighted(point.sim, weights[t]);
-      if (real.trials == 0 || sim.trials == 0) continue;
-      rates.real.push_back(static_cast<double>(real.successes) / static_cast<double>(real.trials));
-      rates.sim.push_back(static_cast<double>(sim.successes) / static_cast<double>(sim.trials));
+/// One task's counts with all of a state's side by side, so that a state that is drawn is added in one go:
+/// [states][points][real successes, real trials, sim successes, sim trials].
+class StateRows {
+ public:
+  explicit StateRows(const TaskOutcomes& task) : columns_(4 * task.points.size()), states_(StatesOf(task)) {
+    for (std::size_t state = 0; state < states_; ++state) {
+      for (const PointOutcomes& point : task.points) {
+        const Count &real = point.real[state], &sim = point.sim[state];
+        cells_.insert(cells_.end(), {real.successes, real.trials, sim.successes, sim.trials});
+      }
     }
   }
-  return rates;
-}
+  std::size_t states() const { return states_; }
+  std::size_t columns() const { return columns_; }
 
-Weights EachOnce(const std::vector<TaskOutcomes>& tasks) {
-  Weights weights;
-  for (const TaskOutcomes& task : tasks) weights.emplace_back(StatesOf(task), 1);
-  return weights;
+  void AddTo(std::span<std::int64_t> totals, std::size_t state) const {
+    const std::int64_t* row = cells_.data() + state * columns_;
+    for (std::size_t i = 0; i < columns_; ++i) totals[i] += row[i];
+  }
+  void TakeFrom(std::span<std::int64_t> totals, std::size_t state) const {
+    const std::int64_t* row = cells_.data() + state * columns_;
+    for (std::size_t i = 0; i < columns_; ++i) totals[i] -= row[i];
+  }
+
+ private:
+  std::size_t columns_, states_;
+  std::vector<std::int64_t> cells_;
+};
+
+/// Sums over the states taken: [tasks][points][4].
+using Totals = std::vector<std::vector<std::int64_t>>;
+
+std::vector<StateRows> RowsOf(const std::vector<TaskOutcomes>& tasks) { return {tasks.begin(), tasks.end()}; }
+
+Totals EachOnce(const std::vector<StateRows>& tasks) {
+  Totals totals;
+  for (const StateRows& task : tasks) {
+    std::vector<std::int64_t>& sums = totals.emplace_back(task.columns(), 0);
+    for (std::size_t state = 0; state < task.states(); ++state) task.AddTo(sums, state);
+  }
+  return totals;
 }
 
 /// As many draws per task as it has states.
-Weights Draw(const std::vector<TaskOutcomes>& tasks, SplitMix64& random) {
-  Weights weights;
-  for (const TaskOutcomes& task : tasks) {
-    std::vector<std::int64_t>& taken = weights.emplace_back(StatesOf(task), 0);
-    for (std::size_t draw = 0; draw < taken.size(); ++draw) ++taken[random.Below(taken.size())];
+Totals Draw(const std::vector<StateRows>& tasks, SplitMix64& random) {
+  Totals totals;
+  for (const StateRows& task : tasks) {
+    std::vector<std::int64_t>& sums = totals.emplace_back(task.columns(), 0);
+    for (std::size_t draw = 0; draw < task.states(); ++draw) task.AddTo(sums, random.Below(task.states()));
   }
-  return weights;
+  return totals;
+}
+
+/// Points without trials in one of the worlds are left out.
+RatePairs RatesOfTotals(const Totals& totals) {
+  RatePairs rates;
+  for (const std::vector<std::int64_t>& task : totals) {
+    for (std::size_t i = 0; i < task.size(); i += 4) {
+      if (task[i + 1] == 0 || task[i + 3] == 0) continue;
+      rates.real.push_back(static_cast<double>(task[i]) / static_cast<double>(task[i + 1]));
+      rates.sim.push_back(static_cast<double>(task[i + 2]) / static_cast<double>(task[i + 3]));
+    }
+  }
+  return rates;
 }
 
 /// The rates of every way to resample, computed once for all statistics. Those that lost a point are not kept.
@@ -77,24 +102,25 @@ struct ResampledRates {
   std::int64_t incomplete = 0;  ///< replicates that lost a point
 };
 
-ResampledRates Resample(const std::vector<TaskOutcomes>& tasks, const BootstrapOptions& options) {
+ResampledRates Resample(const std::vector<TaskOutcomes>& outcomes, const BootstrapOptions& options) {
+  const std::vector<StateRows> tasks = RowsOf(outcomes);
   ResampledRates result;
-  Weights weights = EachOnce(tasks);
-  result.all = WeightedRates(tasks, weights);
+  Totals totals = EachOnce(tasks);
+  result.all = RatesOfTotals(totals);
   SplitMix64 random(options.seed);
   for (int replicate = 0; replicate < options.replicates; ++replicate) {
-    RatePairs rates = WeightedRates(tasks, Draw(tasks, random));
+    RatePairs rates = RatesOfTotals(Draw(tasks, random));
     if (rates.real.size() == result.all.real.size()) {
       result.replicates.push_back(std::move(rates));
     } else {
       ++result.incomplete;
     }
   }
-  for (std::vector<std::int64_t>& states : weights) {
-    for (std::int64_t& state : states) {
-      state = 0;
-      RatePairs rates = WeightedRates(tasks, weights);
-      state = 1;
+  for (std::size_t task = 0; task < tasks.size(); ++task) {
+    for (std::size_t state = 0; state < tasks[task].states(); ++state) {
+      tasks[task].TakeFrom(totals[task], state);
+      RatePairs rates = RatesOfTotals(totals);
+      tasks[task].AddTo(totals[task], state);
       if (rates.real.size() == result.all.real.size()) result.jackknife.push_back(std::move(rates));
     }
   }
@@ -121,7 +147,7 @@ Defined<BootstrapOf> Bootstrap(const ResampledRates& rates, const Statistic& sta
 
 }  // namespace
 
-RatePairs RatesOf(const std::vector<TaskOutcomes>& tasks) { return WeightedRates(tasks, EachOnce(tasks)); }
+RatePairs RatesOf(const std::vector<TaskOutcomes>& tasks) { return RatesOfTotals(EachOnce(RowsOf(tasks))); }
 
 PairedBootstrap PairedStateBootstrap(const std::vector<TaskOutcomes>& tasks, const MmrvConvention& convention,
                                      const BootstrapOptions& options) {

@@ -73,7 +73,7 @@ TEST_P(BadNetwork, LossReorderingDuplicationAndDelayChangeNothingButTheCountersW
   EXPECT_THAT(through.err, HasSubstr(shown));
   EXPECT_THAT(RunCommand({Binary("evac"), "ls", (folder / "through").string()}).out, HasSubstr(shown));
   ASSERT_EQ(RunCommand({Binary("evac"), "report", (folder / "through").string()}).exit_code, 0);
-  EXPECT_THAT(ReadFile(folder / "through/report.html"), HasSubstr(fmt::format(">{}</td>", repeats)));
+  EXPECT_THAT(ReadFile(folder / "through/report/index.html"), HasSubstr(fmt::format(">{}</td>", repeats)));
 }
 
 INSTANTIATE_TEST_SUITE_P(Percent, BadNetwork, testing::Values(5, 30));

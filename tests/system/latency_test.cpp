@@ -36,7 +36,7 @@ TEST(Latency, WithSecondsTheWorldMovesOnTheSameForAnyNumberOfLanesAndTheReportSa
     EXPECT_EQ(episode.observations.size(), episode.commands.size() + 1);
   }
   ASSERT_EQ(RunCommand({Binary("evac"), "report", (folder / "one").string()}).exit_code, 0);
-  EXPECT_THAT(ReadFile(folder / "one/report.html"), HasSubstr("0.35 s: the worlds move on"));
+  EXPECT_THAT(ReadFile(folder / "one/report/index.html"), HasSubstr("0.35 s: the worlds move on"));
 }
 
 TEST(Latency, MeasuredWantsOneLaneAndCountsTheTimeThatThePolicyTook) {

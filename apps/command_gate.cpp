@@ -1,0 +1,159 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cstdio>
+#include <filesystem>
+#include <memory>
+#include <optional>
+#include <string>
+
+#include "apps/commands.h"
+#include "core/file.h"
+#include "core/store.h"
+#include "core/version.h"
+#include "reports/gate.h"
+#include "reports/gate_output.h"
+#include "reports/report_files.h"
+
+namespace evac {
+namespace {
+
+namespace fs = std::filesystem;
+
+struct GateArguments {
+  std::string rules, run, baseline;
+  std::string out;  ///< of the files; of pin: the pinned file
+  std::string judge = "oracle";
+  SummaryOptions options;
+  bool json = false;
+};
+
+RunSummary SummaryOf(const std::string& run, const std::string& judge, SummaryOptions options) {
+  options.judge = judge;
+  return Summarise(ReadRun(Store::Open(run, Store::Mode::kReadOnly)), options);
+}
+
+/// Without the bootstrap of correlations, which a pinned result does not hold.
+PinnedResult PinRun(const std::string& run, const std::string& judge) {
+  SummaryOptions options;
+  options.bootstrap_replicates = 1;
+  return Pin(SummaryOf(run, judge, options), run);
+}
+
+std::optional<PinnedResult> BaselineOf(const GateArguments& arguments, const std::string& judge) {
+  if (arguments.baseline.empty()) return std::nullopt;
+  if (fs::is_directory(arguments.baseline)) return PinRun(arguments.baseline, judge);
+  return ReadPinned(ReadFile(arguments.baseline), arguments.baseline);
+}
+
+/// A run that is being written cannot take it: the decision stands, and the bets stay valid, they only forget.
+void Keep(const GateResult& result, const std::string& run) {
+  const GateDecision& decision = result.decision;
+  try {
+    Store::Open(run, Store::Mode::kReadWrite)
+        .AddGateRecord({decision.Key(), decision.name, Name(decision.outcome),
+                        JsonOf(decision).dump(-1, ' ', false, nlohmann::json::error_handler_t::replace)},
+                       result.looks);
+  } catch (const Error& error) {
+    fmt::print(stderr, "evac: warning: this decision was not kept: {}\n", error.what());
+  }
+}
+
+/// Correlations are asked for by few rules; the others need not wait for their bootstrap.
+SummaryOptions OptionsFor(const GateRules& rules, SummaryOptions options) {
+  const bool asks =
+      std::ranges::any_of(rules.rules, [](const GateRule& rule) { return rule.test == GateTest::kCorrelation; });
+  if (!asks) options.bootstrap_replicates = 1;
+  return options;
+}
+
+/// The stored decision where these rules, this baseline and these data have been decided before; else a new one, kept.
+GateDecision DecisionOf(const GateRules& rules, const GateArguments& arguments) {
+  const RunSummary summary = SummaryOf(arguments.run, rules.judge, OptionsFor(rules, arguments.options));
+  const std::optional<PinnedResult> baseline = BaselineOf(arguments, rules.judge);
+  const auto looks = Store::Open(arguments.run, Store::Mode::kReadOnly).Looks();
+  const GateResult result = Decide(rules, {summary, arguments.run, looks}, baseline ? &*baseline : nullptr);
+  const auto& records = summary.data.gates;
+  const auto stored = std::ranges::find(records, result.decision.Key(), &GateRecord::key);
+  if (stored != records.end()) return GateDecisionFromJson(stored->document);
+  Keep(result, arguments.run);
+  return result.decision;
+}
+
+void WriteFiles(const GateRules& rules, const GateDecision& decision, const GateArguments& arguments) {
+  const RunSummary summary = SummaryOf(arguments.run, rules.judge, OptionsFor(rules, arguments.options));
+  const fs::path folder = arguments.out;
+  fs::create_directories(folder);
+  for (const ReportFile& file : GateFiles(summary, decision)) WriteFileAtomically(folder / file.name, file.bytes);
+}
+
+ExitCode ExitCodeOf(GateOutcome outcome) {
+  return outcome == GateOutcome::kPass   ? ExitCode::kOk
+         : outcome == GateOutcome::kFail ? ExitCode::kNo
+                                         : ExitCode::kInconclusive;
+}
+
+ExitCode Gate(const GateArguments& arguments) {
+  const GateRules rules = ReadGateRules(Config::FromFile(arguments.rules));
+  if (arguments.run.empty()) {  // before the run: what it will take
+    const std::optional<PinnedResult> baseline = BaselineOf(arguments, rules.judge);
+    for (const std::string& size : SizesOf(rules, baseline ? &*baseline : nullptr)) fmt::print("{}.\n", size);
+    return ExitCode::kOk;
+  }
+  const GateDecision decision = DecisionOf(rules, arguments);
+  if (arguments.json) {
+    fmt::print("{}\n", JsonOf(decision).dump(2, ' ', false, nlohmann::json::error_handler_t::replace));
+  } else {
+    fmt::print("{}", GateText(decision));
+  }
+  if (!arguments.out.empty()) WriteFiles(rules, decision, arguments);
+  return ExitCodeOf(decision.outcome);
+}
+
+void AddPin(CLI::App& gate, ExitCode& exit_code) {
+  const auto arguments = std::make_shared<GateArguments>();
+  CLI::App* command =
+      gate.add_subcommand("pin", "Keep what a run came to as a baseline, in one file with its own hash.");
+  command->add_option("RUN", arguments->run, "folder of a run")->required();
+  command->add_option("--out", arguments->out, "the file")->type_name("PINNED.json")->required();
+  command->add_option("--judge", arguments->judge, "whose verdicts are pinned")->capture_default_str();
+  command->callback([arguments, &exit_code] {
+    const PinnedResult pinned = PinRun(arguments->run, arguments->judge);
+    WriteFileAtomically(arguments->out, PinnedJson(pinned));
+    fmt::print("{}\n", pinned.sha256);
+    exit_code = ExitCode::kOk;
+  });
+}
+
+}  // namespace
+
+void AddGate(CLI::App& app, ExitCode& exit_code) {
+  const auto arguments = std::make_shared<GateArguments>();
+  CLI::App* command =
+      app.add_subcommand("gate", "Decide by rules whether a candidate is good enough: pass, fail or inconclusive.");
+  command->require_subcommand(0, 1);
+  command->add_option("RULES", arguments->rules, "the rules")->type_name("RULES.yaml");
+  command->add_option("RUN", arguments->run, "folder of the candidate's run; without: only how many episodes it takes");
+  command->add_option("--baseline", arguments->baseline, "what to compare with: a run, or what `evac gate pin` wrote")
+      ->type_name("RUN|PINNED.json");
+  command->add_option("--out", arguments->out, "also junit.xml, summary.md, badge.svg and gate.json, into this folder")
+      ->type_name("FOLDER");
+  command->add_option("--seed", arguments->options.bootstrap_seed, "of the bootstrap")->capture_default_str();
+  command->add_flag("--json", arguments->json, "for programs: docs/formats/gate_json.md");
+  command->footer(
+      "Examples:\n"
+      "  evac gate pin out/main --out baseline.json\n"
+      "  evac gate gate.yaml --baseline baseline.json\n"
+      "  evac gate gate.yaml out/candidate --baseline baseline.json --out out/candidate/gate\n"
+      "Exit codes: 0 pass, 1 fail, 2 invalid, 3 inconclusive. The decision is kept in the candidate's run: the same "
+      "rules,\n"
+      "baseline and data get the same answer. docs/gate.md.");
+  AddPin(*command, exit_code);
+  command->callback([arguments, command, &exit_code] {
+    if (!command->get_subcommands().empty()) return;  // pin has done it
+    if (arguments->rules.empty()) throw InvalidInput("gate: RULES: found nothing, wanted RULES.yaml (see --help)");
+    exit_code = Gate(*arguments);
+  });
+}
+
+}  // namespace evac

@@ -1,0 +1,259 @@
+#include "reports/gate_evidence.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "core/error.h"
+#include "core/statistics/planning.h"
+#include "core/statistics/sequential.h"
+#include "core/statistics/special.h"
+#include "core/statistics/two_by_two.h"
+#include "reports/gate_quality.h"
+#include "reports/wording.h"
+
+namespace evac {
+namespace {
+
+constexpr double kPower = 0.8;                   // of the sizes that "more" promises
+constexpr double kShownConfidence = 0.95;        // of the two rates
+constexpr std::int64_t kMostExactTrials = 1000;  // above, Newcombe's interval says nearly the same and at once
+
+Count SumOf(const std::vector<Count>& counts) {
+  Count sum;
+  for (const Count& count : counts) {
+    sum.successes += count.successes;
+    sum.trials += count.trials;
+  }
+  return sum;
+}
+
+/// Repeats of a state as the number of trials that would tell as much.
+Count Effective(const std::vector<Count>& counts) {
+  const ClusterStatistics statistics = StatisticsOfClusters(counts);
+  if (!statistics.effective_trials || !statistics.rate) return SumOf(counts);
+  const auto trials = std::max<std::int64_t>(1, std::llround(*statistics.effective_trials));
+  return {std::llround(*statistics.rate * static_cast<double>(trials)), trials};
+}
+
+std::string Margin(const GateRule& rule) { return fmt::format("{:g} points", 100 * rule.margin); }
+
+double PassConfidence(const GateRule& rule) { return 1 - 2 * rule.alpha; }
+
+/// Pairs of which the lower end of the difference would clear -margin, and those that would show it worse, both if the
+/// flips stay as seen.
+std::string MorePairs(const GateRule& rule, const GatePairs& pairs) {
+  const double n = static_cast<double>(pairs.all.pairs) + 1,
+               better = static_cast<double>(pairs.all.flips.only_first) + 0.5,
+               worse = static_cast<double>(pairs.all.flips.only_second) + 0.5, d = (better - worse) / n;
+  std::vector<std::string> parts;
+  const auto add = [&](double wanted, const std::string& what) {
+    const auto further = static_cast<std::int64_t>(std::ceil(wanted)) - pairs.all.pairs;
+    parts.push_back(fmt::format("about {} more pairs to show it {}", std::max<std::int64_t>(1, further), what));
+  };
+  if (const double room = rule.margin + d; room > 0.005) {
+    const double z = NormalQuantile(1 - rule.alpha) + NormalQuantile(kPower);
+    add(z * z * ((better + worse) / n - d * d) / (room * room), "not worse by " + Margin(rule));
+  }
+  const SampleSize size = PairsForMcNemar({better / n, worse / n}, {rule.alpha, kPower});
+  if (worse > better && size.exact) add(static_cast<double>(size.n), "worse");
+  if (parts.empty()) return "";
+  return "If the flips stay as seen: " + parts.front() + (parts.size() > 1 ? ", " + parts.back() : "") + ".";
+}
+
+std::string MoreTrials(const GateRule& rule, const Count& candidate, const Count& baseline) {
+  if (candidate.trials == 0 || baseline.trials == 0) return "";
+  const auto rate = [](const Count& c) {
+    return (static_cast<double>(c.successes) + 0.5) / (static_cast<double>(c.trials) + 1);
+  };
+  const double p = rate(candidate), q = rate(baseline), room = rule.margin + p - q;
+  if (room <= 0.005) return "";
+  const double z = NormalQuantile(1 - rule.alpha) + NormalQuantile(kPower);
+  const double wanted = std::ceil(z * z * (p * (1 - p) + q * (1 - q)) / (room * room));
+  const auto have = std::min(candidate.trials, baseline.trials);
+  return fmt::format("If the rates stay as seen: about {} more episodes of each to show it not worse by {}.",
+                     std::max<std::int64_t>(1, static_cast<std::int64_t>(wanted) - have), Margin(rule));
+}
+
+/// Rates, difference, flips: what every comparison shows.
+void Describe(const GateRule& rule, const Estimate& difference, std::int64_t n, Evidence& evidence) {
+  RuleDecision& decision = evidence.decision;
+  decision.difference = difference;
+  decision.states = n;
+  evidence.good = "not worse by " + Margin(rule);
+  evidence.bad = rule.test == GateTest::kNonInferiority ? "worse by more than " + Margin(rule) : "worse";
+  evidence.shows_good = difference.value && difference.interval && difference.interval->low > -rule.margin;
+  decision.statement =
+      fmt::format("{} {} against {} {}: {} ({:g} %), ", decision.policy, PercentWithInterval(decision.value),
+                  decision.baseline_policy, PercentWithInterval(decision.baseline), PointsWithInterval(difference),
+                  100 * difference.confidence);
+}
+
+/// The difference of the pairs, its interval on their effective number.
+Estimate DifferenceOf(const GatePairs& pairs, double confidence) {
+  Estimate difference = TangoDifference(pairs.effective, confidence);
+  difference.value = TangoDifference(pairs.all, confidence).value;
+  difference.n = pairs.all.pairs;
+  if (pairs.effective.pairs < pairs.all.pairs)
+    difference.method = fmt::format("Tango on {} effective pairs", pairs.effective.pairs);
+  return difference;
+}
+
+/// Everything of an anytime-valid test but the looks before: both kinds of flips within their confidence sequences.
+Estimate SequentialDifference(const GatePairs& pairs, double alpha) {
+  const double confidence = 1 - alpha / 2;  // two sequences share alpha
+  const auto sequence = [&](std::int64_t flips) { return ConfidenceSequence({flips, pairs.all.pairs}, confidence); };
+  Estimate difference = DifferenceOf(pairs, 1 - alpha);
+  difference.method = "two Beta-binomial confidence sequences";
+  const Estimate better = sequence(pairs.all.flips.only_first), worse = sequence(pairs.all.flips.only_second);
+  difference.interval = Undefined{"no pairs"};
+  if (better.value && worse.value)
+    difference.interval =
+        Interval{better.interval->low - worse.interval->high, better.interval->high - worse.interval->low};
+  return difference;
+}
+
+/// This look's bet and the largest of all looks that leaned towards "worse".
+void Bet(const GateInput& input, const GatePairs& pairs, Evidence& evidence) {
+  RuleDecision& decision = evidence.decision;
+  const auto [better, worse] = pairs.all.flips;
+  const SequentialLook look{fmt::format("gate {}, rule {}: {} against {} of {:.16} in {}, judge {}", input.gate,
+                                        decision.name, decision.policy, decision.baseline_policy,
+                                        input.data.baseline->sha256, decision.world, input.data.candidate.judge),
+                            decision.task,
+                            pairs.all.pairs,
+                            better,
+                            worse,
+                            FlipsEValue(better, worse)};
+  double largest = worse > better ? look.e_value : 1;
+  int looks = 1;
+  bool is_new = true;
+  for (const SequentialLook& old : input.looks) {
+    if (old.comparison != look.comparison || old.task != look.task) continue;
+    if (old.only_second > old.only_first) largest = std::max(largest, old.e_value);
+    is_new = old != look;
+    ++looks;
+  }
+  looks -= !is_new;
+  if (is_new) evidence.look = look;
+  decision.p = std::min(1.0, 1 / largest);
+  decision.statement +=
+      fmt::format("{} pairs, {} better / {} worse; e-value {:.3g}, largest of {} {:.3g}, {}", pairs.all.pairs, better,
+                  worse, look.e_value, Counted(looks, "look"), largest, PValue(*decision.p));
+}
+
+void ComparePairs(const GateRule& rule, const GateInput& input, const GateSides& sides, Evidence& evidence) {
+  RuleDecision& decision = evidence.decision;
+  GatePairs pairs = PairUp(sides, input.data);
+  decision.value = ClusteredWilsonInterval(pairs.candidate, kShownConfidence);
+  decision.baseline = ClusteredWilsonInterval(pairs.baseline, kShownConfidence);
+  const auto [better, worse] = pairs.all.flips;
+  decision.flips_better = better;
+  decision.flips_worse = worse;
+  const bool is_bet = rule.test == GateTest::kSavi;
+  Describe(rule, is_bet ? SequentialDifference(pairs, rule.alpha) : DifferenceOf(pairs, PassConfidence(rule)),
+           pairs.all.pairs, evidence);
+  if (is_bet) {
+    Bet(input, pairs, evidence);
+  } else {
+    const bool by_margin = rule.test == GateTest::kNonInferiority;
+    decision.p = by_margin
+                     ? PBelow([&](double c) { return TangoDifference(pairs.effective, c).interval; }, -rule.margin)
+                 : worse > better ? McNemarExact(pairs.effective.flips).p_exact
+                                  : 1.0;
+    decision.statement += fmt::format("{} pairs, {} better / {} worse, {} ({})", pairs.all.pairs, better, worse,
+                                      PValue(*decision.p), by_margin ? "Tango against the margin" : "exact McNemar");
+  }
+  evidence.more = MorePairs(rule, pairs);
+  decision.counter_examples = std::move(pairs.counter_examples);
+}
+
+void CompareUnpaired(const GateRule& rule, const GateSides& sides, Evidence& evidence) {
+  RuleDecision& decision = evidence.decision;
+  const std::vector<Count> candidate = CountsOf(sides.candidate), baseline = CountsOf(sides.baseline);
+  decision.value = ClusteredWilsonInterval(candidate, kShownConfidence);
+  decision.baseline = ClusteredWilsonInterval(baseline, kShownConfidence);
+  const Count one = Effective(candidate), two = Effective(baseline);
+  Describe(rule, NewcombeDifference(one, two, PassConfidence(rule)), SumOf(candidate).trials, evidence);
+  const bool by_margin = rule.test == GateTest::kNonInferiority, is_large = one.trials + two.trials > kMostExactTrials;
+  const auto interval = [&](double confidence) { return NewcombeDifference(one, two, confidence).interval; };
+  if (one.trials == 0 || two.trials == 0) {
+    decision.p = Undefined{"one of the two has no episode that counts"};
+  } else if (by_margin) {
+    decision.p = PBelow(interval, -rule.margin);
+  } else if (is_large) {
+    decision.p = std::min(1.0, 2 * PBelow(interval, 0));
+  } else {
+    decision.p = std::min(1.0, 2 * BoschlooExact(one, two).less);
+  }
+  decision.statement += fmt::format("{} and {} episodes, {} ({})", SumOf(candidate).trials, SumOf(baseline).trials,
+                                    decision.p ? PValue(*decision.p) : decision.p.reason(),
+                                    by_margin || is_large ? "Newcombe" : "Boschloo");
+  evidence.more = MoreTrials(rule, one, two);
+}
+
+/// What stands before any test.
+void Block(const GateRule& rule, const GateSides& sides, Evidence& evidence) {
+  const GateSide& side = sides.candidate;
+  const double share = side.episodes > 0 ? static_cast<double>(side.errors) / static_cast<double>(side.episodes) : 0;
+  if (share > rule.max_error_share) {
+    evidence.blocked = fmt::format("{} of {} episodes ({}) could not go on, more than {}", side.errors, side.episodes,
+                                   Percent(share), Percent(rule.max_error_share));
+    evidence.more = "Mend what failed and run those again (evac resume --retry-failed).";
+  } else if (evidence.decision.states < rule.min_states) {
+    evidence.blocked = fmt::format("{} of at least {} states", evidence.decision.states, rule.min_states);
+    evidence.more = fmt::format("{} more are asked for.", rule.min_states - evidence.decision.states);
+  }
+}
+
+/// Bisection over log alpha; the interval shrinks as alpha grows.
+template <typename IsBeyond>
+double SmallestAlpha(const IntervalAt& interval, IsBeyond is_beyond) {
+  const auto holds = [&](double alpha) {
+    const Defined<Interval> at = interval(1 - 2 * alpha);
+    return at && is_beyond(*at);
+  };
+  double yes = 0.4999, no = 1e-9;
+  if (!holds(yes)) return 1;
+  if (holds(no)) return no;
+  for (int halving = 0; halving < 40; ++halving) {
+    const double middle = std::sqrt(yes * no);
+    (holds(middle) ? yes : no) = middle;
+  }
+  return yes;
+}
+
+}  // namespace
+
+double PBelow(const IntervalAt& interval, double threshold) {
+  return SmallestAlpha(interval, [threshold](const Interval& at) { return at.high < threshold; });
+}
+
+double PAbove(const IntervalAt& interval, double threshold) {
+  return SmallestAlpha(interval, [threshold](const Interval& at) { return at.low > threshold; });
+}
+
+Evidence Examine(const GateRule& rule, const GateInput& input) {
+  const GateSides sides = SidesOf(rule, input.data);
+  Evidence evidence;
+  RuleDecision& decision = evidence.decision;
+  decision.name = rule.name;
+  decision.test = Name(rule.test);
+  decision.metric = rule.metric;
+  decision.task = rule.task;
+  decision.world = sides.world;
+  decision.policy = sides.candidate.policy;
+  decision.baseline_policy = sides.baseline.policy;
+  if (rule.ComparesPairs()) {
+    ComparePairs(rule, input, sides, evidence);
+  } else if (rule.Compares()) {
+    CompareUnpaired(rule, sides, evidence);
+  } else {
+    ExamineQuality(rule, input.run, sides, evidence);
+  }
+  if (!evidence.counted) Block(rule, sides, evidence);
+  return evidence;
+}
+
+}  // namespace evac

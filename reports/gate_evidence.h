@@ -1,0 +1,45 @@
+#pragma once
+
+#include <functional>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "core/store.h"
+#include "reports/gate_decision.h"
+#include "reports/gate_sides.h"
+#include "reports/summary.h"
+
+/// What the data say of one rule, before the correction over the rules. Used by gate.cpp.
+namespace evac {
+
+/// Everything a gate is decided from.
+struct GateInput {
+  const RunSummary& run;  ///< the candidate's
+  GateData data;
+  std::string gate;                   ///< the gate's name
+  std::vector<SequentialLook> looks;  ///< at this run, oldest first
+};
+
+struct Evidence {
+  RuleDecision decision;               ///< all but outcome, p_adjusted, more and the end of the statement
+  bool shows_good = false;             ///< the rule may pass: shown to be good enough, at its alpha
+  std::string blocked;                 ///< why the rule cannot be decided (too few states, too many errors); else empty
+  std::optional<GateOutcome> counted;  ///< of a rule that counts instead of testing
+  std::string good, bad;               ///< how the two outcomes are called: "not worse by 10 points", "worse"
+  std::string more;                    ///< how many more episodes would decide, if it is not decided
+  std::optional<SequentialLook> look;  ///< a new look that was taken
+};
+
+/// @throws InvalidInput as SidesOf, and where a judge or a world is missing.
+Evidence Examine(const GateRule& rule, const GateInput& input);
+
+/// An interval at any confidence, two-sided.
+using IntervalAt = std::function<Defined<Interval>(double confidence)>;
+/// One-sided p of "the value is at least `threshold`": the smallest alpha at which the interval of confidence 1 - 2
+/// alpha ends below it; 1 where none of alpha < .5 does.
+double PBelow(const IntervalAt& interval, double threshold);
+/// The same of "at most".
+double PAbove(const IntervalAt& interval, double threshold);
+
+}  // namespace evac

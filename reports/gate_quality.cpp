@@ -1,0 +1,170 @@
+#include "reports/gate_quality.h"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "core/error.h"
+#include "core/statistics/confusion.h"
+#include "core/statistics/special.h"
+#include "reports/wording.h"
+
+namespace evac {
+namespace {
+
+constexpr double kPower = 0.8;
+constexpr double kTooNear = 1e-3;  // a value at the threshold itself is decided by no number of episodes
+
+/// A number with its interval at any confidence, held against one threshold.
+struct Held {
+  Estimate value;  ///< interval at the rule's own confidence
+  IntervalAt interval;
+  double threshold = 0;
+  bool is_ceiling = false;  ///< good is below
+  const char* unit = "episodes";
+};
+
+/// From how many on the interval would clear the threshold with power, if the value stays.
+std::string MoreOf(const Held& held, double alpha) {
+  if (!held.value.value || !held.value.interval || held.value.n == 0) return "";
+  const double value = *held.value.value, distance = std::abs(value - held.threshold);
+  if (distance < kTooNear) return "The value is at the threshold: no number of episodes decides.";
+  const bool is_good = held.is_ceiling ? value < held.threshold : value > held.threshold;
+  const double width =
+      is_good == held.is_ceiling ? held.value.interval->high - value : value - held.value.interval->low;
+  const double ratio = width / distance * (1 + NormalQuantile(kPower) / NormalQuantile(1 - alpha));
+  const double more = std::ceil(static_cast<double>(held.value.n) * (ratio * ratio - 1));
+  return fmt::format("If the value stays as seen: about {} more {}.", std::max(1.0, more), held.unit);
+}
+
+void Hold(const GateRule& rule, const Held& held, Evidence& evidence) {
+  RuleDecision& decision = evidence.decision;
+  decision.value = held.value;
+  evidence.good = fmt::format("{} {:g}", held.is_ceiling ? "at most" : "at least", held.threshold);
+  evidence.bad = fmt::format("{} {:g}", held.is_ceiling ? "above" : "below", held.threshold);
+  if (!held.value.value) {
+    decision.p = Undefined{held.value.value.reason()};
+  } else {
+    decision.p = held.is_ceiling ? PAbove(held.interval, held.threshold) : PBelow(held.interval, held.threshold);
+  }
+  const Defined<Interval>& interval = held.value.interval;
+  evidence.shows_good = held.value.value && interval &&
+                        (held.is_ceiling ? interval->high <= held.threshold : interval->low >= held.threshold);
+  evidence.more = MoreOf(held, rule.alpha);
+}
+
+void HoldRate(const GateRule& rule, const GateSides& sides, Evidence& evidence) {
+  const std::vector<Count> states = CountsOf(sides.candidate);
+  const bool has_repeats = std::ranges::any_of(states, [](const Count& count) { return count.trials > 1; });
+  std::int64_t successes = 0, trials = 0;
+  for (const Count& count : states) {
+    successes += count.successes;
+    trials += count.trials;
+  }
+  const auto estimate = [=](double confidence) {
+    return has_repeats ? ClusteredWilsonInterval(states, confidence)
+                       : ClopperPearsonInterval(successes, trials, confidence);
+  };
+  evidence.decision.states = trials;
+  Hold(rule, {estimate(1 - 2 * rule.alpha), [=](double c) { return estimate(c).interval; }, *rule.at_least}, evidence);
+  evidence.decision.statement =
+      fmt::format("{} {} ({:g} %, {}), {}/{}", evidence.decision.policy, PercentWithInterval(evidence.decision.value),
+                  100 * (1 - 2 * rule.alpha), evidence.decision.value.method, successes, trials);
+}
+
+const WorldComparison& ComparisonWith(const RunSummary& run, const std::string& world, const std::string& rule) {
+  const auto found = std::ranges::find(run.comparisons, world, &WorldComparison::other);
+  if (found != run.comparisons.end()) return *found;
+  std::vector<std::string> known;
+  for (const WorldComparison& comparison : run.comparisons) known.push_back(comparison.other);
+  throw InvalidInput("gate rule '{}': world: found '{}', wanted one beside the real one: {}", rule, world,
+                     fmt::join(known, ", "));
+}
+
+const Defined<BootstrapOf>& Resampled(const PairedBootstrap& bootstrap, const std::string& metric) {
+  return metric == "pearson" ? bootstrap.pearson : metric == "spearman" ? bootstrap.spearman : bootstrap.mmrv;
+}
+
+void HoldCorrelation(const GateRule& rule, const RunSummary& run, const GateSides& sides, Evidence& evidence) {
+  const WorldComparison& comparison = ComparisonWith(run, sides.world, rule.name);
+  const CorrelationGroup& group = comparison.correlation;
+  Held held{rule.metric == "pearson"    ? group.pearson
+            : rule.metric == "spearman" ? group.spearman
+                                        : group.mmrv,
+            [](double) -> Defined<Interval> { return Undefined{"not resampled"}; },
+            rule.at_most.value_or(rule.at_least.value_or(0)), rule.metric == "mmrv",
+            "(task, policy) points or initial states"};
+  PairedBootstrap bootstrap;
+  if (held.value.value) {  // the same draws as the report's, at the confidence that is asked
+    bootstrap = PairedStateBootstrap(comparison.by_state, group.options.convention, group.options.bootstrap);
+    if (const auto& resampled = Resampled(bootstrap, rule.metric)) {
+      held.interval = [&resampled](double c) { return IntervalsOf(resampled->resampled, c).percentile; };
+    }
+  }
+  held.value.confidence = 1 - 2 * rule.alpha;
+  held.value.interval = held.interval(held.value.confidence);
+  RuleDecision& decision = evidence.decision;
+  for (const PairTable& table : comparison.tables) decision.states += table.Counted();
+  decision.policy.clear();  // it is about all of them
+  Hold(rule, held, evidence);
+  evidence.more = held.value.value ? evidence.more : "";
+  decision.statement = fmt::format("{} of {} against {}: {} ({:g} %) over {}, {}", rule.metric, sides.world,
+                                   run.reference, NumberWithInterval(held.value), 100 * held.value.confidence,
+                                   Counted(held.value.n, "point"), Counted(decision.states, "pair"));
+}
+
+void HoldKappa(const GateRule& rule, const RunSummary& run, const GateSides& sides, Evidence& evidence) {
+  if (std::ranges::find(run.judges, rule.against) == run.judges.end())
+    throw InvalidInput("gate rule '{}': against: found '{}', wanted a judge of the run: {}", rule.name, rule.against,
+                       fmt::join(run.judges, ", "));
+  Confusion table;
+  for (const JudgedEpisode& judged : run.episodes) {
+    const EpisodeKey& key = judged.episode.key;
+    if (key.world != sides.world || (!rule.task.empty() && key.pair.task != rule.task) || !judged.Counts()) continue;
+    const auto verdicts = run.data.verdicts.find(key.Id());
+    const auto other = verdicts->second.find(rule.against);
+    if (other == verdicts->second.end()) continue;
+    const Label label = other->second.label;
+    if (label != Label::kSuccess && label != Label::kFailure) continue;
+    const bool one = judged.outcome == Outcome::kSuccess, two = label == Label::kSuccess;
+    ++(one ? (two ? table.both_success : table.only_judge_success)
+           : (two ? table.only_human_success : table.both_failure));
+  }
+  const auto kappa = [=](double confidence) { return StatisticsOf(table, confidence).kappa; };
+  Hold(rule, {kappa(1 - 2 * rule.alpha), [=](double c) { return kappa(c).interval; }, *rule.at_least}, evidence);
+  RuleDecision& decision = evidence.decision;
+  decision.policy.clear();
+  decision.states = table.total();
+  decision.statement = fmt::format(
+      "kappa of {} with {} in {}: {} ({:g} %) over {} that both judged, {} only {} and {} only {} a success",
+      run.options.judge, rule.against, sides.world, NumberWithInterval(decision.value), 100 * (1 - 2 * rule.alpha),
+      Counted(table.total(), "episode"), table.only_judge_success, run.options.judge, table.only_human_success,
+      rule.against);
+}
+
+/// A fact of this run, not a sample of others: no test.
+void CountErrors(const GateRule& rule, const GateSides& sides, Evidence& evidence) {
+  const GateSide& side = sides.candidate;
+  const double share = static_cast<double>(side.errors) / static_cast<double>(side.episodes);
+  evidence.decision.value = ClopperPearsonInterval(side.errors, side.episodes, 1 - 2 * rule.alpha);
+  evidence.decision.states = side.episodes;
+  evidence.decision.p = Undefined{"errors are counted, not tested"};
+  evidence.decision.statement = fmt::format("{} of {} of {} ({}) could not go on", side.errors,
+                                            Counted(side.episodes, "episode"), side.policy, Percent(share));
+  evidence.good = "at most " + Percent(*rule.at_most);
+  evidence.bad = "more than " + Percent(*rule.at_most);
+  evidence.counted = share <= *rule.at_most ? GateOutcome::kPass : GateOutcome::kFail;
+}
+
+}  // namespace
+
+void ExamineQuality(const GateRule& rule, const RunSummary& run, const GateSides& sides, Evidence& evidence) {
+  if (rule.test == GateTest::kCiLower) HoldRate(rule, sides, evidence);
+  if (rule.test == GateTest::kCorrelation) HoldCorrelation(rule, run, sides, evidence);
+  if (rule.test == GateTest::kJudgeKappa) HoldKappa(rule, run, sides, evidence);
+  if (rule.test == GateTest::kErrorShare) CountErrors(rule, sides, evidence);
+}
+
+}  // namespace evac

@@ -1,0 +1,192 @@
+#include "reports/gate_sides.h"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <map>
+#include <set>
+#include <tuple>
+#include <utility>
+
+#include "core/error.h"
+
+namespace evac {
+namespace {
+
+using Place = std::tuple<std::string, std::string, std::uint64_t>;  // task, initial state, seed
+
+std::vector<std::string> Keys(const std::map<std::string, std::string>& map) {
+  std::vector<std::string> keys;
+  for (const auto& [key, value] : map) keys.push_back(key);
+  return keys;
+}
+
+/// The one asked for, or the only one there is.
+std::string Chosen(const std::string& wanted, const std::vector<std::string>& known, const std::string& what) {
+  if (wanted.empty() && known.size() == 1) return known.front();
+  if (!wanted.empty() && std::ranges::find(known, wanted) != known.end()) return wanted;
+  throw InvalidInput("{}: found {}, wanted one of: {}", what, wanted.empty() ? "nothing" : "'" + wanted + "'",
+                     fmt::join(known, ", "));
+}
+
+std::string BaselinePolicy(const GateRule& rule, const std::string& candidate, const std::vector<std::string>& known,
+                           const std::string& what) {
+  const bool same_name = rule.baseline_policy.empty() && std::ranges::find(known, candidate) != known.end();
+  return Chosen(same_name ? candidate : rule.baseline_policy, known, what + "baseline_policy");
+}
+
+GateSide SideOf(const PinnedResult& result, const GateRule& rule, const std::string& world, const std::string& policy) {
+  GateSide side{policy, {}, 0, 0};
+  for (const PinnedCell& cell : result.cells) {
+    if ((!policy.empty() && cell.policy != policy) || cell.world != world ||
+        (!rule.task.empty() && cell.task != rule.task))
+      continue;
+    side.cells.push_back(&cell);
+    side.episodes += static_cast<std::int64_t>(cell.outcomes.size());
+    side.errors += std::ranges::count(cell.outcomes, Outcome::kError, &PinnedOutcome::outcome);
+  }
+  return side;
+}
+
+std::set<Place> PlacesOf(const GateSide& side) {
+  std::set<Place> places;
+  for (const PinnedCell* cell : side.cells) {
+    for (const PinnedOutcome& one : cell->outcomes) places.insert({cell->task, one.initial_state, one.seed});
+  }
+  return places;
+}
+
+std::string Example(const std::vector<Place>& places) {
+  if (places.empty()) return "none";
+  const auto& [task, state, seed] = places.front();
+  return fmt::format("{} (such as {} {} seed {})", places.size(), task, state, seed);
+}
+
+/// Pairs are pairs only if both sides began alike.
+void DemandSameStates(const GateSides& sides, bool may_be_part, const std::string& what) {
+  const std::set<Place> candidate = PlacesOf(sides.candidate), baseline = PlacesOf(sides.baseline);
+  std::vector<Place> only_candidate, only_baseline;
+  std::ranges::set_difference(candidate, baseline, std::back_inserter(only_candidate));
+  std::ranges::set_difference(baseline, candidate, std::back_inserter(only_baseline));
+  if (only_candidate.empty() && (only_baseline.empty() || may_be_part)) return;
+  throw InvalidInput(
+      "{}initial states: found another list than the baseline's: {} only here, {} only there, wanted the same list (or "
+      "an "
+      "unpaired test: boschloo, noninferiority with paired: false)",
+      what, Example(only_candidate), Example(only_baseline));
+}
+
+void DemandSame(const std::string& found, const std::string& wanted, const std::string& what) {
+  if (found != wanted) throw InvalidInput("{}: found {}, wanted the baseline's, {}", what, found, wanted);
+}
+
+void DemandComparable(const GateSides& sides, const GateRule& rule, const GateData& data, const std::string& what) {
+  if (!rule.ComparesPairs()) return;
+  const std::string& world = sides.world;
+  DemandSame(data.candidate.worlds.at(world), data.baseline->worlds.at(world), what + "profile of world " + world);
+  for (const PinnedCell* cell : sides.candidate.cells) {
+    if (data.baseline->tasks.contains(cell->task))
+      DemandSame(data.candidate.tasks.at(cell->task), data.baseline->tasks.at(cell->task),
+                 what + "page of task " + cell->task);
+  }
+  DemandSameStates(sides, rule.test == GateTest::kSavi, what);
+}
+
+std::vector<Count> Values(const std::map<std::pair<std::string, std::string>, Count>& map) {
+  std::vector<Count> counts;
+  for (const auto& [key, count] : map) counts.push_back(count);
+  return counts;
+}
+
+std::string ClipPath(const PinnedResult& result, const std::string& video) {
+  return video.empty() || result.run.empty() ? video : result.run + "/" + video;
+}
+
+/// The baseline's outcomes by place.
+std::map<Place, const PinnedOutcome*> ByPlace(const GateSide& side) {
+  std::map<Place, const PinnedOutcome*> places;
+  for (const PinnedCell* cell : side.cells) {
+    for (const PinnedOutcome& one : cell->outcomes) places[{cell->task, one.initial_state, one.seed}] = &one;
+  }
+  return places;
+}
+
+void Add(bool success, Count& count) {
+  ++count.trials;
+  count.successes += success;
+}
+
+}  // namespace
+
+GateSides SidesOf(const GateRule& rule, const GateData& data) {
+  const std::string what = fmt::format("gate rule '{}': ", rule.name);
+  GateSides sides;
+  sides.world = Chosen(rule.world, Keys(data.candidate.worlds), what + "world");
+  const bool may_be_all = !rule.Compares() && rule.test != GateTest::kCiLower && rule.policy.empty();
+  const std::string policy = may_be_all ? "" : Chosen(rule.policy, data.candidate.Policies(), what + "policy");
+  sides.candidate = SideOf(data.candidate, rule, sides.world, policy);
+  if (sides.candidate.cells.empty())
+    throw InvalidInput("{}found no episode of {}{} in {}, wanted some", what, policy.empty() ? "any policy" : policy,
+                       rule.task.empty() ? "" : " on task '" + rule.task + "'", sides.world);
+  if (!rule.Compares()) return sides;
+  if (!data.baseline) throw InvalidInput("{}baseline: found none, wanted --baseline RUN or PINNED.json", what);
+  if (!data.baseline->worlds.contains(sides.world))
+    throw InvalidInput("{}world: found '{}', which the baseline has not, wanted one of: {}", what, sides.world,
+                       fmt::join(Keys(data.baseline->worlds), ", "));
+  DemandSame(data.candidate.judge, data.baseline->judge, what + "judge");
+  if (!rule.is_paired && sides.candidate.cells.size() > 1)
+    throw InvalidInput("{}task: found {} tasks, wanted one: unpaired tasks pooled can say the opposite of each", what,
+                       sides.candidate.cells.size());
+  const std::string other = BaselinePolicy(rule, policy, data.baseline->Policies(), what);
+  sides.baseline = SideOf(*data.baseline, rule, sides.world, other);
+  if (sides.baseline.cells.empty())
+    throw InvalidInput("{}found no episode of {} in {} in the baseline, wanted some", what, other, sides.world);
+  DemandComparable(sides, rule, data, what);
+  return sides;
+}
+
+GatePairs PairUp(const GateSides& sides, const GateData& data) {
+  GatePairs pairs;
+  std::map<std::pair<std::string, std::string>, PairedOutcomes> states;
+  std::map<std::pair<std::string, std::string>, Count> candidate, baseline;
+  const std::map<Place, const PinnedOutcome*> before = ByPlace(sides.baseline);
+  for (const auto& [place, one] : ByPlace(sides.candidate)) {
+    const auto partner = before.find(place);
+    if (partner == before.end() || !one->Counts() || !partner->second->Counts()) continue;
+    const auto& [task, state, seed] = place;
+    const bool now = one->outcome == Outcome::kSuccess, then = partner->second->outcome == Outcome::kSuccess;
+    PairedOutcomes& outcomes = states[{task, state}];
+    ++outcomes.pairs;
+    outcomes.flips.only_first += now && !then;
+    outcomes.flips.only_second += !now && then;
+    Add(now, candidate[{task, state}]);
+    Add(then, baseline[{task, state}]);
+    if (!now && then && pairs.counter_examples.size() < kMostCounterExamples)
+      pairs.counter_examples.push_back(
+          {task, state, seed, ClipPath(data.candidate, one->video), ClipPath(*data.baseline, partner->second->video)});
+  }
+  std::vector<PairedOutcomes> clusters;
+  for (const auto& [state, outcomes] : states) {
+    clusters.push_back(outcomes);
+    pairs.all.pairs += outcomes.pairs;
+    pairs.all.flips.only_first += outcomes.flips.only_first;
+    pairs.all.flips.only_second += outcomes.flips.only_second;
+  }
+  pairs.effective = EffectivePairs(clusters);
+  pairs.candidate = Values(candidate);
+  pairs.baseline = Values(baseline);
+  return pairs;
+}
+
+std::vector<Count> CountsOf(const GateSide& side) {
+  std::map<std::pair<std::string, std::string>, Count> states;
+  for (const PinnedCell* cell : side.cells) {
+    for (const PinnedOutcome& one : cell->outcomes) {
+      if (one.Counts()) Add(one.outcome == Outcome::kSuccess, states[{cell->task, one.initial_state}]);
+    }
+  }
+  return Values(states);
+}
+
+}  // namespace evac

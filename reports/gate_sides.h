@@ -1,0 +1,51 @@
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "core/statistics/rate_difference.h"
+#include "reports/gate_baseline.h"
+#include "reports/gate_decision.h"
+#include "reports/gate_rules.h"
+
+/// Which episodes one rule of a gate is about: chosen, checked and paired, before anything is tested.
+namespace evac {
+
+/// The candidate as it is, and the pinned baseline.
+struct GateData {
+  const PinnedResult& candidate;
+  const PinnedResult* baseline = nullptr;  ///< null: none was given
+};
+
+/// One policy in one world, a cell per task.
+struct GateSide {
+  std::string policy;  ///< empty: all of them, where the rule is about no policy
+  std::vector<const PinnedCell*> cells;
+  std::int64_t episodes = 0, errors = 0;
+};
+
+struct GateSides {
+  std::string world;
+  GateSide candidate, baseline;  ///< baseline empty where the rule does not compare
+};
+
+/// @throws InvalidInput naming the rule: a policy, world or task that is not there or is not named where there are
+/// several; no baseline; for pairs another list of initial states, another task page or another world profile than the
+/// baseline's (a sequential rule may have seen only a part of its states yet).
+GateSides SidesOf(const GateRule& rule, const GateData& data);
+
+/// The states that count on both sides. "First" is the candidate: flips.only_first are for the better.
+struct GatePairs {
+  PairedOutcomes all;
+  PairedOutcomes effective;                ///< where states repeat (several seeds), what the pairs tell as much as
+  std::vector<Count> candidate, baseline;  ///< by (task, initial state)
+  std::vector<CounterExample> counter_examples;  ///< at most kMostCounterExamples, in order
+};
+inline constexpr std::size_t kMostCounterExamples = 200;
+GatePairs PairUp(const GateSides& sides, const GateData& data);
+
+/// Successes and trials by (task, initial state) of what counts.
+std::vector<Count> CountsOf(const GateSide& side);
+
+}  // namespace evac

@@ -1,0 +1,236 @@
+#include "reports/gate.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "core/error.h"
+#include "reports/gate_evidence.h"
+#include "reports/gate_output.h"
+#include "tests/reports/sample_run.h"
+
+namespace evac {
+namespace {
+
+using testing::AllOf;
+using testing::HasSubstr;
+
+GateRules Rules(const std::string& gates, const std::string& top = "") {
+  return ReadGateRules(Config::FromText(top + "gates:\n" + gates, "gate.yaml"));
+}
+
+/// One policy on one task, as many states as letters, in sim alone.
+SampleRun RunOf(const Outcomes& sim) { return SampleRun({{"take_bottle", "pick", "good", "-", sim}}); }
+
+PinnedResult PinOf(const SampleRun& run) { return Pin(run.Summary({.bootstrap_replicates = 1}), "out/main"); }
+
+GateDecision Decided(const GateRules& rules, const Outcomes& candidate, const Outcomes& baseline,
+                     const std::vector<SequentialLook>& looks = {}) {
+  const SampleRun now = RunOf(candidate), then = RunOf(baseline);
+  const PinnedResult pinned = PinOf(then);
+  return Decide(rules, {now.Summary({.bootstrap_replicates = 1}), "out/candidate", looks}, &pinned).decision;
+}
+
+Outcomes Repeat(int count, char outcome) { return Outcomes(static_cast<std::size_t>(count), outcome); }
+
+const std::string kMcnemar = "  - {name: r, test: paired_mcnemar, world: sim, margin: 0.1}\n";
+
+std::string MessageOf(const std::function<void()>& act) {
+  try {
+    act();
+  } catch (const Error& error) {
+    EXPECT_EQ(error.exit_code(), ExitCode::kInvalidInput);
+    return error.what();
+  }
+  return "nothing was thrown";
+}
+
+TEST(Gate, APlantedRegressionFailsWithItsNumbersAndBothClips) {
+  const GateDecision decision = Decided(Rules(kMcnemar), Repeat(28, 's') + Repeat(12, 'f'), Repeat(40, 's'));
+  EXPECT_EQ(decision.outcome, GateOutcome::kFail);
+  const RuleDecision& rule = decision.rules.at(0);
+  EXPECT_THAT(rule.statement,
+              AllOf(HasSubstr("pick@good 70 % [55, 82] against pick@good 100 % [91, 100]"),
+                    HasSubstr("40 pairs, 0 better / 12 worse, p < 0.001 (exact McNemar)"), HasSubstr(": worse.")));
+  ASSERT_EQ(rule.counter_examples.size(), 12u);
+  EXPECT_EQ(rule.counter_examples[0].initial_state, "41-0028");
+  EXPECT_EQ(rule.counter_examples[0].candidate_video, "out/candidate/videos/sim/take_bottle/pick@good/41-0028-s1.mp4");
+  EXPECT_EQ(rule.counter_examples[0].baseline_video, "out/main/videos/sim/take_bottle/pick@good/41-0028-s1.mp4");
+  EXPECT_THAT(GateText(decision), AllOf(HasSubstr("FAIL"), HasSubstr("41-0028"), HasSubstr("and 2 more")));
+}
+
+TEST(Gate, TheSameOutcomesPassWhenTheyAreManyAndAreInconclusiveWhenFew) {
+  const GateDecision many = Decided(Rules(kMcnemar), Repeat(40, 's'), Repeat(40, 's'));
+  EXPECT_EQ(many.outcome, GateOutcome::kPass);
+  EXPECT_THAT(many.rules[0].statement, HasSubstr("not worse by 10 points"));
+  EXPECT_EQ(many.rules[0].more, "");
+  const GateDecision few = Decided(Rules(kMcnemar), "ssssssf", "sssssfs");
+  EXPECT_EQ(few.outcome, GateOutcome::kInconclusive);
+  EXPECT_THAT(few.rules[0].more, HasSubstr("more pairs to show it not worse by 10 points"));
+}
+
+TEST(Gate, TooFewStatesOrTooManyErrorsAreInconclusiveWhateverTheNumbersSay) {
+  const std::string rule = "  - {name: r, test: paired_mcnemar, world: sim, min_states: 50, max_error_share: 0.02}\n";
+  EXPECT_THAT(Decided(Rules(rule), Repeat(40, 'f'), Repeat(40, 's')).rules[0].statement,
+              HasSubstr("40 of at least 50 states"));
+  const GateDecision errors = Decided(Rules(rule), "ee" + Repeat(58, 'f'), Repeat(60, 's'));
+  EXPECT_EQ(errors.outcome, GateOutcome::kInconclusive);
+  EXPECT_THAT(errors.rules[0].statement, HasSubstr("2 of 60 episodes (3 %) could not go on, more than 2 %"));
+}
+
+TEST(Gate, InconclusiveCountsAsFailedWhereTheRulesSaySo) {
+  const GateDecision decision = Decided(Rules(kMcnemar, "on_inconclusive: fail\n"), "sssf", "sssf");
+  EXPECT_EQ(decision.outcome, GateOutcome::kFail);
+  EXPECT_THAT(decision.rules[0].statement, HasSubstr("inconclusive counts as failed here"));
+}
+
+TEST(Gate, HolmHoldsTheFalseAlarmsOfTheWholeFile) {
+  // 6 flips to none: exact McNemar p = 2 / 64 = .03125 each.
+  const std::string two =
+      "  - {name: a, test: paired_mcnemar, world: sim}\n  - {name: b, test: paired_mcnemar, world: sim}\n";
+  const Outcomes now = "ffffffss", then = "ssssssss";
+  EXPECT_EQ(Decided(Rules(kMcnemar), now, then).outcome, GateOutcome::kFail);
+  const GateDecision corrected = Decided(Rules(two), now, then);
+  EXPECT_EQ(corrected.outcome, GateOutcome::kInconclusive);
+  EXPECT_DOUBLE_EQ(*corrected.rules[0].p, 0.03125);
+  EXPECT_DOUBLE_EQ(*corrected.rules[0].p_adjusted, 0.0625);
+  EXPECT_EQ(Decided(Rules(two, "correction: none\n"), now, then).outcome, GateOutcome::kFail);
+}
+
+TEST(Gate, NonInferiorityLooksAtTheMarginAlone) {
+  const std::string rule = "  - {name: r, test: noninferiority, world: sim, margin: 0.3}\n";
+  // 8 of 60 worse: significant (p = .008), but the interval ends well above -30 points.
+  const Outcomes now = Repeat(8, 'f') + Repeat(52, 's'), then = Repeat(60, 's');
+  EXPECT_EQ(Decided(Rules(rule), now, then).outcome, GateOutcome::kPass);
+  EXPECT_EQ(Decided(Rules(kMcnemar), now, then).outcome, GateOutcome::kFail);
+  EXPECT_EQ(Decided(Rules(rule), Repeat(40, 'f') + Repeat(20, 's'), then).outcome, GateOutcome::kFail);
+}
+
+TEST(Gate, AnotherListOfStatesIsRefusedUnlessTheRuleIsUnpaired) {
+  EXPECT_THAT(MessageOf([] { Decided(Rules(kMcnemar), "sss", "ssss"); }),
+              AllOf(HasSubstr("gate rule 'r': initial states: found another list"), HasSubstr("none only here"),
+                    HasSubstr("1 (such as take_bottle 41-0003 seed 1) only there")));
+  for (const char* unpaired : {"  - {name: r, test: boschloo, world: sim}\n",
+                               "  - {name: r, test: noninferiority, paired: false, world: sim}\n"}) {
+    EXPECT_EQ(Decided(Rules(unpaired), Repeat(10, 'f'), Repeat(12, 's')).outcome, GateOutcome::kFail) << unpaired;
+    EXPECT_EQ(Decided(Rules(unpaired), Repeat(100, 's'), Repeat(90, 's')).outcome, GateOutcome::kPass) << unpaired;
+  }
+}
+
+TEST(Gate, WhatIsNotThereIsNamedWithWhatIs) {
+  const auto message = [](const std::string& rule) {
+    return MessageOf([&] { Decided(Rules("  - {name: r, test: paired_mcnemar" + rule + "}\n"), "s", "s"); });
+  };
+  EXPECT_THAT(message(""), HasSubstr("world: found nothing, wanted one of: real, sim"));
+  EXPECT_THAT(message(", world: moon"), HasSubstr("world: found 'moon', wanted one of: real, sim"));
+  EXPECT_THAT(message(", world: sim, policy: x"), HasSubstr("policy: found 'x', wanted one of: pick@good"));
+  EXPECT_THAT(message(", world: sim, task: x"), HasSubstr("found no episode of pick@good on task 'x' in sim"));
+  const SampleRun run = RunOf("s");
+  EXPECT_THAT(MessageOf([&] {
+                Decide(Rules(kMcnemar), {run.Summary(), "out", {}}, nullptr);
+              }),
+              HasSubstr("baseline: found none, wanted --baseline"));
+}
+
+TEST(Gate, SequentialBetsRememberTheirBestLookAndMayHaveSeenAPart) {
+  const GateRules rules = Rules("  - {name: r, test: savi, world: sim, margin: 0.1}\n");
+  const Outcomes then = Repeat(40, 's');
+  const SampleRun early = RunOf(Repeat(9, 'f')), base = RunOf(then);
+  const PinnedResult pinned = PinOf(base);
+  const GateResult first = Decide(rules, {early.Summary({.bootstrap_replicates = 1}), "out", {}}, &pinned);
+  EXPECT_EQ(first.decision.outcome, GateOutcome::kFail) << "9 flips to none: E = 52";
+  ASSERT_EQ(first.looks.size(), 1u);
+  EXPECT_EQ(first.looks[0].only_second, 9);
+  // Later looks may be luckier; the best one stays.
+  const SampleRun later = RunOf(Repeat(9, 'f') + Repeat(31, 's'));
+  const GateResult second = Decide(rules, {later.Summary({.bootstrap_replicates = 1}), "out", first.looks}, &pinned);
+  EXPECT_DOUBLE_EQ(*second.decision.rules[0].p, 1 / first.looks[0].e_value);
+  EXPECT_EQ(Decide(rules, {early.Summary({.bootstrap_replicates = 1}), "out", first.looks}, &pinned).looks.size(), 0u)
+      << "the same data are no new look";
+}
+
+TEST(Gate, ARateOfItsOwnIsHeldAgainstAFloorByClopperPearson) {
+  const auto outcome = [](const Outcomes& outcomes) {
+    return Decided(Rules("  - {name: r, test: ci_lower, world: sim, at_least: 0.7}\n"), outcomes, "s").outcome;
+  };
+  EXPECT_EQ(outcome(Repeat(40, 's')), GateOutcome::kPass);
+  EXPECT_EQ(outcome(Repeat(30, 's') + Repeat(10, 'f')), GateOutcome::kInconclusive);
+  EXPECT_EQ(outcome(Repeat(20, 's') + Repeat(20, 'f')), GateOutcome::kFail);
+}
+
+TEST(Gate, ErrorsAreCountedAndNotTested) {
+  const std::string rule = "  - {name: r, test: error_share, world: sim, at_most: 0.1}\n";
+  EXPECT_EQ(Decided(Rules(rule),
+                    "sssssssss"
+                    "e",
+                    "s")
+                .outcome,
+            GateOutcome::kPass);
+  EXPECT_EQ(Decided(Rules(rule),
+                    "ssssssss"
+                    "ee",
+                    "s")
+                .outcome,
+            GateOutcome::kFail);
+}
+
+TEST(Gate, ACorrelationIsHeldAgainstItsFloorAndMmrvAgainstItsCeiling) {
+  const auto outcome = [](const std::string& rule) {
+    const SampleRun& run = LargeRun();
+    return Decide(Rules("  - {name: r, test: correlation, world: sim, " + rule + "}\n"), {run.Summary(), "out", {}},
+                  nullptr)
+        .decision;
+  };
+  const GateDecision good = outcome("at_least: 0.5");
+  EXPECT_EQ(good.outcome, GateOutcome::kPass) << good.rules[0].statement;
+  EXPECT_EQ(outcome("at_least: 0.999").outcome, GateOutcome::kFail);
+  EXPECT_EQ(outcome("metric: mmrv, at_most: 0.5").outcome, GateOutcome::kPass);
+  EXPECT_THAT(MessageOf([&] { outcome("metric: mmrv, at_least: 0.5"); }),
+              HasSubstr("at_least: found '0.5', wanted none"));
+}
+
+TEST(Gate, TheJudgeIsHeldAgainstAnother) {
+  SampleRun run = RunOf(Repeat(20, 's') + Repeat(20, 'f'));
+  int turn = 0;
+  for (const Episode& episode : run.store().Episodes()) {
+    Verdict verdict;
+    verdict.episode_id = episode.key.Id();
+    verdict.judge = "human";
+    verdict.label = turn++ < 20 ? Label::kSuccess : Label::kFailure;
+    run.store().AddVerdict(verdict);
+  }
+  const auto decide = [&](const std::string& rule) {
+    return Decide(Rules("  - {name: r, test: judge_kappa, world: sim, " + rule + "}\n"),
+                  {run.Summary({.bootstrap_replicates = 1}), "out", {}}, nullptr)
+        .decision;
+  };
+  const GateDecision decision = decide("at_least: 0.8");
+  EXPECT_THAT(decision.rules[0].statement, HasSubstr("kappa of oracle with human in sim: 1.00"))
+      << "and it may be undecided: it has no spread";
+  EXPECT_THAT(MessageOf([&] { decide("at_least: 0.8, against: vlm"); }), HasSubstr("against: found 'vlm'"));
+}
+
+TEST(Gate, TheStoredDecisionIsTheDecision) {
+  const GateDecision decision = Decided(Rules(kMcnemar), Repeat(28, 's') + Repeat(12, 'f'), Repeat(40, 's'));
+  const GateDecision again = GateDecisionFromJson(JsonOf(decision).dump());
+  EXPECT_EQ(JsonOf(again), JsonOf(decision));
+  EXPECT_EQ(again.Key(), decision.Key());
+  EXPECT_THROW(GateDecisionFromJson("{}"), Error);
+}
+
+TEST(Gate, SizesAreKnownBeforeTheRun) {
+  const std::vector<std::string> sizes = SizesOf(Rules(kMcnemar), nullptr);
+  ASSERT_EQ(sizes.size(), 1u);
+  EXPECT_THAT(sizes[0], AllOf(HasSubstr("124 pairs if 20 % of the states flip"), HasSubstr("260 episodes of each")))
+      << sizes[0];
+}
+
+TEST(Gate, AnInvertedIntervalTouchesItsThreshold) {
+  const PairedOutcomes outcomes{{2, 14}, 50};
+  const IntervalAt interval = [&](double confidence) { return TangoDifference(outcomes, confidence).interval; };
+  const double p = PBelow(interval, -0.1);
+  EXPECT_NEAR(interval(1 - 2 * p)->high, -0.1, 1e-6);
+  EXPECT_EQ(PBelow(interval, -0.5), 1) << "the value itself is above";
+}
+
+}  // namespace
+}  // namespace evac

@@ -1,0 +1,174 @@
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <fstream>
+#include <nlohmann/json.hpp>
+
+#include "core/file.h"
+#include "core/store.h"
+#include "tests/core/store_samples.h"
+#include "tests/support/temp_folder.h"
+#include "tests/system/run_support.h"
+
+/// A repository with a gate, as CI would run it: the real program on runs on disk.
+namespace evac::system_test {
+namespace {
+
+using testing::AllOf;
+using testing::HasSubstr;
+using Json = nlohmann::json;
+
+const std::string kRules =
+    "name: nightly\n"
+    "gates:\n"
+    "  - {name: bottle.sim, test: paired_mcnemar, task: take_bottle, world: sim, margin: 0.1, max_error_share: 0.02}\n"
+    "  - {name: errors, test: error_share, world: sim, at_most: 0.02}\n";
+
+class GateCommand : public testing::Test {
+ protected:
+  GateCommand() {
+    WriteFileAtomically(folder_ / "gate.yaml", kRules);
+    WriteRun("main", 60, 0);
+    Pin("main");
+  }
+
+  /// A run of one policy in sim: states succeed but for the first `failures`.
+  void WriteRun(const std::string& name, int states, int failures) const {
+    Store store = Store::CreateOrContinue(folder_ / name, samples::SomeRun());
+    samples::Declare(store);
+    std::vector<EpisodeRecord> records;
+    std::vector<Verdict> verdicts;
+    for (int state = 0; state < states; ++state) {
+      EpisodeRecord& record = records.emplace_back(EpisodeRecord{});
+      record.episode.key = samples::Key(1, "sim");
+      record.episode.key.pair.initial_state = fmt::format("41-{:04d}", state);
+      record.episode.stop = StopReason::kStill;
+      Verdict& verdict = verdicts.emplace_back();
+      verdict.episode_id = record.episode.key.Id();
+      verdict.judge = "oracle";
+      verdict.label = state < failures ? Label::kFailure : Label::kSuccess;
+    }
+    store.AddAll(records);
+    store.AddVerdicts(verdicts);
+  }
+
+  CommandResult Evac(std::vector<std::string> words) const {
+    words.insert(words.begin(), Binary("evac"));
+    return RunCommand(words);
+  }
+  void Pin(const std::string& run) const {
+    const CommandResult result = Evac({"gate", "pin", Path(run), "--out", Path("baseline.json")});
+    EXPECT_EQ(result.exit_code, 0) << result.err;
+  }
+  CommandResult Gate(const std::string& run, const std::vector<std::string>& options = {}) const {
+    std::vector<std::string> words = {"gate", Path("gate.yaml"), Path(run), "--baseline", Path("baseline.json")};
+    words.insert(words.end(), options.begin(), options.end());
+    return Evac(words);
+  }
+  std::string Path(const std::string& name) const { return (folder_ / name).string(); }
+
+  const TempFolder folder_;
+};
+
+TEST_F(GateCommand, APlantedRegressionFailsTheSamePassesAndFewAreInconclusive) {
+  WriteRun("worse", 60, 15);
+  const CommandResult worse = Gate("worse");
+  EXPECT_EQ(worse.exit_code, 1) << worse.err;
+  EXPECT_THAT(worse.out,
+              AllOf(HasSubstr("FAIL          bottle.sim: visual_pick@good 75 %"),
+                    HasSubstr("60 pairs, 0 better / 15 worse, p < 0.001 (exact McNemar)"),
+                    HasSubstr("take_bottle 41-0000"), HasSubstr("and 5 more"), HasSubstr("Gate nightly: fail.")));
+
+  WriteRun("same", 60, 0);
+  const CommandResult same = Gate("same");
+  EXPECT_EQ(same.exit_code, 0) << same.out << same.err;
+  EXPECT_THAT(same.out, HasSubstr("PASS          bottle.sim"));
+
+  WriteRun("small-main", 8, 0);
+  WriteRun("small", 8, 1);
+  Pin("small-main");
+  const CommandResult small = Gate("small");
+  EXPECT_EQ(small.exit_code, 3) << small.out << small.err;
+  EXPECT_THAT(small.out,
+              AllOf(HasSubstr("INCONCLUSIVE"), HasSubstr("more pairs to show"), HasSubstr("take_bottle 41-0000")));
+}
+
+TEST_F(GateCommand, OtherStatesAndAHandMadeBaselineAreRefused) {
+  WriteRun("fewer", 50, 0);
+  const CommandResult fewer = Gate("fewer");
+  EXPECT_EQ(fewer.exit_code, 2);
+  EXPECT_THAT(
+      fewer.err,
+      HasSubstr(
+          "initial states: found another list than the baseline's: none only here, 10 (such as take_bottle 41-0050"));
+
+  std::string pinned = ReadFile(folder_ / "baseline.json");
+  pinned.replace(pinned.find("\"success\""), 9, "\"failure\"");
+  WriteFileAtomically(folder_ / "baseline.json", pinned);
+  const CommandResult changed = Gate("fewer");
+  EXPECT_EQ(changed.exit_code, 2);
+  EXPECT_THAT(changed.err, HasSubstr("baseline.json: field sha256: found"));
+
+  WriteFileAtomically(folder_ / "gate.yaml", "gates: [{name: r, test: t}]");
+  EXPECT_THAT(Gate("fewer").err, HasSubstr("gate.yaml:1: field gates.0.test: found 't', wanted paired_mcnemar"));
+}
+
+TEST_F(GateCommand, TheSameDataGetTheStoredDecisionAndTheReportShowsIt) {
+  WriteRun("worse", 60, 15);
+  const CommandResult first = Gate("worse", {"--json", "--out", Path("files")});
+  EXPECT_EQ(Gate("worse", {"--json"}).out, first.out);
+  const auto records = Store::Open(folder_ / "worse", Store::Mode::kReadOnly).GateRecords();
+  ASSERT_EQ(records.size(), 1u) << "asked twice, decided once";
+  EXPECT_EQ(records[0].outcome, "fail");
+  EXPECT_THAT(ReadFile(folder_ / "files/junit.xml"), HasSubstr("failures=\"1\""));
+
+  EXPECT_EQ(Evac({"report", Path("worse")}).exit_code, 0);
+  const Json report = Json::parse(ReadFile(folder_ / "worse/report/report.json"));
+  EXPECT_EQ(report.at("gates").at(0).at("outcome"), "fail");
+  EXPECT_EQ(report.at("gates").at(0).at("current"), true);
+  EXPECT_THAT(ReadFile(folder_ / "worse/report/summary.md"), HasSubstr("## Gate nightly: fail"));
+  EXPECT_THAT(ReadFile(folder_ / "worse/report/badge.svg"), HasSubstr("#cf222e"));
+
+  Verdict other;  // new data: the decision is of older ones, and is taken anew
+  other.episode_id = Store::Open(folder_ / "worse", Store::Mode::kReadOnly).Episodes().at(0).key.Id();
+  other.judge = "oracle";
+  other.label = Label::kSuccess;
+  Store::Open(folder_ / "worse", Store::Mode::kReadWrite).AddVerdict(other);
+  EXPECT_EQ(Evac({"report", Path("worse")}).exit_code, 0);
+  EXPECT_THAT(ReadFile(folder_ / "worse/report/junit.xml"), HasSubstr("Of older data"));
+  EXPECT_THAT(Gate("worse").out, HasSubstr("0 better / 14 worse"));
+}
+
+TEST_F(GateCommand, SequentialBetsAreKeptInTheRunOnceForEachDataSet) {
+  WriteFileAtomically(folder_ / "gate.yaml", "gates: [{name: bet, test: savi, world: sim}]");
+  WriteRun("part", 9, 9);  // in progress: a part of the baseline's states
+  EXPECT_EQ(Gate("part").exit_code, 1);
+  EXPECT_EQ(Gate("part").exit_code, 1);
+  const auto looks = Store::Open(folder_ / "part", Store::Mode::kReadOnly).Looks();
+  ASSERT_EQ(looks.size(), 1u);
+  EXPECT_EQ(looks[0].only_second, 9);
+  EXPECT_GT(looks[0].e_value, 20);
+}
+
+TEST_F(GateCommand, WithoutARunItSaysHowManyEpisodesTheRulesTake) {
+  const CommandResult result = Evac({"gate", Path("gate.yaml"), "--baseline", Path("baseline.json")});
+  EXPECT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_THAT(result.out, HasSubstr("124 pairs if 20 % of the states flip"));
+  EXPECT_EQ(Evac({"gate"}).exit_code, 2);
+}
+
+TEST_F(GateCommand, GatesARealRun) {
+  const CommandResult run = RunCommand(RunWords(kSmall, folder_ / "run"));
+  ASSERT_EQ(run.exit_code, 0) << run.err;
+  Pin("run");
+  WriteFileAtomically(folder_ / "gate.yaml",
+                      "gates:\n"
+                      "  - {name: toast, test: paired_mcnemar, world: sim, policy: visual_pick@good}\n"
+                      "  - {name: errors, test: error_share, world: real, at_most: 0}\n");
+  const CommandResult itself = Gate("run");
+  EXPECT_EQ(itself.exit_code, 3) << "4 pairs show nothing" << itself.out << itself.err;
+  EXPECT_THAT(itself.out, AllOf(HasSubstr("4 pairs, 0 better / 0 worse"), HasSubstr("PASS          errors")));
+}
+
+}  // namespace
+}  // namespace evac::system_test
