@@ -3,16 +3,15 @@
 #include <memory>
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
-#include <optional>
-#include <thread>
 
 #include "apps/commands.h"
 #include "apps/interrupts.h"
+#include "apps/train_arguments.h"
+#include "apps/train_judge.h"
+#include "apps/train_policy.h"
 #include "apps/training_page.h"
-#include "apps/training_progress.h"
 #include "core/file.h"
 #include "core/hash.h"
-#include "worldmodel/evac_config.h"
 #include "worldmodel/nn/threads.h"
 #include "worldmodel/train/train_world.h"
 
@@ -21,51 +20,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-struct TrainArguments {
-  std::string shards, config, training, out, codec, init;
-  std::vector<std::string> settings, init_except;
-  std::optional<double> minutes;
-  std::optional<std::int64_t> steps;
-  int threads = 0;
-};
 using Arguments = std::shared_ptr<TrainArguments>;
-
-int Threads(const TrainArguments& arguments) {
-  return arguments.threads > 0 ? arguments.threads : std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
-}
-
-/// What the command line says beside the page.
-void Override(const TrainArguments& arguments, train::TrainerOptions& options) {
-  if (arguments.minutes) options.minutes = *arguments.minutes;
-  if (!arguments.steps) return;
-  options.steps = *arguments.steps;
-  options.minutes = 0;
-}
-
-train::JobPlace PlaceOf(const TrainArguments& arguments, TrainingProgress& progress) {
-  return {arguments.shards,
-          arguments.out,
-          ReadEvacConfig(arguments.config),
-          Threads(arguments),
-          IsInterrupted,
-          [&](const train::TrainerProgress& at) { progress.Show(at); },
-          [&](const std::string& sentence) { progress.Say(sentence); }};
-}
-
-/// Threads that share the parts of a step use one core each.
-int LibraryThreadsOf(const train::JobPlace& place, const train::JobOptions& options) {
-  return Workers(place, options) > 1 ? 1 : place.threads;
-}
-
-ExitCode End(const train::TrainerSummary& summary, const fs::path& out, const char* file) {
-  if (!summary.IsDone()) {
-    fmt::print(stderr, "interrupted at step {} of {}: the same command goes on from there\n", summary.step, summary.steps);
-    return ExitCode::kInternal;
-  }
-  const std::string best = summary.best ? fmt::format(", best hold-out {:.6g} at step {}", *summary.best, summary.best_step) : "";
-  fmt::print("{}: {} after {} steps{}\n", (out / file).string(), summary.why, summary.step, best);
-  return ExitCode::kOk;
-}
 
 ExitCode RunCodec(const TrainArguments& arguments) {
   train::CodecOptions options;
@@ -104,26 +59,15 @@ ExitCode RunWorld(const TrainArguments& arguments) {
   return End(TrainWorld(place, options, start, look), arguments.out, "weights.safetensors");
 }
 
-void AddShared(CLI::App& command, const Arguments& arguments) {
-  command.add_option("SHARDS", arguments->shards, "a folder of `evac pack` (docs/formats/shards.md)")
-      ->required()
-      ->check(CLI::ExistingDirectory);
+void AddConfig(CLI::App& command, const Arguments& arguments) {
   command.add_option("--config", arguments->config, "the page of the network's sizes")->required()->check(CLI::ExistingFile);
-  command.add_option("--training", arguments->training, "the page of training options; what is left out is the paper's")
-      ->check(CLI::ExistingFile);
-  command.add_option("--set", arguments->settings, "NAME=VALUE, one option of that page; may be given again");
-  command.add_option("--minutes", arguments->minutes, "as many steps as fit, counted once after the first")
-      ->check(CLI::Range(0.001, 1e6));
-  command.add_option("--steps", arguments->steps, "so many steps")->check(CLI::Range(std::int64_t{1}, std::int64_t{1} << 40));
-  command.add_option("--threads", arguments->threads, "default: one per core; the last digits of the sums depend on it")
-      ->check(CLI::Range(1, 1024));
-  command.add_option("-o,--out", arguments->out, "the folder to write; if it holds this training, it goes on")->required();
 }
 
 void AddCodec(CLI::App& group, ExitCode& exit_code) {
   const auto arguments = std::make_shared<TrainArguments>();
   CLI::App* command = group.add_subcommand("codec", "Train the latent codec on pictures and pose maps.");
   AddShared(*command, arguments);
+  AddConfig(*command, arguments);
   command->footer(
       "Example:\n"
       "  evac train codec out/shards --config apps/configs/desk_model.yaml --training apps/configs/desk_training.yaml \\\n"
@@ -136,6 +80,7 @@ void AddWorld(CLI::App& group, ExitCode& exit_code) {
   const auto arguments = std::make_shared<TrainArguments>();
   CLI::App* command = group.add_subcommand("world", "Train the world model on encoded shards.");
   AddShared(*command, arguments);
+  AddConfig(*command, arguments);
   command->add_option("--codec", arguments->codec, "the codec's weights, which encoded the shards")
       ->required()
       ->check(CLI::ExistingFile);
@@ -155,13 +100,64 @@ void AddWorld(CLI::App& group, ExitCode& exit_code) {
   command->callback([arguments, &exit_code] { exit_code = RunWorld(*arguments); });
 }
 
+ExitCode RunJudge(const TrainArguments& arguments) {
+  JudgeOptions options;
+  ReadTrainingPage(arguments.training, "judge", arguments.settings, SettingsOf(options));
+  Override(arguments, options.job.trainer);
+  const CatchInterrupts catch_interrupts;
+  TrainingProgress progress(stderr);
+  const train::JobPlace place = PlaceOf(arguments, progress);
+  const nn::LibraryThreads threads(1);
+  return End(TrainJudge(place, options), arguments.out, "judge.safetensors");
+}
+
+void AddJudgeTraining(CLI::App& group, ExitCode& exit_code) {
+  const auto arguments = std::make_shared<TrainArguments>();
+  CLI::App* command = group.add_subcommand("judge", "Train the classifier judge on clips with a known outcome.");
+  AddShared(*command, arguments);
+  command->footer(
+      "Example:\n"
+      "  evac train judge out/shards --training apps/configs/desk_training.yaml --out out/judge\n"
+      "OUT: judge.safetensors with its card (docs/classifier_judge.md), metrics.csv, holdout.csv");
+  command->callback([arguments, &exit_code] { exit_code = RunJudge(*arguments); });
+}
+
+ExitCode RunPolicy(const TrainArguments& arguments) {
+  PolicyOptions options;
+  ReadTrainingPage(arguments.training, "policy", arguments.settings, SettingsOf(options));
+  Override(arguments, options.job.trainer);
+  const CatchInterrupts catch_interrupts;
+  TrainingProgress progress(stderr);
+  const train::JobPlace place = PlaceOf(arguments, progress);
+  const nn::LibraryThreads threads(1);
+  return End(TrainPolicy(place, options, arguments.keep_steps), arguments.out, "policy.safetensors");
+}
+
+void AddPolicyTraining(CLI::App& group, ExitCode& exit_code) {
+  const auto arguments = std::make_shared<TrainArguments>();
+  CLI::App* command = group.add_subcommand("policy", "Train a policy to imitate recordings that succeeded.");
+  AddShared(*command, arguments);
+  command
+      ->add_option("--keep-steps", arguments->keep_steps,
+                   "steps after which a checkpoint is kept beside the last, with commas between them")
+      ->delimiter(',');
+  command->footer(
+      "Example:\n"
+      "  evac train policy out/shards --training apps/configs/desk_training.yaml --keep-steps 500,1000,2000 --out out/policy\n"
+      "OUT: policy.safetensors and policy_<step>.safetensors, each with its card (docs/learned_policy.md)\n"
+      "Then: evac-policy learned --checkpoint out/policy/policy.safetensors");
+  command->callback([arguments, &exit_code] { exit_code = RunPolicy(*arguments); });
+}
+
 }  // namespace
 
 void AddTrain(CLI::App& app, ExitCode& exit_code) {
-  CLI::App* group = app.add_subcommand("train", "Train the codec and the world model.");
+  CLI::App* group = app.add_subcommand("train", "Train the codec, the world model, the classifier judge, a policy.");
   group->require_subcommand(1);
   AddCodec(*group, exit_code);
   AddWorld(*group, exit_code);
+  AddJudgeTraining(*group, exit_code);
+  AddPolicyTraining(*group, exit_code);
 }
 
 }  // namespace evac

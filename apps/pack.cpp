@@ -242,10 +242,16 @@ void WriteIndex(const PackArguments& arguments, const Packing& packing) {
                       {"frames", frames},
                       {"sha256", Sha256HexOfFile(path)}});
   }
-  for (const PackSource& source : packing.sources) recordings.push_back(source.name);
-  const Json page = {{"format", "evac-shards"},  {"version", 1},
-                     {"recipe", packing.recipe}, {"tasks", packing.tasks},
-                     {"recordings", recordings}, {"shards", shards}};
+  Json states = Json::array(), behaviours = Json::array(), fates = Json::array();
+  for (const PackSource& source : packing.sources) {
+    recordings.push_back(source.name);
+    states.push_back(source.state);
+    behaviours.push_back(source.row ? source.row->behaviour : "");
+    fates.push_back(source.row ? source.row->fate : "");
+  }
+  const Json page = {{"format", "evac-shards"},    {"version", 1},        {"recipe", packing.recipe},
+                     {"tasks", packing.tasks},     {"recordings", recordings}, {"states", states},
+                     {"behaviours", behaviours},   {"fates", fates},      {"shards", shards}};
   WriteFileAtomically(arguments.out / "shards.json", page.dump(1) + "\n");
 }
 

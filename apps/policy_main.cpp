@@ -8,6 +8,7 @@
 #include "core/recording.h"
 #include "core/version.h"
 #include "policies/hold_policy.h"
+#include "policies/learned_policy.h"
 #include "policies/policy_server.h"
 #include "policies/replay_policy.h"
 #include "policies/visual_pick.h"
@@ -33,14 +34,18 @@ struct Command {
   std::shared_ptr<Common> common = std::make_shared<Common>();
 };
 
+void AddAddress(CLI::App& app, Common& common) {
+  app.add_option("--url", common.address.url, "where to listen")->envname("EVAC_LCM_URL")->capture_default_str();
+  app.add_option("--token", common.address.token, "word inside the channels' names")->envname("EVAC_TOKEN")->capture_default_str();
+}
+
 Command AddPolicy(CLI::App& app, const std::string& name, const std::string& description) {
   const Command command{app.add_subcommand(name, description)};
   Common& common = *command.common;
   command.app->add_option("--checkpoint", common.checkpoint, "name that tells apart two of this policy in a run")->capture_default_str();
   command.app->add_option("--chunk-size", common.chunk_size, "targets per chunk")->envname("EVAC_CHUNK_SIZE")->check(CLI::Range(1, 1000))->capture_default_str();
   command.app->add_option("--period-s", common.period_s, "seconds between two targets; 0: any")->check(CLI::Range(0.0, 60.0))->capture_default_str();
-  command.app->add_option("--url", common.address.url, "where to listen")->envname("EVAC_LCM_URL")->capture_default_str();
-  command.app->add_option("--token", common.address.token, "word inside the channels' names")->envname("EVAC_TOKEN")->capture_default_str();
+  AddAddress(*command.app, common);
   return command;
 }
 
@@ -99,6 +104,21 @@ void AddVisualPick(CLI::App& app, int& exit_code) {
   });
 }
 
+void AddLearned(CLI::App& app, int& exit_code) {
+  CLI::App* command = app.add_subcommand("learned", "Does what it learned by imitation (evac train policy).");
+  const auto weights = std::make_shared<std::string>();
+  const auto common = std::make_shared<Common>();
+  common->chunk_size = 8;
+  command->add_option("--checkpoint", *weights, "weights with their card, as `evac train policy` writes them")->required();
+  command->add_option("--chunk-size", common->chunk_size, "targets per chunk, of the 16 that it says at once")->envname("EVAC_CHUNK_SIZE")->capture_default_str();
+  AddAddress(*command, *common);
+  command->footer("Example:\n  evac-policy learned --checkpoint out/policy/policy.safetensors\nHow it is trained and how good it is: docs/learned_policy.md");
+  command->callback([&exit_code, common, weights] {
+    LearnedPolicy policy(*weights, common->chunk_size);
+    exit_code = ServePolicy(policy, policy.Spec(), common->address);
+  });
+}
+
 }  // namespace
 }  // namespace evac
 
@@ -112,6 +132,7 @@ int main(int argc, char** argv) {
     evac::AddHold(app, exit_code);
     evac::AddReplay(app, exit_code);
     evac::AddVisualPick(app, exit_code);
+    evac::AddLearned(app, exit_code);
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
     return app.exit(error) == 0 ? 0 : static_cast<int>(evac::ExitCode::kInvalidInput);

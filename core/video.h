@@ -59,6 +59,10 @@ class VideoReader {
 
   /// The next frame as CV_8UC3 RGB in a Mat of its own, or an empty Mat at the end.
   cv::Mat Next();
+  /// Decodes the next frame without making a picture of it, which costs more than decoding. False at the end.
+  bool Skip();
+  /// How many frames the file says it has; where it says nothing, 0. One that has fewer is an Error at its end.
+  int frames() const;
   /// Presentation time of the frame last returned, seconds.
   double time_s() const;
   int width_px() const;

@@ -49,7 +49,7 @@ av::Scaler NewToRgb(const AVFrame& frame) {
 struct VideoReader::Decoder {
   explicit Decoder(const std::filesystem::path& path);
 
-  cv::Mat Next();
+  bool Decode();
 
   void OpenFile();
   void OpenCodec();
@@ -66,7 +66,7 @@ struct VideoReader::Decoder {
   int stream_ = -1;
   av::Frame rgb_;                 ///< rows padded as swscale wants them; its size is the first frame's
   int format_ = AV_PIX_FMT_NONE;  ///< of the first frame; a video that changes it is broken
-  std::int64_t packets_ = 0;
+  std::int64_t packets_ = 0, frames_ = 0;
   double time_s_ = 0;
 };
 
@@ -132,14 +132,16 @@ bool VideoReader::Decoder::Feed() {
   return false;
 }
 
-cv::Mat VideoReader::Decoder::Next() {
+/// The next frame into frame_; false at the end.
+bool VideoReader::Decoder::Decode() {
   for (;;) {
     const int received = avcodec_receive_frame(codec_.get(), frame_.get());
-    if (received == AVERROR_EOF && format_ == AV_PIX_FMT_NONE) throw InvalidInput("{}: has no frames", name_);
-    if (received == AVERROR_EOF) return {};
+    if (received == AVERROR_EOF && frames_ == 0) throw InvalidInput("{}: has no frames", name_);
+    if (received == AVERROR_EOF) return false;
     if (received != AVERROR(EAGAIN)) {
       Demand(received, "a frame is damaged");
-      return Rgb();
+      ++frames_;
+      return true;
     }
     Feed();
   }
@@ -168,7 +170,11 @@ cv::Mat VideoReader::Decoder::Rgb() {
 VideoReader::VideoReader(const std::filesystem::path& path) : decoder_(std::make_unique<Decoder>(path)) {}
 VideoReader::~VideoReader() = default;
 
-cv::Mat VideoReader::Next() { return decoder_->Next(); }
+cv::Mat VideoReader::Next() { return decoder_->Decode() ? decoder_->Rgb() : cv::Mat(); }
+bool VideoReader::Skip() { return decoder_->Decode(); }
+int VideoReader::frames() const {
+  return avformat_index_get_entries_count(decoder_->input_->streams[decoder_->stream_]);
+}
 double VideoReader::time_s() const { return decoder_->time_s_; }
 int VideoReader::width_px() const { return decoder_->rgb_ ? decoder_->rgb_->width : decoder_->codec_->width; }
 int VideoReader::height_px() const { return decoder_->rgb_ ? decoder_->rgb_->height : decoder_->codec_->height; }

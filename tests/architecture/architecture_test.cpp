@@ -113,6 +113,8 @@ TEST(Libraries, EachIsRefusedAwayFromItsHome) {
   EXPECT_THAT(MisplacedLibraries({"core/store_schema.cpp", "#include <sqlite3.h>\n"}), IsEmpty());
   EXPECT_THAT(MisplacedLibraries({"worldmodel/evac_world.cpp", "#include <torch/torch.h>\n"}), SizeIs(1));
   EXPECT_THAT(MisplacedLibraries({"worldmodel/nn/unet.cpp", "#include <torch/torch.h>\n"}), IsEmpty());
+  EXPECT_THAT(MisplacedLibraries({"judges/classifier_net.cpp", "#include <ATen/core/Tensor.h>\n"}), IsEmpty());
+  EXPECT_THAT(MisplacedLibraries({"judges/oracle_judge.cpp", "#include <ATen/core/Tensor.h>\n"}), SizeIs(1));
 }
 
 TEST(Sizes, AFileOf501LinesIsTooLong) {

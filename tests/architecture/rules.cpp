@@ -60,8 +60,8 @@ const std::array<Library, 3>& Libraries() {
       {std::regex("^libav|^libsw(scale|resample)/"), std::regex("^core/video[^/]*$"),
        "libav belongs in core/video.* alone"},
       {std::regex("^sqlite3"), std::regex("^core/store[^/]*$"), "SQLite belongs in core/store* alone"},
-      {std::regex("^(torch|ATen|c10)/"), std::regex("^worldmodel/(nn|train)/"),
-       "torch belongs in worldmodel/nn and worldmodel/train alone"},
+      {std::regex("^(torch|ATen|c10)/"), std::regex("^worldmodel/(nn|train)/|^judges/classifier_[^/]*$|^policies/learned_[^/]*$"),
+       "torch belongs in worldmodel/nn, worldmodel/train, judges/classifier_* and policies/learned_* alone"},
   }};
   return libraries;
 }

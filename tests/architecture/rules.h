@@ -21,8 +21,8 @@ using Violations = std::vector<std::string>;
 /// A file includes its own module and core; apps and tests are free. Inside worldmodel: train → nn, worldmodel → nn,
 /// sim → sim.
 Violations BrokenIncludeArrows(const SourceFile& file);
-/// libav in core/video alone, SQLite in core/store alone, torch in worldmodel/nn and worldmodel/train alone. Tests are
-/// free.
+/// libav in core/video alone, SQLite in core/store alone, torch in worldmodel/nn, worldmodel/train, judges/classifier_*
+/// and policies/learned_* alone (docs/decisions/0041-small-networks.md). Tests are free.
 Violations MisplacedLibraries(const SourceFile& file);
 /// At most 500 lines a file and 60 a function. For .h and .cpp.
 Violations TooLong(const SourceFile& file);

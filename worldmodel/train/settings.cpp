@@ -7,26 +7,10 @@ namespace evac::train {
 namespace {
 
 void AddJob(Settings& settings, JobOptions& job) {
-  TrainerOptions& t = job.trainer;
-  const Settings shared = {{"steps", &t.steps},
-                           {"minutes", &t.minutes},
-                           {"learning_rate", &t.learning_rate},
-                           {"warmup_steps", &t.warmup_steps},
-                           {"decay_from", &t.decay_from},
-                           {"beta1", &t.adamw.beta1},
-                           {"beta2", &t.adamw.beta2},
-                           {"epsilon", &t.adamw.epsilon},
-                           {"weight_decay", &t.adamw.weight_decay},
-                           {"clip_norm", &t.clip_norm},
-                           {"average_decay", &t.average_decay},
-                           {"accumulate", &t.accumulate},
-                           {"holdout_every", &t.holdout_every},
-                           {"patience", &t.patience},
-                           {"checkpoint_every_s", &t.checkpoint_every_s},
-                           {"seed", &t.seed},
-                           {"bf16", &job.bf16},
-                           {"holdout_size", &job.holdout_size}};
+  const Settings shared = SettingsOf(job.trainer);
   settings.insert(settings.end(), shared.begin(), shared.end());
+  settings.push_back({"bf16", &job.bf16});
+  settings.push_back({"holdout_size", &job.holdout_size});
 }
 
 /// What may change from one process of a training to the next, and what the trainer compares itself.
@@ -53,6 +37,25 @@ std::string Text(const Setting& setting) {
 }
 
 }  // namespace
+
+Settings SettingsOf(TrainerOptions& t) {
+  return {{"steps", &t.steps},
+          {"minutes", &t.minutes},
+          {"learning_rate", &t.learning_rate},
+          {"warmup_steps", &t.warmup_steps},
+          {"decay_from", &t.decay_from},
+          {"beta1", &t.adamw.beta1},
+          {"beta2", &t.adamw.beta2},
+          {"epsilon", &t.adamw.epsilon},
+          {"weight_decay", &t.adamw.weight_decay},
+          {"clip_norm", &t.clip_norm},
+          {"average_decay", &t.average_decay},
+          {"accumulate", &t.accumulate},
+          {"holdout_every", &t.holdout_every},
+          {"patience", &t.patience},
+          {"checkpoint_every_s", &t.checkpoint_every_s},
+          {"seed", &t.seed}};
+}
 
 Settings SettingsOf(CodecOptions& options) {
   CodecTrainingOptions& c = options.codec;

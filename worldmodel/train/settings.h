@@ -19,7 +19,7 @@ struct Setting {
 };
 using Settings = std::vector<Setting>;
 
-/// What the two trainings share beside the trainer.
+/// What the trainings of codec and world share beside the trainer.
 struct JobOptions {
   TrainerOptions trainer;
   bool bf16 = false;               ///< products of matrices and convolutions; weights and sums stay floats
@@ -42,6 +42,8 @@ struct WorldOptions {
   void Resolve();
 };
 
+/// What every training has.
+Settings SettingsOf(TrainerOptions& options);
 Settings SettingsOf(CodecOptions& options);
 Settings SettingsOf(WorldOptions& options);
 

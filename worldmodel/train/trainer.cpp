@@ -219,6 +219,8 @@ TrainerSummary Trainer::Run(const TrainerCallbacks& callbacks) {
     const bool last = planned_ && step_ >= steps_;
     if (callbacks.holdout && options_.holdout_every > 0 && (step_ % options_.holdout_every == 0 || last))
       HoldOut(callbacks);
+    if (std::count(callbacks.keep_steps.begin(), callbacks.keep_steps.end(), step_) > 0)
+      With(Averaged(), [&] { callbacks.keep(step_); });
     Report(callbacks);
     why = WhyEnd(callbacks);
     if (!why.empty() || SecondsSince(saved_) >= options_.checkpoint_every_s) {

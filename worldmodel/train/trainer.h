@@ -54,6 +54,10 @@ struct TrainerCallbacks {
   std::function<double()> holdout = {};
   /// Called after each hold-out, with the averaged weights in place: for pictures.
   std::function<void(std::int64_t step)> look = {};
+  /// After each of these steps `keep` is called, with the averaged weights in place: checkpoints of one training. Killed
+  /// before its own checkpoint, a training calls it again, with the same weights.
+  std::vector<std::int64_t> keep_steps = {};
+  std::function<void(std::int64_t step)> keep = {};
   std::function<bool()> interrupted = {};  ///< asked after every step; the checkpoint is written then
   std::function<void(const TrainerProgress&)> on_progress = {};
 };
