@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <functional>
+#include <limits>
 #include <span>
 
 #include "core/error.h"
@@ -29,55 +30,90 @@ void Check(const std::vector<TaskOutcomes>& tasks, const BootstrapOptions& optio
   }
 }
 
+/// How many rows of bytes are summed in 16 bits before they could overflow.
+constexpr std::size_t kBlock = 256;
+
 /// One task's counts with all of a state's side by side, so that a state that is drawn is added in one go:
-/// [states][points][real successes, real trials, sim successes, sim trials].
+/// [states][points][real successes, real trials, sim successes, sim trials]. Memory decides how fast this is: a Cell is
+/// 16 bits where every count fits a byte, else 64.
+template <typename Cell>
 class StateRows {
  public:
   explicit StateRows(const TaskOutcomes& task) : columns_(4 * task.points.size()), states_(StatesOf(task)) {
+    cells_.reserve(columns_ * states_);
     for (std::size_t state = 0; state < states_; ++state) {
       for (const PointOutcomes& point : task.points) {
         const Count &real = point.real[state], &sim = point.sim[state];
-        cells_.insert(cells_.end(), {real.successes, real.trials, sim.successes, sim.trials});
+        for (const std::int64_t count : {real.successes, real.trials, sim.successes, sim.trials})
+          cells_.push_back(static_cast<Cell>(count));
       }
     }
   }
   std::size_t states() const { return states_; }
   std::size_t columns() const { return columns_; }
 
-  void AddTo(std::span<std::int64_t> totals, std::size_t state) const {
-    const std::int64_t* row = cells_.data() + state * columns_;
-    for (std::size_t i = 0; i < columns_; ++i) totals[i] += row[i];
+  /// totals += sign * the state's row.
+  void Add(std::size_t state, std::int64_t sign, std::span<std::int64_t> totals) const {
+    const Cell* row = cells_.data() + state * columns_;
+    for (std::size_t i = 0; i < columns_; ++i) totals[i] += sign * static_cast<std::int64_t>(row[i]);
   }
-  void TakeFrom(std::span<std::int64_t> totals, std::size_t state) const {
-    const std::int64_t* row = cells_.data() + state * columns_;
-    for (std::size_t i = 0; i < columns_; ++i) totals[i] -= row[i];
+  /// The same for many, each as often as it is listed.
+  void AddAll(std::span<const std::size_t> states, std::span<std::int64_t> totals) const {
+    std::vector<Cell> sums(columns_);
+    for (; !states.empty(); states = states.subspan(std::min(kBlock, states.size()))) {
+      std::ranges::fill(sums, Cell{0});
+      for (const std::size_t state : states.first(std::min(kBlock, states.size()))) {
+        const Cell* row = cells_.data() + state * columns_;
+        Cell* sum = sums.data();
+        for (std::size_t i = 0; i < columns_; ++i) sum[i] = static_cast<Cell>(sum[i] + row[i]);
+      }
+      for (std::size_t i = 0; i < columns_; ++i) totals[i] += static_cast<std::int64_t>(sums[i]);
+    }
   }
 
  private:
   std::size_t columns_, states_;
-  std::vector<std::int64_t> cells_;
+  std::vector<Cell> cells_;
 };
+
+bool FitsAByte(const std::vector<TaskOutcomes>& tasks) {
+  constexpr std::int64_t kMost = std::numeric_limits<std::uint8_t>::max();
+  const auto fits = [](const Count& count) { return count.successes <= kMost && count.trials <= kMost; };
+  for (const TaskOutcomes& task : tasks) {
+    for (const PointOutcomes& point : task.points) {
+      if (!std::ranges::all_of(point.real, fits) || !std::ranges::all_of(point.sim, fits)) return false;
+    }
+  }
+  return true;
+}
 
 /// Sums over the states taken: [tasks][points][4].
 using Totals = std::vector<std::vector<std::int64_t>>;
 
-std::vector<StateRows> RowsOf(const std::vector<TaskOutcomes>& tasks) { return {tasks.begin(), tasks.end()}; }
+template <typename Cell>
+std::vector<StateRows<Cell>> RowsOf(const std::vector<TaskOutcomes>& tasks) {
+  return {tasks.begin(), tasks.end()};
+}
 
-Totals EachOnce(const std::vector<StateRows>& tasks) {
+template <typename Cell>
+Totals EachOnce(const std::vector<StateRows<Cell>>& tasks) {
   Totals totals;
-  for (const StateRows& task : tasks) {
+  for (const StateRows<Cell>& task : tasks) {
     std::vector<std::int64_t>& sums = totals.emplace_back(task.columns(), 0);
-    for (std::size_t state = 0; state < task.states(); ++state) task.AddTo(sums, state);
+    for (std::size_t state = 0; state < task.states(); ++state) task.Add(state, 1, sums);
   }
   return totals;
 }
 
 /// As many draws per task as it has states.
-Totals Draw(const std::vector<StateRows>& tasks, SplitMix64& random) {
+template <typename Cell>
+Totals Draw(const std::vector<StateRows<Cell>>& tasks, SplitMix64& random) {
   Totals totals;
-  for (const StateRows& task : tasks) {
-    std::vector<std::int64_t>& sums = totals.emplace_back(task.columns(), 0);
-    for (std::size_t draw = 0; draw < task.states(); ++draw) task.AddTo(sums, random.Below(task.states()));
+  std::vector<std::size_t> drawn;
+  for (const StateRows<Cell>& task : tasks) {
+    drawn.resize(task.states());
+    for (std::size_t& state : drawn) state = random.Below(task.states());
+    task.AddAll(drawn, totals.emplace_back(task.columns(), 0));
   }
   return totals;
 }
@@ -102,8 +138,9 @@ struct ResampledRates {
   std::int64_t incomplete = 0;  ///< replicates that lost a point
 };
 
+template <typename Cell>
 ResampledRates Resample(const std::vector<TaskOutcomes>& outcomes, const BootstrapOptions& options) {
-  const std::vector<StateRows> tasks = RowsOf(outcomes);
+  const std::vector<StateRows<Cell>> tasks = RowsOf<Cell>(outcomes);
   ResampledRates result;
   Totals totals = EachOnce(tasks);
   result.all = RatesOfTotals(totals);
@@ -118,9 +155,9 @@ ResampledRates Resample(const std::vector<TaskOutcomes>& outcomes, const Bootstr
   }
   for (std::size_t task = 0; task < tasks.size(); ++task) {
     for (std::size_t state = 0; state < tasks[task].states(); ++state) {
-      tasks[task].TakeFrom(totals[task], state);
+      tasks[task].Add(state, -1, totals[task]);
       RatePairs rates = RatesOfTotals(totals);
-      tasks[task].AddTo(totals[task], state);
+      tasks[task].Add(state, 1, totals[task]);
       if (rates.real.size() == result.all.real.size()) result.jackknife.push_back(std::move(rates));
     }
   }
@@ -147,12 +184,15 @@ Defined<BootstrapOf> Bootstrap(const ResampledRates& rates, const Statistic& sta
 
 }  // namespace
 
-RatePairs RatesOf(const std::vector<TaskOutcomes>& tasks) { return RatesOfTotals(EachOnce(RowsOf(tasks))); }
+RatePairs RatesOf(const std::vector<TaskOutcomes>& tasks) {
+  return RatesOfTotals(EachOnce(RowsOf<std::int64_t>(tasks)));
+}
 
 PairedBootstrap PairedStateBootstrap(const std::vector<TaskOutcomes>& tasks, const MmrvConvention& convention,
                                      const BootstrapOptions& options) {
   Check(tasks, options);
-  const ResampledRates rates = Resample(tasks, options);
+  const ResampledRates rates =
+      FitsAByte(tasks) ? Resample<std::uint16_t>(tasks, options) : Resample<std::int64_t>(tasks, options);
   const auto bootstrap = [&](const Statistic& statistic) { return Bootstrap(rates, statistic, options.confidence); };
   PairedBootstrap result;
   result.method = fmt::format("paired state bootstrap, percentile, B={}, seed {}", options.replicates, options.seed);

@@ -81,6 +81,19 @@ TEST(PairedStateBootstrap, IsTheSameForTheSameSeedAndStaysInRange) {
   EXPECT_EQ(one.method, "paired state bootstrap, percentile, B=300, seed 5");
 }
 
+/// Few trials per state are summed in narrow numbers, many in wide ones.
+TEST(PairedStateBootstrap, AThousandTimesAsManyTrialsGiveTheSameReplicates) {
+  TaskOutcomes narrow = RandomTask(8, 4, 600), wide = narrow;  // more states than one block of sums
+  for (PointOutcomes& point : wide.points) {
+    for (std::vector<Count>* world : {&point.real, &point.sim}) {
+      for (Count& count : *world) count = {1000 * count.successes, 1000 * count.trials};
+    }
+  }
+  const PairedBootstrap one = PairedStateBootstrap({narrow}, {}, kFew), thousand = PairedStateBootstrap({wide}, {}, kFew);
+  EXPECT_EQ(one.pearson->resampled.replicates, thousand.pearson->resampled.replicates);
+  EXPECT_EQ(one.pearson->resampled.jackknife, thousand.pearson->resampled.jackknife);
+}
+
 TEST(PairedStateBootstrap, TwoWorldsThatNeverDisagreeCorrelatePerfectlyInEveryReplicate) {
   TaskOutcomes task = RandomTask(3, 5, 20);
   for (PointOutcomes& point : task.points) point.sim = point.real;
