@@ -1,0 +1,20 @@
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+
+namespace evac {
+
+/// A packing that is small enough to learn from in a test. A bright square, the object, either goes from left to right
+/// while the arm takes it there (success), or stays on the left while the arm does the same (failure). Two views, one
+/// task. Nothing but the square tells the two apart.
+struct LearningShards {
+  std::int64_t clips = 24;  ///< of each split, every second a success; two to an initial state
+  std::int64_t frames = 20;
+  std::int64_t height_px = 16, width_px = 24;
+};
+
+/// Writes a training and a hold-out shard and shards.json, as docs/formats/shards.md says.
+void WriteLearningShards(const std::filesystem::path& folder, const LearningShards& options);
+
+}  // namespace evac

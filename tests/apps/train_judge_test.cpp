@@ -1,0 +1,106 @@
+#include "apps/train_judge.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <fstream>
+
+#include "apps/judge_quality.h"
+#include "core/error.h"
+#include "core/file.h"
+#include "core/hash.h"
+#include "core/weight_file.h"
+#include "tests/apps/learning_shards.h"
+#include "tests/support/temp_folder.h"
+
+namespace evac {
+namespace {
+
+using testing::HasSubstr;
+using testing::ThrowsMessage;
+
+JudgeOptions Quick(std::int64_t steps) {
+  JudgeOptions options;
+  options.batch = 8;
+  options.calibration = 0.3;
+  options.job.trainer.steps = steps;
+  options.job.trainer.learning_rate = 2e-3;
+  options.job.trainer.clip_norm = 1;
+  options.job.trainer.holdout_every = steps / 2;
+  options.job.trainer.checkpoint_every_s = 0;
+  options.job.trainer.seed = 3;
+  return options;
+}
+
+class TrainJudgeTest : public testing::Test {
+ protected:
+  void SetUp() override { WriteLearningShards(folder_ / "shards", {}); }
+  train::JobPlace Place(const std::string& out) const {
+    train::JobPlace place;
+    place.shards = folder_ / "shards";
+    place.out = folder_ / out;
+    return place;
+  }
+  const TempFolder folder_;
+};
+
+TEST_F(TrainJudgeTest, ATinyClassifierTellsClipsApartThatItHasNotSeen) {
+  TrainJudge(Place("judge"), Quick(150));
+  const WeightFile file(folder_ / "judge" / "judge.safetensors", "evac-classifier 1");
+  EXPECT_GT(file.Number("auroc"), 0.95);
+  EXPECT_GT(file.Number("kappa"), 0.8);
+  EXPECT_LE(file.Number("kappa_masked"), file.Number("kappa"));
+  EXPECT_EQ(file.Text("tasks"), "carry");
+  EXPECT_EQ(file.Text("recipe"), "carry");
+  EXPECT_NO_THROW(ClassifierJudge(folder_ / "judge" / "judge.safetensors", folder_.path()));
+}
+
+TEST_F(TrainJudgeTest, InterruptedAndGoneOnWithItEndsInTheSameBytes) {
+  TrainJudge(Place("whole"), Quick(12));
+  train::JobPlace place = Place("parts");
+  int steps = 0;
+  place.interrupted = [&] { return ++steps % 5 == 0; };
+  int runs = 0;
+  while (!TrainJudge(place, Quick(12)).IsDone()) ++runs;
+  EXPECT_EQ(runs, 2);
+  EXPECT_EQ(Sha256HexOfFile(folder_ / "parts" / "judge.safetensors"),
+            Sha256HexOfFile(folder_ / "whole" / "judge.safetensors"));
+}
+
+TEST_F(TrainJudgeTest, CalibrationSharesNoInitialStateWithLearning) {
+  const PackedSet set(folder_ / "shards", train::Split::kTrain);
+  const JudgeSplit split = SplitForJudge(set, Quick(2));
+  EXPECT_EQ(split.fit.size() + split.calibration.size(), set.clips.size());
+  for (const PackedClip& one : split.fit) {
+    for (const PackedClip& other : split.calibration) EXPECT_NE(one.state, other.state);
+  }
+}
+
+TEST_F(TrainJudgeTest, OutcomesOfOneKindAloneAreRefused) {
+  PackedSet set(folder_ / "shards", train::Split::kTrain);
+  for (PackedClip& clip : set.clips) clip.outcome = 1;
+  EXPECT_THAT([&] { SplitForJudge(set, Quick(2)); }, ThrowsMessage<Error>(HasSubstr("wanted some of both kinds")));
+}
+
+TEST_F(TrainJudgeTest, APackingThatSaysNothingOfStatesIsRefused) {
+  std::ofstream(folder_ / "shards" / "shards.json") << "{}";
+  EXPECT_THAT([&] { TrainJudge(Place("judge"), Quick(2)); },
+              ThrowsMessage<Error>(HasSubstr("wanted states, behaviours and fates per recording")));
+}
+
+TEST(Calibrate, FindsTheTemperatureThatMadeTheLogitsTooSure) {
+  JudgeClips clips;
+  std::vector<double> logits;
+  for (int i = 0; i < 400; ++i) {
+    const double honest = (i % 40 - 19.5) / 8;  // log odds
+    clips.emplace_back().outcome = (i / 40 + 0.5) / 10 < 1 / (1 + std::exp(-honest)) ? 1 : 0;
+    logits.push_back(3 * honest);
+  }
+  const ClassifierCard card = Calibrate(logits, clips, 0.1);
+  EXPECT_NEAR(card.temperature, 3, 0.4);
+  EXPECT_NEAR(card.threshold, 0.5, 0.1);
+  EXPECT_LT(Measure(logits, clips, card).ece, 0.06);
+}
+
+}  // namespace
+}  // namespace evac
