@@ -170,7 +170,7 @@ void RunJudges(const Suite& suite, Store& store) {
   for (const std::string& name : suite.judges) {
     if (name != "oracle") throw InvalidInput("{}: field judges: found '{}', wanted oracle", suite.path.string(), name);
     OracleJudge oracle(store);
-    JudgeEpisodes(oracle, store, {});
+    JudgeEpisodes(oracle, store, {.interrupted = IsInterrupted});
   }
 }
 
@@ -201,6 +201,7 @@ ExitCode Evaluate(const Suite& suite, Store& store, const EvaluateOptions& optio
   Declare(suite, store);
   std::string why_ended = RunWorlds(suite, options.shard, store);
   if (!IsInterrupted()) RunJudges(suite, store);
+  if (why_ended.empty() && IsInterrupted()) why_ended = "interrupted";
   const Plan now = MakePlan(suite, options.shard, store);
   Tell("{} of {} episodes stored in {}, {} failed\n", now.total - now.missing, now.total, store.folder().string(), now.failed);
   if (why_ended.empty() && now.failed > now.allowed) {

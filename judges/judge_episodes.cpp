@@ -1,14 +1,23 @@
 #include "judges/judge_episodes.h"
 
+#include <string_view>
+
 #include "core/error.h"
 
 namespace evac {
 namespace {
 
-Verdict RateSafely(Judge& judge, const Task& task, const Episode& episode) {
+/// @returns nothing if the judge will not be asked about this episode, or about any more: the summary says so.
+std::optional<Verdict> RateSafely(Judge& judge, const Task& task, const Episode& episode, JudgeSummary& summary) {
   Verdict invalid;
   try {
     return judge.Rate(task, episode);
+  } catch (const Error& error) {
+    const std::string_view kind = error.kind();
+    if (kind == "not_judged") ++summary.left_out;
+    if (kind == "judge_over") summary.why_over = error.what();
+    if (kind == "not_judged" || kind == "judge_over") return std::nullopt;
+    invalid.reason = error.what();
   } catch (const std::exception& error) {
     invalid.reason = error.what();
   }
@@ -33,17 +42,21 @@ JudgeSummary JudgeEpisodes(Judge& judge, Store& store, const JudgeOptions& optio
   const auto current = store.CurrentVerdicts();
   JudgeSummary summary;
   for (Episode& episode : store.Episodes()) {
+    if (summary.why_over.empty() && options.interrupted()) summary.why_over = "interrupted";
+    if (!summary.why_over.empty()) break;
+    if (!options.wanted(episode)) continue;
     if (IsFailure(episode.stop)) {
       ++summary.failed;
     } else if (!options.again && HasVerdict(current, episode.key.Id(), judge.Name())) {
       ++summary.already;
     } else {
       store.LoadSteps(episode);
-      const Verdict verdict = RateSafely(judge, tasks.at(episode.key.pair.task), episode);
-      store.AddVerdict(verdict);
-      options.on_verdict(verdict);
+      const auto verdict = RateSafely(judge, tasks.at(episode.key.pair.task), episode, summary);
+      if (!verdict) continue;
+      store.AddVerdict(*verdict);
+      options.on_verdict(*verdict);
       ++summary.rated;
-      ++summary.labels[verdict.label];
+      ++summary.labels[verdict->label];
     }
   }
   return summary;

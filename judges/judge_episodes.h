@@ -10,6 +10,10 @@ namespace evac {
 
 struct JudgeOptions {
   bool again = false;  ///< rate also the episodes that have a verdict by this judge
+  std::function<bool(const Episode&)> wanted = [](const Episode&) { return true; };  ///< others are left alone
+  std::function<bool()> interrupted = [] {
+    return false;
+  };  ///< asked before each episode: the rest is left for another time
   std::function<void(const Verdict&)> on_verdict = [](const Verdict&) {};  ///< after each one stored, for progress
 };
 
@@ -17,12 +21,15 @@ struct JudgeSummary {
   int rated = 0;
   int already = 0;              ///< had a current verdict by this judge
   int failed = 0;               ///< failed episodes: errors, which nobody judges
+  int left_out = 0;             ///< the judge had nothing to judge by (an Error called not_judged)
   std::map<Label, int> labels;  ///< of those rated
+  std::string why_over;         ///< why the rest was not judged (interrupted, or an Error called judge_over), or empty
 };
 
 /// Rates every episode of a store that did not fail and has no verdict by this judge yet, one at a time; each verdict
 /// is stored before the next is asked for, so that an interruption loses one at most. A judge that throws gives a
-/// verdict `invalid` with the message, never a failure.
+/// verdict `invalid` with the message, never a failure; but after an Error called `not_judged` or `judge_over`
+/// (Error::Called) nothing is stored of that episode, and after the second the rest is left for another time.
 /// @throws Error if the store cannot be read or written.
 JudgeSummary JudgeEpisodes(Judge& judge, Store& store, const JudgeOptions& options);
 

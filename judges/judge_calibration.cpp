@@ -1,0 +1,209 @@
+#include "judges/judge_calibration.h"
+
+#include <fmt/format.h>
+
+#include <cmath>
+#include <set>
+
+#include "core/statistics/rates.h"
+
+namespace evac {
+namespace {
+
+using Verdicts = std::map<std::string, Verdict>;  // of one episode, by judge
+
+bool IsDecided(Label label) { return label == Label::kSuccess || label == Label::kFailure; }
+
+void Add(const JudgedItem& item, Confusion& confusion) {
+  const bool judge = item.judge == Label::kSuccess, truth = item.truth == Label::kSuccess;
+  ++(judge ? (truth ? confusion.both_success : confusion.only_judge_success)
+           : (truth ? confusion.only_human_success : confusion.both_failure));
+}
+
+JudgeQualityRow RowOf(const std::vector<JudgedItem>& items, const std::string& kind, const std::string& name,
+                      std::string JudgedItem::*field) {
+  return QualityOn(items, kind + " " + name, [&](const JudgedItem& item) { return item.*field == name; });
+}
+
+std::vector<JudgeQualityRow> RowsBy(const std::vector<JudgedItem>& items, const std::string& kind,
+                                    std::string JudgedItem::*field) {
+  std::set<std::string> names;
+  for (const JudgedItem& item : items) names.insert(item.*field);
+  std::vector<JudgeQualityRow> rows;
+  for (const std::string& name : names) rows.push_back(RowOf(items, kind, name, field));
+  return rows;
+}
+
+/// What is missing before a judge can be accepted or refused on each task.
+std::vector<std::string> Missing(const std::vector<JudgedItem>& items, const JudgeAcceptance& wanted) {
+  std::vector<std::string> missing;
+  if (items.empty()) missing.push_back("no episode has a verdict of both");
+  for (const JudgeQualityRow& row : RowsBy(items, "task", &JudgedItem::task)) {
+    const std::int64_t successes = row.confusion.both_success + row.confusion.only_human_success;
+    const std::int64_t failures = row.confusion.total() - successes;
+    if (row.confusion.total() < wanted.min_items_per_task || std::min(successes, failures) < wanted.min_per_class)
+      missing.push_back(fmt::format("{}: {} successes and {} failures, wanted {} items with {} of each", row.group,
+                                    successes, failures, wanted.min_items_per_task, wanted.min_per_class));
+  }
+  return missing;
+}
+
+void RefuseUnless(bool holds, const std::string& sentence, std::vector<std::string>& refusals) {
+  if (!holds) refusals.push_back(sentence);
+}
+
+double DifferenceOf(const Number& a, const Number& b) { return a && b ? std::abs(*a - *b) : 0; }
+
+std::vector<std::string> Refusals(const std::vector<JudgedItem>& items, const JudgeAcceptance& wanted) {
+  std::vector<std::string> refusals;
+  const auto everything = QualityOn(items, "all", [](const JudgedItem&) { return true; });
+  const auto real = QualityOn(items, "real clips", [](const JudgedItem& item) { return item.is_real; });
+  const auto other = QualityOn(items, "other clips", [](const JudgedItem& item) { return !item.is_real; });
+  const Estimate& kappa = everything.statistics.kappa;
+  RefuseUnless(kappa.value && *kappa.value >= wanted.min_kappa,
+               fmt::format("kappa is {}, wanted at least {}",
+                           kappa.value ? fmt::format("{:.2f}", *kappa.value) : kappa.value.reason(), wanted.min_kappa),
+               refusals);
+  if (kappa.value && kappa.interval)
+    RefuseUnless(kappa.interval->low >= wanted.min_kappa_low,
+                 fmt::format("kappa may be as low as {:.2f}, wanted {}", kappa.interval->low, wanted.min_kappa_low),
+                 refusals);
+  for (const JudgeQualityRow* row : {&real, &other}) {
+    const Number& bias = row->statistics.bias;
+    if (bias)
+      RefuseUnless(std::abs(*bias) <= wanted.max_bias,
+                   fmt::format("on {} its success rate is {:+.1f} points off, wanted within {}", row->group,
+                               100 * *bias, 100 * wanted.max_bias),
+                   refusals);
+  }
+  for (const auto& [name, number] : {std::pair("sensitivity", &ConfusionStatistics::sensitivity),
+                                     std::pair("specificity", &ConfusionStatistics::specificity)}) {
+    const double difference = DifferenceOf(real.statistics.*number, other.statistics.*number);
+    RefuseUnless(difference <= wanted.max_domain_difference,
+                 fmt::format("its {} differs by {:.1f} points between real and other clips, wanted at most {}", name,
+                             100 * difference, 100 * wanted.max_domain_difference),
+                 refusals);
+  }
+  const double asked = static_cast<double>(everything.errors + everything.cannot_tell + everything.confusion.total());
+  RefuseUnless(static_cast<double>(everything.errors) <= wanted.max_errors * asked,
+               fmt::format("{} of {} verdicts are errors, wanted at most {} %", everything.errors, asked,
+                           100 * wanted.max_errors),
+               refusals);
+  return refusals;
+}
+
+/// A probe says the same where its label is the judge's; where either decided nothing, it is not counted.
+std::map<std::string, Count> Consistency(const std::map<std::string, Verdicts>& current, const std::string& judge) {
+  std::map<std::string, Count> counts;
+  for (const auto& [episode, verdicts] : current) {
+    const auto own = verdicts.find(judge);
+    if (own == verdicts.end() || !IsDecided(own->second.label)) continue;
+    for (const char* probe : {"flip", "retest"}) {
+      const auto other = verdicts.find(judge + ":" + probe);
+      if (other == verdicts.end() || !IsDecided(other->second.label)) continue;
+      ++counts[probe].trials;
+      counts[probe].successes += other->second.label == own->second.label;
+    }
+  }
+  return counts;
+}
+
+std::string Share(const Number& number) { return number ? fmt::format("{:.3f}", *number) : "-"; }
+
+/// One line of the table; every column has its width.
+std::string Line(const std::vector<std::string>& cells) {
+  constexpr int kWidths[] = {28, 6, 6, 6, 6, 6, 9, 7, 15, 7, 7, 7, 7, 7, 7, 6, 5};
+  std::string line = fmt::format("{:<{}}", cells.front(), kWidths[0]);
+  for (std::size_t i = 1; i < cells.size(); ++i) line += fmt::format("{:>{}}", cells[i], kWidths[i]);
+  return line + "\n";
+}
+
+std::string Heading() {
+  return Line({"", "", "both", "only", "only", "", "", "", "", "", "sensi-", "speci-", "", "", "", "can't", ""}) +
+         Line({"success by", "n", "", "judge", "truth", "none", "accuracy", "kappa", "95 %", "AC1", "tivity", "ficity",
+               "bias", "Brier", "ECE", "tell", "err."});
+}
+
+std::string LineOf(const JudgeQualityRow& row) {
+  const ConfusionStatistics& s = row.statistics;
+  const bool has_interval = s.kappa.value && s.kappa.interval;
+  return Line({row.group, std::to_string(s.n), std::to_string(row.confusion.both_success),
+               std::to_string(row.confusion.only_judge_success), std::to_string(row.confusion.only_human_success),
+               std::to_string(row.confusion.both_failure), Share(s.accuracy), Share(s.kappa.value),
+               has_interval ? fmt::format("{:.2f} … {:.2f}", s.kappa.interval->low, s.kappa.interval->high) : "-",
+               Share(s.gwet_ac1), Share(s.sensitivity), Share(s.specificity), Share(s.bias),
+               Share(row.calibration.brier), Share(row.calibration.ece), std::to_string(row.cannot_tell),
+               std::to_string(row.errors)});
+}
+
+}  // namespace
+
+std::vector<JudgedItem> JudgedItems(const Store& store, const std::string& judge, const std::string& truth) {
+  std::set<std::string> real_worlds;
+  for (const WorldInfo& world : store.Worlds()) {
+    if (world.is_real) real_worlds.insert(world.name);
+  }
+  const auto current = store.CurrentVerdicts();
+  std::vector<JudgedItem> items;
+  for (const Episode& episode : store.Episodes()) {
+    const auto verdicts = current.find(episode.key.Id());
+    if (verdicts == current.end() || !verdicts->second.contains(judge) || !verdicts->second.contains(truth)) continue;
+    const PairKey& pair = episode.key.pair;
+    const Verdict& its = verdicts->second.at(judge);
+    items.push_back({pair.task, pair.policy + "@" + pair.checkpoint, episode.key.world,
+                     real_worlds.contains(episode.key.world), its.label, verdicts->second.at(truth).label,
+                     its.probability});
+  }
+  return items;
+}
+
+JudgeQualityRow QualityOn(const std::vector<JudgedItem>& items, const std::string& group,
+                          const std::function<bool(const JudgedItem&)>& is_in) {
+  JudgeQualityRow row{.group = group};
+  std::vector<double> probabilities;
+  std::vector<int> outcomes;
+  for (const JudgedItem& item : items) {
+    if (!is_in(item) || !IsDecided(item.truth)) continue;
+    row.errors += item.judge == Label::kInvalid;
+    row.cannot_tell += item.judge == Label::kCannotTell;
+    if (!IsDecided(item.judge)) continue;
+    Add(item, row.confusion);
+    if (!item.probability) continue;
+    probabilities.push_back(*item.probability);
+    outcomes.push_back(item.truth == Label::kSuccess);
+  }
+  row.statistics = StatisticsOf(row.confusion);
+  row.calibration = CalibrationOf(probabilities, outcomes);
+  return row;
+}
+
+JudgeCalibrationReport CalibrateJudge(const Store& store, const std::string& judge, const std::string& truth,
+                                      const JudgeAcceptance& wanted) {
+  const std::vector<JudgedItem> items = JudgedItems(store, judge, truth);
+  JudgeCalibrationReport report{.judge = judge, .truth = truth};
+  report.rows.push_back(QualityOn(items, "all", [](const JudgedItem&) { return true; }));
+  for (const auto& [kind, field] : {std::pair("task", &JudgedItem::task), std::pair("world", &JudgedItem::world),
+                                    std::pair("policy", &JudgedItem::policy)}) {
+    for (JudgeQualityRow& row : RowsBy(items, kind, field)) report.rows.push_back(std::move(row));
+  }
+  report.missing = Missing(items, wanted);
+  report.refusals = Refusals(items, wanted);
+  report.consistency = Consistency(store.CurrentVerdicts(), judge);
+  return report;
+}
+
+std::string Text(const JudgeCalibrationReport& report) {
+  std::string text = fmt::format("{} against {}\n", report.judge, report.truth) + Heading();
+  for (const JudgeQualityRow& row : report.rows) text += LineOf(row);
+  for (const auto& [probe, count] : report.consistency) {
+    const Estimate rate = WilsonInterval(count.successes, count.trials);
+    text += fmt::format("{} probe: the same verdict for {} of {} ({:.0f} %, {:.0f} … {:.0f})\n", probe, count.successes,
+                        count.trials, 100 * *rate.value, 100 * rate.interval->low, 100 * rate.interval->high);
+  }
+  for (const std::string& sentence : report.missing) text += "too few: " + sentence + "\n";
+  for (const std::string& sentence : report.refusals) text += "not good enough: " + sentence + "\n";
+  if (report.missing.empty() && report.refusals.empty()) text += "a gate may count this judge\n";
+  return text;
+}
+
+}  // namespace evac

@@ -1,0 +1,60 @@
+#pragma once
+
+#include <functional>
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "core/statistics/confusion.h"
+#include "core/statistics/rates.h"
+#include "core/store.h"
+
+namespace evac {
+
+/// One episode as a judge and the truth (the oracle, or adjudicated humans) saw it.
+struct JudgedItem {
+  std::string task, policy, world;  ///< policy with its checkpoint: "visual_pick@good"
+  bool is_real = false;             ///< of a real world's clip; else of a simulated or imagined one
+  Label judge = Label::kCannotTell, truth = Label::kCannotTell;
+  std::optional<double> probability{};  ///< of success, as the judge gave it
+};
+
+/// Every episode that has a current verdict of both.
+std::vector<JudgedItem> JudgedItems(const Store& store, const std::string& judge, const std::string& truth);
+
+/// A judge against the truth on some items. Only those where both said success or failure are in the statistics.
+struct JudgeQualityRow {
+  std::string group;  ///< "all", "task take_bottle", "world real", "policy visual_pick@good"
+  Confusion confusion{};
+  ConfusionStatistics statistics{};
+  Calibration calibration{};                 ///< of its probabilities, where it gave them
+  std::int64_t cannot_tell = 0, errors = 0;  ///< by the judge, of items that the truth knows
+};
+JudgeQualityRow QualityOn(const std::vector<JudgedItem>& items, const std::string& group,
+                          const std::function<bool(const JudgedItem&)>& is_in);
+
+/// What vlm_judge.md 2.5 asks of a judge whose verdicts a gate may count.
+struct JudgeAcceptance {
+  std::int64_t min_items_per_task = 60, min_per_class = 15;
+  double min_kappa = 0.6, min_kappa_low = 0.4;
+  double max_bias = 0.05;               ///< share, either way, in real and in other worlds
+  double max_domain_difference = 0.10;  ///< of sensitivity and of specificity between the two
+  double max_errors = 0.02;             ///< share
+};
+
+struct JudgeCalibrationReport {
+  std::string judge, truth;
+  std::vector<JudgeQualityRow> rows{};  ///< all, per task, per world, per policy
+  std::vector<std::string> refusals{};  ///< why a gate may not count it
+  std::vector<std::string> missing{};   ///< why nothing can be said yet: too few items
+  /// How often a probe of the judge ("flip", "retest") said the same as it; none where it never ran.
+  std::map<std::string, Count> consistency{};
+};
+JudgeCalibrationReport CalibrateJudge(const Store& store, const std::string& judge, const std::string& truth,
+                                      const JudgeAcceptance& wanted = {});
+
+/// A table for people.
+std::string Text(const JudgeCalibrationReport& report);
+
+}  // namespace evac

@@ -1,0 +1,193 @@
+#include "judges/vlm_client.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "core/error.h"
+#include "core/seed.h"
+#include "judges/json_text.h"
+
+namespace evac {
+namespace {
+
+using nlohmann::json;
+
+constexpr int kTries = 6, kTriesOfTimeout = 2, kTroublesBeforePause = 10;
+constexpr double kLongestRetryAfter_s = 120, kLongestWait_s = 30, kPause_s = 60;
+
+bool IsRejection(int status) { return status == 400 || status == 413 || status == 415 || status == 422; }
+bool IsWrongAddress(int status) { return status == 401 || status == 403 || status == 404; }
+bool MayPass(int status) { return status == 429 || status >= 500; }
+
+/// What a server says of an error: its message if it is in the usual place, else the body's beginning.
+std::string WhatItSaid(const std::string& body) {
+  const std::optional<json> reply = ParseJson(body);
+  if (reply && reply->is_object() && reply->contains("error")) {
+    const json& error = (*reply)["error"];
+    if (error.is_object() && error.contains("message") && error["message"].is_string())
+      return Excerpt(error["message"].get<std::string>());
+    return Excerpt(error.dump());
+  }
+  return Excerpt(body);
+}
+
+VlmSaid Trouble(VlmOutcome outcome, const std::string& message) {
+  VlmSaid said;
+  said.trouble = outcome;
+  said.message = message;
+  return said;
+}
+
+/// One answer by itself, whatever came before it.
+VlmSaid Read(const HttpReply& reply) {
+  if (reply.trouble == HttpReply::Trouble::kTimeout) return Trouble(VlmOutcome::kTimeout, reply.message);
+  if (reply.trouble != HttpReply::Trouble::kNone) return Trouble(VlmOutcome::kHttpError, reply.message);
+  if (reply.status != 200) {
+    VlmSaid said = Trouble(reply.status == 415 ? VlmOutcome::kUnsupportedMedia : VlmOutcome::kHttpError,
+                           fmt::format("status {}: {}", reply.status, WhatItSaid(reply.body)));
+    said.was_rejected = IsRejection(reply.status);
+    return said;
+  }
+  VlmSaid said;
+  said.completion = ParseCompletion(reply.body);
+  said.trouble = said.completion.trouble;
+  said.message = said.completion.message;
+  return said;
+}
+
+/// Whether the same question may be answered the next time.
+bool IsPassing(const HttpReply& reply, const VlmSaid& said) {
+  if (reply.trouble == HttpReply::Trouble::kTooLarge) return false;
+  if (reply.trouble != HttpReply::Trouble::kNone) return true;
+  return reply.status == 200 ? said.trouble == VlmOutcome::kHttpError : MayPass(reply.status);
+}
+
+}  // namespace
+
+double VlmSpent::Usd(const VlmBudget& budget) const {
+  return 1e-6 * (static_cast<double>(prompt_tokens) * budget.usd_per_million_prompt_tokens +
+                 static_cast<double>(completion_tokens) * budget.usd_per_million_completion_tokens);
+}
+
+VlmClient::VlmClient(VlmClientOptions options) : options_(std::move(options)) {
+  while (options_.base_url.ends_with('/')) options_.base_url.pop_back();
+  const std::string& url = options_.base_url;
+  if (!url.starts_with("http://") && !url.starts_with("https://"))
+    throw InvalidInput("base_url is '{}', wanted one such as http://localhost:8000/v1", url);
+}
+
+HttpReply VlmClient::Send(const std::string& path, const std::string& body) {
+  return Exchange({options_.base_url + path, body, options_.bearer_key}, options_.limits);
+}
+
+std::string VlmClient::Fingerprint(const std::string& model) {
+  const HttpReply reply = Send("/models", "");
+  if (reply.trouble != HttpReply::Trouble::kNone)
+    throw InvalidInput("{}: no model server answers: {}", options_.base_url, reply.message);
+  if (reply.status == 404 || reply.status == 405) return "";
+  if (reply.status != 200)
+    throw InvalidInput("{}/models: status {}: {}", options_.base_url, reply.status, WhatItSaid(reply.body));
+  const std::optional<json> list = ParseJson(reply.body);
+  if (!list || !list->is_object() || !list->contains("data") || !(*list)["data"].is_array()) return "";
+  std::string known;
+  for (const json& entry : (*list)["data"]) {
+    const bool is_named = entry.is_object() && entry.contains("id") && entry["id"].is_string();
+    const std::string id = is_named ? entry["id"].get<std::string>() : "";
+    if (id != model) {
+      known += (known.empty() ? "" : ", ") + id;
+      continue;
+    }
+    json same_at_every_start = entry;  // vLLM writes when it was started, and a permission with a number of its own
+    for (const char* key : {"created", "permission"}) same_at_every_start.erase(key);
+    return same_at_every_start.dump();
+  }
+  throw InvalidInput("{}: has no model '{}', but: {}", options_.base_url, model, known);
+}
+
+VlmSaid VlmClient::Ask(const json& request) {
+  const std::string body = request.dump();
+  VlmSaid said = Trouble(VlmOutcome::kHttpError, "nothing was sent");
+  for (int attempt = 1; attempt <= kTries && MaySend(); ++attempt) {
+    const HttpReply reply = Send("/chat/completions", body);
+    said = Read(reply);
+    said.attempts = attempt;
+    const bool is_passing = IsPassing(reply, said);
+    Count(said, is_passing);
+    if (IsWrongAddress(reply.status)) End(fmt::format("{}: {}", options_.base_url, said.message));
+    if (!is_passing || attempt == kTries) break;
+    if (said.trouble == VlmOutcome::kTimeout && attempt == kTriesOfTimeout) break;
+    Wait(reply.retry_after_s, attempt);
+  }
+  return said;
+}
+
+/// Waits while somebody waits for the server, then says whether one more request may be sent.
+bool VlmClient::MaySend() {
+  const std::lock_guard wait_with_the_others(pause_mutex_);
+  const std::lock_guard lock(mutex_);
+  const VlmBudget& budget = options_.budget;
+  const long tokens = spent_.prompt_tokens + spent_.completion_tokens;
+  std::string why;
+  if (budget.max_requests > 0 && spent_.requests >= budget.max_requests)
+    why = fmt::format("{} requests were sent, as many as may be", spent_.requests);
+  if (budget.max_tokens > 0 && tokens >= budget.max_tokens)
+    why = fmt::format("{} tokens are spent of {}", tokens, budget.max_tokens);
+  if (budget.max_usd > 0 && spent_.Usd(budget) >= budget.max_usd)
+    why = fmt::format("{:.2f} USD are spent of {:.2f}", spent_.Usd(budget), budget.max_usd);
+  if (!why.empty() && !why_over_) why_over_ = "the budget is spent: " + why;
+  if (why_over_) return false;
+  ++spent_.requests;
+  return true;
+}
+
+void VlmClient::Count(const VlmSaid& said, bool is_trouble) {
+  bool must_pause = false;
+  {
+    const std::lock_guard lock(mutex_);
+    spent_.prompt_tokens += said.completion.prompt_tokens.value_or(0);
+    spent_.completion_tokens += said.completion.completion_tokens.value_or(0);
+    troubles_in_a_row_ = is_trouble ? troubles_in_a_row_ + 1 : 0;
+    if (!is_trouble) has_paused_ = false;
+    if (troubles_in_a_row_ < kTroublesBeforePause) return;
+    if (has_paused_ && !why_over_)
+      why_over_ = fmt::format("{} requests in a row failed, also after a pause; the last: {}", troubles_in_a_row_,
+                              said.message);
+    must_pause = !has_paused_;
+    has_paused_ = true;
+  }
+  if (!must_pause) return;
+  const std::lock_guard others_wait_too(pause_mutex_);
+  options_.sleep_s(kPause_s);
+}
+
+void VlmClient::Wait(std::optional<double> retry_after_s, int attempt) {
+  double wait_s = 0;
+  {
+    const std::lock_guard lock(mutex_);
+    if (why_over_) return;
+    const std::uint64_t draw = SeedFor(options_.seed, static_cast<std::uint64_t>(spent_.requests));
+    wait_s = SplitMix64(draw).Uniform(0, std::min(kLongestWait_s, std::exp2(attempt - 1)));
+  }
+  const std::lock_guard others_wait_too(pause_mutex_);
+  if (retry_after_s) wait_s = std::clamp(*retry_after_s, 0.0, kLongestRetryAfter_s);
+  options_.sleep_s(wait_s);
+}
+
+void VlmClient::End(const std::string& why) {
+  const std::lock_guard lock(mutex_);
+  if (!why_over_) why_over_ = why;
+}
+
+std::optional<std::string> VlmClient::WhyOver() const {
+  const std::lock_guard lock(mutex_);
+  return why_over_;
+}
+
+VlmSpent VlmClient::spent() const {
+  const std::lock_guard lock(mutex_);
+  return spent_;
+}
+
+}  // namespace evac

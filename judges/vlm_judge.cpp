@@ -1,0 +1,210 @@
+#include "judges/vlm_judge.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <atomic>
+#include <chrono>
+#include <future>
+
+#include "core/error.h"
+#include "core/hash.h"
+#include "judges/json_text.h"
+
+namespace evac {
+namespace {
+
+using nlohmann::json;
+using Clock = std::chrono::steady_clock;
+
+constexpr long kFewestTokensPerFrame = 60;
+constexpr VlmClipOptions kSmall{.frames = 8, .tail_frames = 0, .long_side_px = 336};
+
+/// What a server says of a request that holds more than it takes.
+bool IsAboutSize(const std::string& message) {
+  for (const char* words : {"context length", "context window", "maximum context", "too many images", "too large",
+                            "at most", "limit-mm-per-prompt", "status 413"}) {
+    if (message.find(words) != std::string::npos) return true;
+  }
+  return false;
+}
+
+VlmAnswer Troubled(VlmOutcome outcome, const std::string& message) {
+  return {.outcome = outcome, .observations = message};
+}
+
+/// A server that counts far too few prompt tokens has thrown pictures away and said nothing.
+bool HasLostImages(const VlmCompletion& completion, std::size_t frames) {
+  return completion.prompt_tokens && *completion.prompt_tokens < kFewestTokensPerFrame * static_cast<long>(frames);
+}
+
+bool Agree(const std::vector<VlmAnswer>& answers) {
+  return std::all_of(answers.begin(), answers.end(), [&](const VlmAnswer& answer) {
+    return answer.outcome == answers.front().outcome && !answer.evidence_frames.empty();
+  });
+}
+
+double ProbabilityOfSuccess(const std::vector<VlmAnswer>& answers) {
+  double sum = 0;
+  for (const VlmAnswer& answer : answers) {
+    if (answer.outcome == VlmOutcome::kSuccess) sum += 0.5 + answer.confidence / 2;
+    if (answer.outcome == VlmOutcome::kFailure) sum += 0.5 - answer.confidence / 2;
+    if (answer.outcome == VlmOutcome::kCannotTell) sum += 0.5;
+  }
+  return sum / static_cast<double>(answers.size());
+}
+
+std::string VotesSentence(const std::vector<VlmAnswer>& answers) {
+  std::string text;
+  for (const VlmAnswer& answer : answers) {
+    text += fmt::format("{}{}", text.empty() ? "" : ", ", Name(answer.outcome));
+    if (answer.evidence_frames.empty()) text += " without a frame";
+  }
+  return text;
+}
+
+}  // namespace
+
+/// What all wordings of one episode share.
+struct VlmJudge::Clip {
+  const Task& task;
+  std::vector<VlmFrame> frames;
+  mutable std::atomic<bool> is_too_large = false;  ///< the server said so
+};
+
+Verdict VerdictOf(const std::vector<VlmAnswer>& answers) {
+  Verdict verdict;
+  for (const VlmAnswer& answer : answers) {
+    if (LabelOf(answer.outcome) != Label::kInvalid) continue;
+    verdict.label = Label::kInvalid;
+    verdict.reason = fmt::format("{}: {}", Name(answer.outcome), answer.observations);
+    return verdict;
+  }
+  verdict.label = Agree(answers) ? LabelOf(answers.front().outcome) : Label::kCannotTell;
+  verdict.probability = ProbabilityOfSuccess(answers);
+  verdict.reason =
+      Agree(answers) ? answers.front().observations
+                     : fmt::format("its answers differ ({}): {}", VotesSentence(answers), answers.front().observations);
+  for (const VlmAnswer& answer : answers) {
+    for (const auto& [stage, reached] : answer.stages) {
+      const auto [entry, is_new] = verdict.stages.try_emplace(stage, reached);
+      entry->second = entry->second && reached;
+    }
+  }
+  return verdict;
+}
+
+VlmJudge::VlmJudge(const VlmConfig& config, VlmJudgeOptions options, VlmClient& client, CallCache& cache)
+    : config_(config), options_(std::move(options)), client_(client), cache_(cache) {}
+
+std::string VlmJudge::Name() const {
+  const char* suffix = options_.probe == VlmProbe::kFlip     ? ":flip"
+                       : options_.probe == VlmProbe::kRetest ? ":retest"
+                                                             : "";
+  return config_.JudgeName() + suffix;
+}
+
+Verdict VlmJudge::Rate(const Task& task, const Episode& episode) {
+  std::string name = Name();
+  const std::filesystem::path video = options_.run_folder / episode.video;
+  std::vector<VlmAnswer> answers;
+  Clip clip{task, ReadVlmFrames(video, task, config_.clip)};
+  answers = AllWordings(clip);
+  if (clip.is_too_large) {
+    const Clip small{task, ReadVlmFrames(video, task, kSmall)};
+    answers = AllWordings(small);
+    name += ":small";
+  }
+  Verdict verdict = VerdictOf(answers);
+  verdict.episode_id = episode.key.Id();
+  verdict.judge = name;
+  verdict.rubric_version = task.rubric.version;
+  return verdict;
+}
+
+/// Side by side: a server answers several at once sooner than one after another.
+std::vector<VlmAnswer> VlmJudge::AllWordings(const Clip& clip) {
+  if (options_.probe == VlmProbe::kFlip) return {AnswerOf(clip, VlmWording::kFlipped)};
+  std::vector<std::future<VlmAnswer>> asked;
+  for (const VlmWording wording : kVlmWordings)
+    asked.push_back(std::async(std::launch::async, [this, &clip, wording] { return AnswerOf(clip, wording); }));
+  for (const auto& answer : asked) answer.wait();
+  std::vector<VlmAnswer> answers;
+  for (auto& answer : asked) answers.push_back(answer.get());
+  return answers;
+}
+
+VlmAnswer VlmJudge::AnswerOf(const Clip& clip, VlmWording wording) {
+  const json request = VlmRequest(clip.task, clip.frames, wording, config_.sampling);
+  JudgeCall call{.key = Sha256Hex(fmt::format("{}\n{}\n{}\n{}", kVlmVersion, options_.fingerprint,
+                                              options_.probe == VlmProbe::kRetest ? "again" : "", request.dump())),
+                 .judge = Name()};
+  if (const auto known = cache_.Find(call.key))
+    return ParseVerdictText(known->response, QuestionOf(clip.task, clip.frames, wording));
+  if (options_.offline) throw InvalidInput("no answer in the cache").Called("not_judged");
+  const auto before = Clock::now();
+  const VlmAnswer answer = Asked(clip, wording, call);
+  call.latency_ms = std::chrono::duration_cast<std::chrono::milliseconds>(Clock::now() - before).count();
+  call.created_at = options_.now();
+  cache_.Add(call);
+  if (const auto why = client_.WhyOver(); why && LabelOf(answer.outcome) == Label::kInvalid)
+    throw InternalError("{}", *why).Called("judge_over");
+  return answer;
+}
+
+/// Asks, again with more room if the answer was cut, and once more for JSON alone if it was none.
+/// Fills in what came, for the cache.
+VlmAnswer VlmJudge::Asked(const Clip& clip, VlmWording wording, JudgeCall& call) {
+  const json request = VlmRequest(clip.task, clip.frames, wording, config_.sampling);
+  const VlmQuestion question = QuestionOf(clip.task, clip.frames, wording);
+  VlmSaid said = AskWhole(request);
+  call.attempts = said.attempts;
+  if (said.trouble) {
+    call.response = said.message;
+    call.status = evac::Name(*said.trouble);
+    if (!said.was_rejected) return Troubled(*said.trouble, said.message);
+    if (IsAboutSize(said.message)) clip.is_too_large = true;
+    return Troubled(VlmOutcome::kUnsupportedMedia, said.message);
+  }
+  if (HasLostImages(said.completion, clip.frames.size())) {
+    call.status = evac::Name(VlmOutcome::kTruncated);
+    call.response = fmt::format("the server counted {} prompt tokens for {} images: it drops some of them",
+                                *said.completion.prompt_tokens, clip.frames.size());
+    return Troubled(VlmOutcome::kTruncated, call.response);
+  }
+  VlmAnswer answer = ParseVerdictText(said.completion.text, question);
+  if (answer.outcome == VlmOutcome::kParseError) {
+    const VlmSaid repaired = AskWhole(RepairRequest(request, said.completion.text, answer.observations));
+    if (!repaired.trouble) {
+      answer = ParseVerdictText(repaired.completion.text, question);
+      said = repaired;
+    }
+  }
+  call.response = said.completion.text;
+  call.status = answer.outcome == VlmOutcome::kParseError ? evac::Name(answer.outcome) : "ok";
+  call.prompt_tokens = said.completion.prompt_tokens.value_or(0);
+  call.completion_tokens = said.completion.completion_tokens.value_or(0);
+  return answer;
+}
+
+VlmSaid VlmJudge::AskWhole(const json& request) {
+  VlmSaid said = client_.Ask(request);
+  if (said.trouble != VlmOutcome::kTruncated) return said;
+  json longer = request;
+  longer["max_tokens"] = 2 * request.at("max_tokens").get<int>();
+  return client_.Ask(longer);
+}
+
+void CheckThatItSees(VlmClient& client, const VlmSampling& sampling) {
+  const SightTest test = MakeSightTest(sampling);
+  const VlmSaid said = client.Ask(test.request);
+  if (said.trouble)
+    throw InvalidInput("the model server did not answer three pictures: {}: {}", Name(*said.trouble), said.message);
+  if (HasSeen(said.completion.text, test.numbers)) return;
+  throw InvalidInput(
+      "the model does not see the images: pictures of {}, {} and {} were answered with: {}\n"
+      "      Some servers drop images without saying so (too short a context, a model without eyes)",
+      test.numbers[0], test.numbers[1], test.numbers[2], Excerpt(said.completion.text));
+}
+
+}  // namespace evac

@@ -1,0 +1,127 @@
+#include "judges/judge_calibration.h"
+
+#include <gmock/gmock.h>
+
+#include "tests/support/temp_folder.h"
+
+namespace evac {
+namespace {
+
+using testing::HasSubstr;
+
+/// A run of one task in two worlds with verdicts of an oracle and of a judge, one letter an episode: s, f, ?, i.
+class Judged {
+ public:
+  Judged(const std::string& world, const std::string& truth, const std::string& judge) { Add(world, truth, judge); }
+
+  Judged& Add(const std::string& world, const std::string& truth, const std::string& judge) {
+    store_.AddWorld({world, "mujoco", world == "real", ""});
+    for (std::size_t i = 0; i < truth.size(); ++i) {
+      EpisodeRecord record;
+      record.episode.key = {{"take", std::to_string(i), "policy", "v1", 1}, world};
+      record.episode.stop = StopReason::kStill;
+      store_.Add(record);
+      Say("oracle", record.episode.key, truth[i]);
+      Say("vlm:x", record.episode.key, judge.at(i));
+    }
+    return *this;
+  }
+
+  Judged& Say(const std::string& judge, const EpisodeKey& key, char letter) {
+    const std::map<char, Label> labels = {
+        {'s', Label::kSuccess}, {'f', Label::kFailure}, {'?', Label::kCannotTell}, {'i', Label::kInvalid}};
+    Verdict verdict;
+    verdict.episode_id = key.Id();
+    verdict.judge = judge;
+    verdict.label = labels.at(letter);
+    verdict.probability = letter == 's' ? 0.9 : 0.2;
+    store_.AddVerdict(verdict);
+    return *this;
+  }
+
+  const Store& store() const { return store_; }
+
+ private:
+  static Store Made(const std::filesystem::path& folder) {
+    Store store = Store::InMemory(
+        folder, {.suite_text = "suite: x", .suite_hash = "0", .suite_path = "x.yaml", .evac_version = "0"});
+    Task task;
+    task.id = "take";
+    store.AddTask(task);
+    store.AddPolicy({"policy", "v1", "{}"});
+    return store;
+  }
+
+  TempFolder folder_;
+  Store store_ = Made(folder_.path());
+};
+
+std::string Times(int times, const std::string& letters) {
+  std::string text;
+  for (int i = 0; i < times; ++i) text += letters;
+  return text;
+}
+
+TEST(JudgeCalibration, CountsWhoSaidWhatAndLeavesOutWhatEitherDidNotDecide) {
+  const Judged run("real", "sssff?s", "ssfsfsi");
+  const JudgeCalibrationReport report = CalibrateJudge(run.store(), "vlm:x", "oracle");
+  const JudgeQualityRow& all = report.rows.front();
+  EXPECT_EQ(all.confusion.both_success, 2);
+  EXPECT_EQ(all.confusion.only_human_success, 1);
+  EXPECT_EQ(all.confusion.only_judge_success, 1);
+  EXPECT_EQ(all.confusion.both_failure, 1);
+  EXPECT_EQ(all.errors, 1);
+  EXPECT_EQ(all.cannot_tell, 0);
+  EXPECT_NEAR(*all.statistics.sensitivity, 2.0 / 3, 1e-12);
+  EXPECT_NEAR(*all.calibration.brier, (2 * 0.01 + 0.64 + 0.81 + 0.04) / 5, 1e-12);
+  std::vector<std::string> groups;
+  for (const JudgeQualityRow& row : report.rows) groups.push_back(row.group);
+  EXPECT_EQ(groups, (std::vector<std::string>{"all", "task take", "world real", "policy policy@v1"}));
+}
+
+TEST(JudgeCalibration, AGoodJudgeIsAccepted) {
+  Judged run("real", Times(20, "sf"), Times(20, "sf"));
+  run.Add("sim", Times(20, "sf") + "sf", Times(20, "sf") + "fs");
+  const JudgeCalibrationReport report = CalibrateJudge(run.store(), "vlm:x", "oracle");
+  EXPECT_THAT(report.missing, testing::IsEmpty());
+  EXPECT_THAT(report.refusals, testing::IsEmpty());
+  EXPECT_THAT(Text(report), HasSubstr("a gate may count this judge"));
+}
+
+TEST(JudgeCalibration, AJudgeThatIsKinderToOneWorldIsRefusedThoughItsKappaIsGood) {
+  Judged run("real", Times(50, "sf"), Times(50, "sf"));
+  run.Add("sim", Times(50, "sf"), Times(40, "sf") + Times(10, "ss"));
+  const JudgeCalibrationReport report = CalibrateJudge(run.store(), "vlm:x", "oracle");
+  EXPECT_GT(*report.rows.front().statistics.kappa.value, 0.8);
+  EXPECT_THAT(report.refusals, testing::ElementsAre(HasSubstr("on other clips its success rate is +10.0 points off"),
+                                                    HasSubstr("specificity differs by 20.0 points")));
+}
+
+TEST(JudgeCalibration, ErrorsAndChanceAgreementAreRefused) {
+  const Judged run("real", Times(50, "sf"), Times(24, "sf") + "ii" + Times(12, "sf") + Times(13, "fs"));
+  EXPECT_THAT(CalibrateJudge(run.store(), "vlm:x", "oracle").refusals,
+              testing::IsSupersetOf({HasSubstr("kappa is 0.47, wanted at least 0.6")}));
+  const Judged errors("real", Times(50, "sf"), Times(48, "sf") + "iiii");
+  EXPECT_THAT(CalibrateJudge(errors.store(), "vlm:x", "oracle").refusals,
+              testing::ElementsAre(HasSubstr("4 of 100 verdicts are errors")));
+}
+
+TEST(JudgeCalibration, TooFewOfOneKindIsNoAnswer) {
+  const Judged run("real", Times(70, "s") + Times(5, "f"), Times(70, "s") + Times(5, "f"));
+  const JudgeCalibrationReport report = CalibrateJudge(run.store(), "vlm:x", "oracle");
+  EXPECT_THAT(report.missing, testing::ElementsAre(HasSubstr("task take: 70 successes and 5 failures")));
+  EXPECT_FALSE(CalibrateJudge(run.store(), "vlm:nobody", "oracle").missing.empty());
+}
+
+TEST(JudgeCalibration, ProbesAreComparedWithTheJudgeItself) {
+  Judged run("real", "ssff", "ssff");
+  for (int i = 0; i < 4; ++i)
+    run.Say("vlm:x:flip", {{"take", std::to_string(i), "policy", "v1", 1}, "real"}, "ss?s"[i]);
+  const auto consistency = CalibrateJudge(run.store(), "vlm:x", "oracle").consistency;
+  EXPECT_EQ(consistency.size(), 1u);
+  EXPECT_EQ(consistency.at("flip").successes, 2);
+  EXPECT_EQ(consistency.at("flip").trials, 3);
+}
+
+}  // namespace
+}  // namespace evac
