@@ -14,6 +14,7 @@ void AddMerge(CLI::App& app, ExitCode& exit_code);
 void AddJudge(CLI::App& app, ExitCode& exit_code);
 void AddCorrelate(CLI::App& app, ExitCode& exit_code);
 void AddReport(CLI::App& app, ExitCode& exit_code);
+void AddDashboard(CLI::App& app, ExitCode& exit_code);
 void AddValidate(CLI::App& app, ExitCode& exit_code);
 void AddDoctor(CLI::App& app, ExitCode& exit_code);
 void AddCompare(CLI::App& app, ExitCode& exit_code);

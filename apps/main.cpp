@@ -10,8 +10,9 @@ int main(int argc, char** argv) {
   CLI::App app("evac: find out, without a robot, how well a policy works.", "evac");
   app.set_version_flag("--version", EVAC_VERSION);
   app.require_subcommand(1);
-  app.footer("First steps:\n  evac run apps/configs/demo.yaml --out out/demo\n  evac report out/demo\n"
-             "Exit codes: 0 ok, 1 the answer is no, 2 invalid input, 3 inconclusive, 4 internal error.");
+  app.footer(
+      "First steps:\n  evac run apps/configs/demo.yaml --out out/demo\n  evac report out/demo\n"
+      "Exit codes: 0 ok, 1 the answer is no, 2 invalid input, 3 inconclusive, 4 internal error.");
   evac::ExitCode exit_code = evac::ExitCode::kOk;
   try {
     evac::AddRun(app, exit_code);
@@ -20,6 +21,7 @@ int main(int argc, char** argv) {
     evac::AddJudge(app, exit_code);
     evac::AddCorrelate(app, exit_code);
     evac::AddReport(app, exit_code);
+    evac::AddDashboard(app, exit_code);
     evac::AddPlan(app, exit_code);
     evac::AddCompare(app, exit_code);
     evac::AddImportReal(app, exit_code);

@@ -154,7 +154,7 @@ std::string RateStrip(const Estimate& rate, std::size_t world) {
     for (const double end : {low, high})
       svg += fmt::format("<line class=\"range\" x1=\"{0:.2f}%\" x2=\"{0:.2f}%\" y1=\"8\" y2=\"16\"/>", end);
     svg += fmt::format("<svg x=\"{:.2f}%\" y=\"12\" overflow=\"visible\">{}</svg></g>", 100 * *rate.value,
-                       Marker(world == 0 ? 0 : 3 + (world - 1), "dot"));
+                       Marker(WorldShape(world), "dot"));
   }
   return svg + "</svg>";
 }
@@ -167,10 +167,9 @@ std::string RateScale() {
   return svg + "</svg>";
 }
 
-std::string Scatter(const WorldComparison& comparison, const std::vector<PointStyle>& styles) {
-  std::string svg = fmt::format("<svg class=\"scatter\" role=\"img\" viewBox=\"0 0 {} {}\" aria-label=\"{}\">", kWidth,
-                                kHeight, Escaped(ScatterInWords(comparison)));
-  svg += Axes(comparison);
+Drawing ScatterDrawing(const WorldComparison& comparison, const std::vector<PointStyle>& styles) {
+  Drawing drawing{kWidth, kHeight, Axes(comparison), ScatterInWords(comparison)};
+  std::string& svg = drawing.body;
   for (std::size_t i = 0; i < comparison.points.size(); ++i) svg += Whiskers(comparison.points[i], styles.at(i));
   const std::vector<Place> labels = PlaceLabels(comparison);
   for (std::size_t i = 0; i < comparison.points.size(); ++i) {
@@ -182,7 +181,11 @@ std::string Scatter(const WorldComparison& comparison, const std::vector<PointSt
     svg += fmt::format("<text class=\"letter\" x=\"{:.1f}\" y=\"{:.1f}\" text-anchor=\"middle\">{}</text>", labels[i].x,
                        labels[i].y + 4.5, comparison.points[i].letter);
   }
-  return svg + "</svg>";
+  return drawing;
+}
+
+std::string Scatter(const WorldComparison& comparison, const std::vector<PointStyle>& styles) {
+  return InPage(ScatterDrawing(comparison, styles), "scatter");
 }
 
 }  // namespace evac

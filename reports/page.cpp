@@ -5,8 +5,10 @@
 #include <algorithm>
 #include <set>
 
-#include "reports/findings.h"
+#include "core/hash.h"
+#include "reports/charts.h"
 #include "reports/html.h"
+#include "reports/page_assets.h"
 #include "reports/page_parts.h"
 #include "reports/wording.h"
 
@@ -25,10 +27,27 @@ std::string Subtitle(const RunSummary& summary) {
       Counted(static_cast<std::int64_t>(summary.episodes.size()), "episode"), Escaped(summary.options.judge));
 }
 
-std::string Navigation() {
-  return "<nav aria-label=\"Sections\"><a href=\"#rates\">Rates</a><a href=\"#worlds\">Worlds</a><a "
-         "href=\"#flips\">Flips</a>"
-         "<a href=\"#clips\">Clips</a><a href=\"#errors\">Errors</a><a href=\"#provenance\">Provenance</a></nav>";
+std::string Navigation(const ReportData& report) {
+  std::string html = "<nav aria-label=\"Sections\">";
+  for (const auto& [id, name] :
+       std::initializer_list<std::pair<const char*, const char*>>{{"gates", "Gates"},
+                                                                  {"rates", "Rates"},
+                                                                  {"findings", "Findings"},
+                                                                  {"trust", "Trust"},
+                                                                  {"worlds", "Worlds"},
+                                                                  {"states", "States"},
+                                                                  {"stages", "Stages"},
+                                                                  {"checkpoints", "Checkpoints"},
+                                                                  {"judges", "Judges"},
+                                                                  {"clips", "Clips"},
+                                                                  {"errors", "Errors"},
+                                                                  {"methods", "Methods"},
+                                                                  {"provenance", "Provenance"}}) {
+    if (std::string_view(id) == "checkpoints" && report.checkpoints.empty()) continue;
+    if (std::string_view(id) == "gates" && report.gates.empty()) continue;
+    html += fmt::format("<a href=\"#{}\">{}</a>", id, name);
+  }
+  return html + "</nav>";
 }
 
 /// Said first where a judge has not spoken: without verdicts there is nothing to count.
@@ -44,6 +63,20 @@ std::string MissingVerdicts(const RunSummary& summary) {
       "<code>evac judge RUN --judge {}</code>, then <code>evac report RUN</code>, adds them.{}</p>",
       unjudged == 1 ? "1 episode has" : fmt::format("{} episodes have", unjudged), Escaped(summary.options.judge),
       Escaped(summary.options.judge), others.empty() ? "" : " Other judges have spoken: " + others + ".");
+}
+
+/// "sha256-…" of a script, as a policy names it: base64 of the hash's bytes.
+std::string HashOf(const std::string& script) {
+  static constexpr char kDigits[] = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
+  const std::string hex = Sha256Hex(script);
+  std::string base64;
+  for (std::size_t at = 0; at < hex.size(); at += 6) {  // three bytes are four digits
+    const std::string group = hex.substr(at, 6);
+    const unsigned long bits = std::stoul(group + std::string(6 - group.size(), '0'), nullptr, 16);
+    for (std::size_t digit = 0; digit < 4; ++digit)
+      base64 += digit * 6 < group.size() * 4 ? kDigits[(bits >> (18 - 6 * digit)) & 63] : '=';
+  }
+  return "sha256-" + base64;
 }
 
 }  // namespace
@@ -74,34 +107,64 @@ std::string AspectRatio(const RunSummary& summary, const std::string& task) {
 
 std::string ClipId(const Episode& episode) { return "clip-" + Anchor(episode.key.Id()); }
 
-std::string PairId(const PairKey& pair, const std::string& world) {
-  return "flip-" + Anchor(EpisodeKey{pair, world}.Id());
+std::string PageScript(PageScripts scripts) {
+  switch (scripts) {
+    case PageScripts::kReport:
+      return PageJs();
+    case PageScripts::kLive:
+      return LiveJs();
+    case PageScripts::kLiveReport:
+      return PageJs() + LiveJs();
+  }
+  return "";
 }
 
-std::string FindingsPart(const RunSummary& summary) {
-  std::string html = "<section class=\"findings\" aria-label=\"Findings\"><dl>";
-  for (const Finding& finding : FindingsOf(summary)) {
-    std::string tag_class = Name(finding.decision);
-    std::replace(tag_class.begin(), tag_class.end(), ' ', '-');
-    html += fmt::format("<div><dt>{}</dt><dd><span class=\"tag {}\">{}</span><p>{}</p></dd></div>",
-                        Escaped(finding.question), tag_class, Name(finding.decision), Escaped(finding.answer));
+std::string PageHead(const std::string& title, PageScripts scripts) {
+  return "<!doctype html>\n<html lang=\"en\"><head><meta charset=\"utf-8\">"
+         "<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">"
+         "<meta name=\"color-scheme\" content=\"light dark\"><meta name=\"referrer\" content=\"no-referrer\">"
+         "<meta http-equiv=\"Content-Security-Policy\" content=\"default-src 'none'; img-src 'self' file:; media-src "
+         "'self' "
+         "file:; style-src 'unsafe-inline'; " +
+         std::string(scripts == PageScripts::kReport ? "" : "connect-src 'self'; ") + "script-src '" +
+         HashOf(PageScript(scripts)) + "'\"><title>" + Escaped(title) + "</title>\n<style>" + ColoursCss() +
+         ChartsCss() + PageCss() + "</style></head>\n";
+}
+
+std::string Tag(const std::string& word) {
+  if (word.empty()) return "";
+  std::string name = word;
+  std::replace(name.begin(), name.end(), ' ', '-');
+  return fmt::format("<span class=\"tag {}\">{}</span>", Escaped(name), Escaped(word));
+}
+
+std::string WorldKey(std::size_t index, const std::string& world) {
+  return fmt::format("<span class=\"key\">{}{}</span>",
+                     MarkerIcon(WorldShape(index), fmt::format("dot w{}", index % 4)), Escaped(world));
+}
+
+std::string ReportPage(const ReportData& report, const PageOptions& options) {
+  const RunSummary& summary = report.summary;
+  const PageScripts scripts = options.events.empty() ? PageScripts::kReport : PageScripts::kLiveReport;
+  std::string html = PageHead("Policy evaluation report", scripts);
+  html += options.events.empty()
+              ? "<body>"
+              : fmt::format("<body data-events=\"{}\" data-run=\"{}\">", Escaped(options.events), options.run);
+  html += "<header><h1>Policy evaluation</h1><p class=\"subtitle\">" + Subtitle(summary) + "</p></header>\n<main>\n";
+  if (!options.events.empty()) html += "<p class=\"live\" role=\"status\"></p>";
+  html += MissingVerdicts(summary) + HeadlinesPart(report) + "\n" + Navigation(report) + "\n";
+  for (const std::string& part :
+       {GatesPart(report, options), RatesPart(summary), FindingsPart(summary), TrustPart(report), ScatterPart(summary),
+        StatesPart(summary, options), StagesPart(report), CheckpointsPart(report), JudgesPart(report),
+        ClipsPart(summary), ErrorsPart(summary), MethodsPart(report), ProvenancePart(summary, options)}) {
+    html += part + "\n";
   }
-  return html + "</dl></section>";
+  return html + "</main>\n" + DataPart(summary, options) + "\n<script>" + PageScript(scripts) +
+         "</script></body></html>\n";
 }
 
 std::string ReportPage(const RunSummary& summary, const PageOptions& options) {
-  std::string html =
-      "<!doctype html>\n<html lang=\"en\"><head><meta charset=\"utf-8\">"
-      "<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">"
-      "<meta name=\"color-scheme\" content=\"light dark\"><meta name=\"referrer\" content=\"no-referrer\">"
-      "<title>Policy evaluation report</title>\n<style>" +
-      PageStyle() + "</style></head>\n<body>";
-  html += "<header><h1>Policy evaluation</h1><p class=\"subtitle\">" + Subtitle(summary) + "</p></header>\n<main>\n";
-  html += MissingVerdicts(summary) + FindingsPart(summary) + "\n" + Navigation() + "\n";
-  html += RatesPart(summary) + "\n" + ScatterPart(summary) + "\n" + FlipsPart(summary, options) + "\n";
-  html += ClipsPart(summary, options) + "\n" + ErrorsPart(summary) + "\n" + ProvenancePart(summary, options);
-  html += "\n</main>\n<script>" + PageScript() + "</script></body></html>\n";
-  return html;
+  return ReportPage(ReportDataOf(summary), options);
 }
 
 }  // namespace evac

@@ -2,17 +2,22 @@
 
 #include <string>
 
-#include "reports/summary.h"
+#include "reports/report_data.h"
 
 namespace evac {
 
 struct PageOptions {
-  std::string run_folder;  ///< from the page's folder to the run's, '/' between folders; empty where they are the same
-  std::string program;     ///< "evac 0.1.0": who wrote the page
+  std::string run_folder;   ///< from the page's folder to the run's, '/' between folders; empty where they are the same
+  std::string program;      ///< "evac 0.1.0": who wrote the page
+  std::string events = {};  ///< inside a dashboard: where it tells of news, relative to the page; else empty
+  std::size_t run = 0;      ///< inside a dashboard: which of its runs this is
 };
 
-/// The report as one HTML file: it opens from disk, needs no network, reads without script, and is the same bytes for
-/// the same run. Videos and thumbnails are linked relatively, all else is inside.
+/// The report as one HTML file: it opens from disk, needs no network, shows every chart without script, and is the same
+/// bytes for the same run. Videos and thumbnails are linked relatively, all else is inside. Its own policy
+/// (Content-Security-Policy) forbids every connection and every script but the one that it carries.
+std::string ReportPage(const ReportData& report, const PageOptions& options);
+/// The same of a run that has been counted only so far.
 std::string ReportPage(const RunSummary& summary, const PageOptions& options);
 
 }  // namespace evac

@@ -7,25 +7,47 @@
 /// The parts of the page, one function each, in the order they are read. All return HTML; texts are escaped inside.
 namespace evac {
 
-std::string PageStyle();   ///< CSS, light and dark
-std::string PageScript();  ///< filters, videos in sync; the page reads without it
-
-std::string FindingsPart(const RunSummary& summary);
+std::string HeadlinesPart(const ReportData& report);                          ///< the first screen
+std::string GatesPart(const ReportData& report, const PageOptions& options);  ///< empty without gates
+std::string FindingsPart(const RunSummary& summary);                          ///< one question, one sentence
 std::string RatesPart(const RunSummary& summary);
+std::string TrustPart(const ReportData& report);
 std::string ScatterPart(const RunSummary& summary);
-std::string FlipsPart(const RunSummary& summary, const PageOptions& options);
-std::string ClipsPart(const RunSummary& summary, const PageOptions& options);
+std::string StatesPart(const RunSummary& summary, const PageOptions& options);
+std::string StagesPart(const ReportData& report);
+std::string CheckpointsPart(const ReportData& report);
+std::string JudgesPart(const ReportData& report);
+std::string ClipsPart(const RunSummary& summary);
 std::string ErrorsPart(const RunSummary& summary);
+std::string MethodsPart(const ReportData& report);
 std::string ProvenancePart(const RunSummary& summary, const PageOptions& options);
+
+/// The run as the page's script reads it: <script type="application/json" id="run-data">.
+std::string DataPart(const RunSummary& summary, const PageOptions& options);
+
+/// Which scripts a page carries.
+enum class PageScripts {
+  kReport,      ///< of a report that lies on a disk: it connects to nothing
+  kLive,        ///< of a dashboard's first page: it listens to /events
+  kLiveReport,  ///< of a report inside a dashboard: both
+};
+std::string PageScript(PageScripts scripts);
+/// From the doctype to </head>: styles, and a policy that forbids every script but these.
+std::string PageHead(const std::string& title, PageScripts scripts);
 
 /// "✓ success", with a class that colours it.
 std::string OutcomeBadge(Outcome outcome);
+/// A pill with one word, "yes", "not decided", "worse", coloured by what it says; nothing for an empty word.
+std::string Tag(const std::string& word);
+/// What a world's markers look like: its icon and name.
+std::string WorldKey(std::size_t index, const std::string& world);
 /// The relative link of a file of the run, ready for an attribute.
 std::string FileLink(const std::string& file, const PageOptions& options);
 /// "width / height" of one frame of a task's videos, for CSS; empty if the task names no cameras.
 std::string AspectRatio(const RunSummary& summary, const std::string& task);
-/// Ids of an episode's clip and of a pair.
+/// Where an episode's clip is opened: "clip-…".
 std::string ClipId(const Episode& episode);
-std::string PairId(const PairKey& pair, const std::string& world);
+/// The value of data-show: a click shows the clips of these (page/clips.js).
+std::string ShowClips(const std::string& task, const std::string& policy, const std::string& world);
 
 }  // namespace evac

@@ -91,29 +91,6 @@ std::string Judges(const RunSummary& summary) {
   return html;
 }
 
-std::string Methods(const RunSummary& summary) {
-  const double confidence = 100 * summary.options.confidence;
-  std::string html = fmt::format(
-      "<p>Rates: Wilson score interval, {:.0f} %, on the effective number of trials where an initial state was tried "
-      "with several seeds.</p>",
-      confidence);
-  for (const WorldComparison& comparison : summary.comparisons) {
-    html += fmt::format(
-        "<p>{} against {}: Pearson, Spearman and MMRV ({}) over {}; {:.0f} % intervals by {}.</p>",
-        Escaped(comparison.other), Escaped(comparison.real), Escaped(Name(comparison.correlation.options.convention)),
-        Counted(comparison.correlation.pearson.n, "point"), confidence, Escaped(comparison.correlation.pearson.method));
-  }
-  html += fmt::format(
-      "<p>Pairs share task, initial state, policy, checkpoint and seed. McNemar’s test is exact and two-sided; decided "
-      "below p = {}; not corrected for the number of tests.</p>",
-      kAlpha);
-  html += fmt::format(
-      "<p>“Follows closely” means that the whole interval of Pearson lies above {}; “in direction”, above 0. Fewer "
-      "than {} points give no correlation.</p>",
-      kCloseCorrelation, kMinCorrelationPoints);
-  return html;
-}
-
 std::string Exclusions(const RunSummary& summary) {
   std::string html;
   for (const Outcome outcome : {Outcome::kError, Outcome::kCannotTell, Outcome::kInvalid, Outcome::kUnjudged}) {
@@ -144,9 +121,9 @@ std::string ProvenancePart(const RunSummary& summary, const PageOptions& options
   html += Row("Suite", "SHA-256 " + Code(run.suite_hash) + Folded("The effective suite", run.suite_text));
   html +=
       Row("Versions", fmt::format("run by evac {}, page by {}", Escaped(run.evac_version), Escaped(options.program)));
-  html += Row("Worlds", Worlds(summary)) + Row("Tasks", Tasks(summary)) + Row("Policies", Policies(summary)) + Row("Policy latency", Latency(summary)) +
-          Row("Judges", Judges(summary));
-  html += Row("Methods", Methods(summary)) + Row("Not counted", Exclusions(summary));
+  html += Row("Worlds", Worlds(summary)) + Row("Tasks", Tasks(summary)) + Row("Policies", Policies(summary)) +
+          Row("Policy latency", Latency(summary)) + Row("Judges", Judges(summary));
+  html += Row("Not counted", Exclusions(summary));
   return html +
          "</dl><p class=\"quiet\">The same numbers for programs: <code>report.json</code> beside this "
          "page.</p></section>";

@@ -34,11 +34,13 @@ std::string Row(const RunSummary& summary, const RateCell& cell) {
   const std::int64_t successes = cell.Of(Outcome::kSuccess), n = successes + cell.Of(Outcome::kFailure);
   const std::string apart = ApartWords(cell);
   return fmt::format(
-      "<tr><th scope=\"row\">{}{}</th><td class=\"plot\">{}</td><td class=\"num\">{}/{}</td><td class=\"num "
-      "rate\">{}{}</td>"
+      "<tr><th scope=\"row\">{}{}</th><td class=\"plot\">{}</td><td class=\"num\"><a href=\"#clips\" "
+      "data-show=\"{}\">{}/{}</a></td><td "
+      "class=\"num rate\">{}{}</td>"
       "<td class=\"apart\">{}</td></tr>",
-      MarkerIcon(world == 0 ? 0 : 3 + (world - 1), fmt::format("dot w{}", world % 4)), Escaped(cell.world),
-      RateStrip(cell.rate, world), successes, n, n == 0 ? "undefined: no verdict" : PercentWithInterval(cell.rate),
+      MarkerIcon(WorldShape(world), fmt::format("dot w{}", world % 4)), Escaped(cell.world),
+      RateStrip(cell.rate, world), ShowClips(cell.task, cell.policy, cell.world), successes, n,
+      n == 0 ? "undefined: no verdict" : PercentWithInterval(cell.rate),
       apart.empty() ? "" : "<small class=\"aside\">" + apart + "</small>",
       apart.empty() ? "<span class=\"none\">–</span>" : apart);
 }

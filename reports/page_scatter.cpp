@@ -10,18 +10,6 @@
 namespace evac {
 namespace {
 
-std::vector<PointStyle> StylesOf(const RunSummary& summary, const WorldComparison& comparison) {
-  std::vector<PointStyle> styles;
-  for (const ComparedPoint& point : comparison.points) {
-    PointStyle style;
-    style.policy = static_cast<std::size_t>(std::find(summary.policies.begin(), summary.policies.end(), point.policy) -
-                                            summary.policies.begin());
-    while (style.task < summary.data.tasks.size() && summary.data.tasks[style.task].id != point.task) ++style.task;
-    styles.push_back(style);
-  }
-  return styles;
-}
-
 std::string StatisticRow(const std::string& name, const Estimate& estimate, const std::string& remark) {
   const std::string value = estimate.value ? Plain(*estimate.value) : "undefined";
   std::string interval = "–";
@@ -105,7 +93,8 @@ std::string PointsTable(const WorldComparison& comparison, const std::vector<Poi
 std::string ByTaskTable(const WorldComparison& comparison) {
   if (comparison.by_task.empty()) return "";
   std::string html =
-      "<table class=\"stats\"><caption class=\"sr\">Within each task</caption><thead><tr><th scope=\"col\">within a "
+      "<div class=\"wide\"><table class=\"stats\"><caption class=\"sr\">Within each task</caption><thead><tr><th "
+      "scope=\"col\">within a "
       "task</th>"
       "<th scope=\"col\" class=\"num\">Pearson</th><th scope=\"col\" class=\"num\">Spearman</th><th scope=\"col\" "
       "class=\"num\">MMRV</th></tr></thead><tbody>";
@@ -114,7 +103,7 @@ std::string ByTaskTable(const WorldComparison& comparison) {
                         Counted(static_cast<std::int64_t>(group.points.size()), "point"));
     html += StackedCell(group.pearson) + StackedCell(group.spearman) + StackedCell(group.mmrv) + "</tr>";
   }
-  return html + "</tbody></table>";
+  return html + "</tbody></table></div>";
 }
 
 std::string LeftOut(const WorldComparison& comparison) {
@@ -142,6 +131,18 @@ std::string OneComparison(const RunSummary& summary, const WorldComparison& comp
 }
 
 }  // namespace
+
+std::vector<PointStyle> StylesOf(const RunSummary& summary, const WorldComparison& comparison) {
+  std::vector<PointStyle> styles;
+  for (const ComparedPoint& point : comparison.points) {
+    PointStyle style;
+    style.policy = static_cast<std::size_t>(std::find(summary.policies.begin(), summary.policies.end(), point.policy) -
+                                            summary.policies.begin());
+    while (style.task < summary.data.tasks.size() && summary.data.tasks[style.task].id != point.task) ++style.task;
+    styles.push_back(style);
+  }
+  return styles;
+}
 
 std::string ScatterPart(const RunSummary& summary) {
   std::string html = "<section id=\"worlds\"><h2>Worlds compared</h2>";

@@ -14,6 +14,11 @@
 namespace evac {
 
 std::vector<ReportFile> ReportFiles(const RunSummary& summary, const PageOptions& options) {
+  return ReportFiles(ReportDataOf(summary), options);
+}
+
+std::vector<ReportFile> ReportFiles(const ReportData& report, const PageOptions& options) {
+  const RunSummary& summary = report.summary;
   std::vector<ShownGate> gates;
   if (!summary.data.gates.empty()) gates = LastGates(summary.data.gates, DataHash(summary.data));
   return {{"report.json", ReportJson(summary, options.program)},
@@ -24,7 +29,7 @@ std::vector<ReportFile> ReportFiles(const RunSummary& summary, const PageOptions
           {"badge.svg", BadgeSvg(summary, gates)},
           {"rates.csv", RatesCsv(summary)},
           {"verdicts.csv", VerdictsCsv(summary)},
-          {"index.html", ReportPage(summary, options)}};
+          {"index.html", ReportPage(report, options)}};
 }
 
 std::vector<ReportFile> GateFiles(const RunSummary& summary, const GateDecision& decision) {

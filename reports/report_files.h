@@ -14,8 +14,10 @@ struct ReportFile {
   std::string name, bytes;
 };
 
-/// All that `evac report` writes: index.html, report.json, summary.md, junit.xml, benchmark.json, eval_info.json, badge.svg,
-/// rates.csv, verdicts.csv (docs/formats has a page for each). A pure function of the run: the same store, the same bytes.
+/// All that `evac report` writes: index.html, report.json, summary.md, junit.xml, benchmark.json, eval_info.json,
+/// badge.svg, rates.csv, verdicts.csv (docs/formats has a page for each). A pure function of the run: the same store,
+/// the same bytes.
+std::vector<ReportFile> ReportFiles(const ReportData& report, const PageOptions& options);
 std::vector<ReportFile> ReportFiles(const RunSummary& summary, const PageOptions& options);
 
 /// What `evac gate --out` writes: gate.json, junit.xml, summary.md, badge.svg, of this decision alone.

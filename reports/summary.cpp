@@ -1,8 +1,10 @@
 #include "reports/summary.h"
 
 #include <algorithm>
+#include <map>
 #include <set>
 
+#include "core/config.h"
 #include "core/error.h"
 
 namespace evac {
@@ -27,6 +29,20 @@ std::vector<std::string> JudgesOf(const RunData& data) {
     for (const auto& [judge, verdict] : verdicts) names.insert(judge);
   }
   return {names.begin(), names.end()};
+}
+
+/// Stores list policies by name; a suite names them in an order that means something (oldest first, say). Those that it
+/// does not name come last. A suite that cannot be read changes nothing.
+void OrderAsInSuite(RunData& data) try {
+  std::map<std::pair<std::string, std::string>, std::size_t> places;
+  for (const Config& policy : Config::FromText(data.run.suite_text, "suite").List("policies"))
+    places.try_emplace({policy.Get<std::string>("name", ""), policy.Get<std::string>("checkpoint", "")}, places.size());
+  const auto place = [&places](const PolicyInfo& policy) {
+    const auto found = places.find({policy.name, policy.checkpoint});
+    return found == places.end() ? places.size() : found->second;
+  };
+  std::ranges::stable_sort(data.policies, {}, place);
+} catch (const Error&) {
 }
 
 /// In the order declared; a policy that was never declared comes last.
@@ -95,8 +111,9 @@ std::vector<WorldComparison> ComparisonsOf(const RunSummary& summary) {
 }  // namespace
 
 RunData ReadRun(const Store& store) {
-  return {store.run(),      store.Tasks(),           store.Worlds(),          store.Policies(),
-          store.Episodes(), store.CurrentVerdicts(), store.CountersByPolicy(), store.GateRecords()};
+  return {store.run(),        store.Tasks(),           store.Worlds(),           store.Policies(),
+          store.Episodes(),   store.CurrentVerdicts(), store.CountersByPolicy(), store.RealTrials(),
+          store.GateRecords()};
 }
 
 std::int64_t RateCell::Apart() const {
@@ -113,6 +130,7 @@ RunSummary Summarise(RunData data, const SummaryOptions& options) {
     throw InvalidInput("confidence is {}, wanted a number between 0 and 1", options.confidence);
   if (options.bootstrap_replicates < 1)
     throw InvalidInput("bootstrap replicates are {}, wanted 1 or more", options.bootstrap_replicates);
+  OrderAsInSuite(data);
   RunSummary summary;
   summary.options = options;
   summary.judges = JudgesOf(data);

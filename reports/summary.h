@@ -25,6 +25,7 @@ struct RunData {
   std::vector<Episode> episodes;                                   ///< in pair-key order, then world
   std::map<std::string, std::map<std::string, Verdict>> verdicts;  ///< the current one per (episode id, judge)
   std::map<std::string, Counters> counters;                        ///< per policy
+  std::vector<RealTrial> real_trials = {};                         ///< imported ones, in the order they were added
   std::vector<GateRecord> gates;                                   ///< what gates decided, oldest first
 };
 RunData ReadRun(const Store& store);

@@ -28,7 +28,8 @@ std::string PointsWithInterval(const Estimate& difference) {
   const auto points = [](double share) { return fmt::format("{:.0f}", std::round(100 * share) + 0.0); };
   if (!difference.value) return "undefined: " + difference.value.reason();
   const double value = std::round(100 * *difference.value);
-  const std::string text = value == 0 ? "0 points" : fmt::format("{:+.0f} points", value);
+  const std::string text =
+      value == 0 ? "0 points" : fmt::format("{:+.0f} {}", value, std::abs(value) == 1 ? "point" : "points");
   if (!difference.interval) return text + " (interval undefined: " + difference.interval.reason() + ")";
   return fmt::format("{} [{}, {}]", text, points(difference.interval->low), points(difference.interval->high));
 }

@@ -1,0 +1,134 @@
+#include "reports/checkpoints.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <charconv>
+#include <map>
+
+#include "reports/wording.h"
+
+namespace evac {
+namespace {
+
+/// Checkpoints by policy name, both in the order declared.
+std::vector<std::pair<std::string, std::vector<std::string>>> FamiliesOf(const RunSummary& summary) {
+  std::vector<std::pair<std::string, std::vector<std::string>>> families;
+  for (const PolicyInfo& policy : summary.data.policies) {
+    auto family = std::ranges::find(families, policy.name, [](const auto& entry) { return entry.first; });
+    if (family == families.end()) family = families.insert(families.end(), {policy.name, {}});
+    family->second.push_back(policy.checkpoint);
+  }
+  std::erase_if(families, [](const auto& family) { return family.second.size() < 2; });
+  return families;
+}
+
+std::vector<CheckpointPoint> PointsInOrder(const std::vector<std::string>& checkpoints, bool& has_steps) {
+  has_steps = std::ranges::all_of(checkpoints, [](const std::string& name) { return StepOf(name).has_value(); });
+  std::vector<CheckpointPoint> points;
+  for (const std::string& checkpoint : checkpoints) {
+    points.push_back({checkpoint, has_steps ? *StepOf(checkpoint) : static_cast<double>(points.size()), {}});
+  }
+  std::ranges::stable_sort(points, {}, &CheckpointPoint::step);
+  return points;
+}
+
+std::vector<std::string> WorldsWithReal(const RunSummary& summary) {
+  std::vector<std::string> worlds;
+  for (const WorldInfo& world : summary.data.worlds) worlds.push_back(world.name);
+  std::ranges::stable_partition(worlds, [&](const std::string& world) { return world == summary.reference; });
+  return worlds;
+}
+
+ComparedPolicy EpisodesOf(const RunSummary& summary, const CheckpointCurve& curve, const std::string& checkpoint,
+                          const std::string& world) {
+  ComparedPolicy policy{PolicyLabel(curve.policy, checkpoint), {}};
+  for (const JudgedEpisode& judged : summary.episodes) {
+    const auto& [pair, in_world] = judged.episode.key;
+    if (in_world == world && pair.task == curve.task && pair.policy == curve.policy && pair.checkpoint == checkpoint)
+      policy.episodes.push_back(judged);
+  }
+  return policy;
+}
+
+void AddRates(const RunSummary& summary, CheckpointCurve& curve) {
+  for (CheckpointPoint& point : curve.points) {
+    const std::string label = PolicyLabel(curve.policy, point.checkpoint);
+    for (const std::string& world : curve.worlds) {
+      const auto cell = std::ranges::find_if(summary.rates, [&](const RateCell& rate) {
+        return rate.task == curve.task && rate.policy == label && rate.world == world;
+      });
+      Estimate none;
+      none.value = Undefined{"no episode"};
+      point.rate.push_back(cell == summary.rates.end() ? none : cell->rate);
+    }
+  }
+}
+
+void AddEnds(const RunSummary& summary, CheckpointCurve& curve) {
+  for (const std::string& world : curve.worlds) {
+    const ComparedPolicy last = EpisodesOf(summary, curve, curve.points.back().checkpoint, world);
+    const ComparedPolicy first = EpisodesOf(summary, curve, curve.points.front().checkpoint, world);
+    if (last.episodes.empty() || first.episodes.empty()) {
+      curve.ends.emplace_back();
+    } else {
+      curve.ends.emplace_back(ComparePolicies(last, first, {.alpha = 1 - summary.options.confidence}));
+    }
+  }
+}
+
+int Rises(const CheckpointCurve& curve, std::size_t world) {
+  int rises = 0;
+  for (std::size_t i = 1; i < curve.points.size(); ++i) {
+    const Number& before = curve.points[i - 1].rate[world].value;
+    const Number& after = curve.points[i].rate[world].value;
+    rises += before && after && *after > *before;
+  }
+  return rises;
+}
+
+}  // namespace
+
+std::optional<double> StepOf(const std::string& checkpoint) {
+  std::size_t end = checkpoint.size();
+  double unit = 1;
+  if (end > 0 && (checkpoint[end - 1] == 'k' || checkpoint[end - 1] == 'M')) {
+    unit = checkpoint[end - 1] == 'k' ? 1e3 : 1e6;
+    --end;
+  }
+  std::size_t begin = end;
+  while (begin > 0 && checkpoint[begin - 1] >= '0' && checkpoint[begin - 1] <= '9') --begin;
+  double step = 0;
+  const auto [stop, error] = std::from_chars(checkpoint.data() + begin, checkpoint.data() + end, step);
+  if (begin == end || error != std::errc() || stop != checkpoint.data() + end) return std::nullopt;
+  return step * unit;
+}
+
+std::vector<CheckpointCurve> CheckpointsOf(const RunSummary& summary) {
+  std::vector<CheckpointCurve> curves;
+  for (const auto& [policy, checkpoints] : FamiliesOf(summary)) {
+    for (const Task& task : summary.data.tasks) {
+      CheckpointCurve curve{task.id, policy, false, WorldsWithReal(summary), {}, {}};
+      curve.points = PointsInOrder(checkpoints, curve.has_steps);
+      AddRates(summary, curve);
+      AddEnds(summary, curve);
+      curves.push_back(std::move(curve));
+    }
+  }
+  return curves;
+}
+
+std::string TrendInWords(const CheckpointCurve& curve, std::size_t world) {
+  const std::string lead = fmt::format("In {}, from {} to {}", curve.worlds[world], curve.points.front().checkpoint,
+                                       curve.points.back().checkpoint);
+  if (!curve.ends[world]) return lead + ": no episodes of both.";
+  const ComparisonRow& row = curve.ends[world]->all;
+  if (!row.first.value || !row.second.value || !row.difference.interval || !row.p)
+    return lead + ": no episodes of both count.";
+  return fmt::format("{}: {} → {}, {} ({}, {}, {}); {} of {} rise.", lead, Percent(*row.second.value),
+                     Percent(*row.first.value), PointsWithInterval(row.difference), row.test, PValue(*row.p),
+                     row.is_paired ? Counted(row.shared, "pair") : "unpaired", Rises(curve, world),
+                     Counted(static_cast<std::int64_t>(curve.points.size()) - 1, "step"));
+}
+
+}  // namespace evac

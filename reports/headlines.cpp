@@ -1,0 +1,218 @@
+#include "reports/headlines.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "reports/wording.h"
+
+namespace evac {
+namespace {
+
+constexpr std::size_t kMostItems = 5;
+
+bool IsDecided(const Number& p) { return p && *p < kAlpha; }
+
+std::string TagOf(const Estimate& difference, const Number& p) {
+  if (!IsDecided(p) || !difference.value || *difference.value == 0) return "not decided";
+  return *difference.value < 0 ? "worse" : "better";
+}
+
+/// What gates decided: they were asked this very question.
+std::vector<HeadlineItem> GateItems(const ReportData& report) {
+  std::vector<HeadlineItem> items;
+  for (const ShownGate& gate : report.gates) {
+    std::string text = fmt::format("gate {}{}", gate.decision.name, gate.is_current ? "" : " (of older data)");
+    for (const RuleDecision& rule : gate.decision.rules) {
+      if (rule.outcome != gate.decision.outcome) continue;
+      text += ": " + rule.statement;
+      break;
+    }
+    items.push_back({Name(gate.decision.outcome), text, "#gates"});
+  }
+  return items;
+}
+
+Headline Worse(const ReportData& report) {
+  Headline headline;
+  headline.items = GateItems(report);
+  if (report.candidates.empty()) {
+    headline.question = "Is the candidate worse?";
+    if (headline.items.empty())
+      headline.items = {{"", "The run has one policy: nothing to compare it with. Its rates are below.", "#rates"}};
+    return headline;
+  }
+  headline.question = report.candidates.size() == 1
+                          ? fmt::format("Is {} worse than {}?", report.candidates[0].comparison.first, report.baseline)
+                          : fmt::format("Is any policy worse than {}?", report.baseline);
+  for (const Candidate& candidate : report.candidates) {
+    const ComparisonRow& all = candidate.comparison.all;
+    std::string text = candidate.comparison.first;
+    if (all.first.value && all.second.value && candidate.p_holm) {
+      text += fmt::format(": {} against {}, {} ({}, {})", Percent(*all.first.value), Percent(*all.second.value),
+                          PointsWithInterval(all.difference),
+                          Counted(all.is_paired ? all.shared : all.first_episodes, all.is_paired ? "pair" : "episode"),
+                          PValue(*candidate.p_holm));
+    } else {
+      text += ": no episode of both is judged";
+    }
+    headline.items.push_back({TagOf(all.difference, candidate.p_holm), text, "#rates"});
+  }
+  return headline;
+}
+
+/// "visual_pick@fair -45 points [-62, -25]" of the candidates that differ at this task.
+HeadlineItem LossesAt(const ReportData& report, const std::string& task) {
+  HeadlineItem item{"", "", "#rates"};
+  int worse = 0, better = 0;
+  for (const Candidate& candidate : report.candidates) {
+    for (const ComparisonRow& row : candidate.comparison.tasks) {
+      if (row.task != task || !IsDecided(row.p_holm) || !row.difference.value) continue;
+      ++(*row.difference.value < 0 ? worse : better);
+      item.text += fmt::format("{}{} {}", item.text.empty() ? task + ": " : "; ", candidate.comparison.first,
+                               PointsWithInterval(row.difference));
+    }
+  }
+  if (worse + better > 0) item.tag = better == 0 ? "worse" : worse == 0 ? "better" : "both ways";
+  return item;
+}
+
+Headline Where(const ReportData& report) {
+  Headline headline{"Where?", {}};
+  std::string undecided;
+  for (const Task& task : report.summary.data.tasks) {
+    if (report.candidates.empty()) break;
+    HeadlineItem item = LossesAt(report, task.id);
+    if (item.text.empty()) {
+      undecided += (undecided.empty() ? "" : ", ") + task.id;
+    } else if (headline.items.size() < kMostItems) {
+      headline.items.push_back(std::move(item));
+    }
+  }
+  if (!undecided.empty())
+    headline.items.push_back({"not decided", undecided + ": no difference that these episodes can show", "#rates"});
+  if (headline.items.empty()) headline.items.push_back({"", "The rates per task stand below.", "#rates"});
+  return headline;
+}
+
+HeadlineItem TrustItem(const TaskTrust& task, const TrustReport& trust, bool name_world) {
+  std::string text = name_world ? fmt::format("{}, {}", trust.world, task.task) : task.task;
+  if (task.pairs.n() == 0) return {Name(task.trust), text + ": no initial state was tried in both worlds", "#trust"};
+  text += fmt::format(": {} against {} real, bias {}, {}", Percent(*task.model.value), Percent(*task.real.value),
+                      PointsWithInterval(task.bias), Counted(task.pairs.n(), "pair"));
+  return {Name(task.trust), text, "#trust"};
+}
+
+Headline Trusted(const ReportData& report) {
+  Headline headline;
+  if (report.trust.empty()) {
+    headline.question = "Can I trust the world model?";
+    headline.items = {{"unknown", report.no_trust, ""}};
+    return headline;
+  }
+  const bool one = report.trust.size() == 1;
+  headline.question =
+      fmt::format("Can I trust {} to within ±{:.0f} points?", one ? report.trust[0].world : "the other worlds",
+                  100 * report.trust[0].options.margin);
+  std::size_t left_out = 0;
+  for (const TrustReport& trust : report.trust) {
+    for (const TaskTrust& task : trust.tasks) {
+      if (headline.items.size() < 2 * kMostItems) {
+        headline.items.push_back(TrustItem(task, trust, !one));
+      } else {
+        ++left_out;
+      }
+    }
+  }
+  if (left_out > 0)
+    headline.items.push_back({"", Counted(static_cast<std::int64_t>(left_out), "further task") + " below", "#trust"});
+  if (headline.items.empty()) headline.items.push_back({"unknown", "no task was tried in both worlds", "#trust"});
+  return headline;
+}
+
+void AddMissing(const RunSummary& summary, std::vector<HeadlineItem>& items) {
+  if (const auto unjudged = summary.Count(Outcome::kUnjudged); unjudged > 0) {
+    items.push_back({"",
+                     fmt::format("{} not judged yet: evac judge RUN --judge {}",
+                                 Counted(unjudged, "episode is", "episodes are"), summary.options.judge),
+                     "#clips"});
+  }
+  if (const auto errors = summary.Count(Outcome::kError); errors > 0)
+    items.push_back({"", Counted(errors, "episode") + " stopped with an error: look at the reasons", "#errors"});
+}
+
+/// The stage with the most one-sided flips that the tests decide on.
+void AddStage(const ReportData& report, std::vector<HeadlineItem>& items) {
+  const StageParting* worst = nullptr;
+  const auto lean = [](const StageParting& parting) {
+    return std::abs(parting.flips.only_first - parting.flips.only_second);
+  };
+  for (const StageParting& parting : report.stages.partings) {
+    if (IsDecided(parting.p_holm) && (worst == nullptr || lean(parting) > lean(*worst))) worst = &parting;
+  }
+  if (worst == nullptr) return;
+  items.push_back(
+      {"",
+       fmt::format("Look at {} in {}: {} episodes went on in {} alone, {} in {} alone", worst->stage, worst->task,
+                   worst->flips.only_first, worst->world, worst->flips.only_second, report.summary.reference),
+       "#stages"});
+}
+
+void AddMorePairs(const ReportData& report, std::vector<HeadlineItem>& items) {
+  for (const TrustReport& trust : report.trust) {
+    const TaskTrust* nearest = nullptr;
+    for (const TaskTrust& task : trust.tasks) {
+      if (task.trust == Trust::kUnknown && task.more && (nearest == nullptr || *task.more < *nearest->more))
+        nearest = &task;
+    }
+    if (nearest == nullptr) continue;
+    items.push_back({"",
+                     fmt::format("About {} would decide whether {} may be trusted at {}",
+                                 Counted(*nearest->more, "more pair"), trust.world, nearest->task),
+                     "#trust"});
+  }
+  for (const Candidate& candidate : report.candidates) {
+    const ComparisonRow& all = candidate.comparison.all;
+    if (IsDecided(candidate.p_holm) || !all.more) continue;
+    items.push_back({"",
+                     fmt::format("About {} would decide on {}",
+                                 Counted(*all.more, all.is_paired ? "more pair" : "more episode per policy",
+                                         all.is_paired ? "" : "more episodes per policy"),
+                                 candidate.comparison.first),
+                     "#rates"});
+  }
+}
+
+void AddFlips(const RunSummary& summary, std::vector<HeadlineItem>& items) {
+  for (const WorldComparison& comparison : summary.comparisons) {
+    std::int64_t flips = 0, counted = 0;
+    for (const PairTable& table : comparison.tables) {
+      flips += table.real_only + table.other_only;
+      counted += table.Counted();
+    }
+    if (flips == 0) continue;
+    items.push_back({"",
+                     fmt::format("Watch the {} of {} and {} ({} compared)", Counted(flips, "flip"), comparison.other,
+                                 comparison.real, Counted(counted, "pair")),
+                     "#states"});
+  }
+}
+
+Headline Next(const ReportData& report) {
+  Headline headline{"What next?", {}};
+  AddMissing(report.summary, headline.items);
+  AddStage(report, headline.items);
+  AddMorePairs(report, headline.items);
+  AddFlips(report.summary, headline.items);
+  if (headline.items.size() > kMostItems) headline.items.resize(kMostItems);
+  if (headline.items.empty()) headline.items.push_back({"", "Nothing is left open by this run.", ""});
+  return headline;
+}
+
+}  // namespace
+
+std::vector<Headline> HeadlinesOf(const ReportData& report) {
+  return {Worse(report), Where(report), Trusted(report), Next(report)};
+}
+
+}  // namespace evac

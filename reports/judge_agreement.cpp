@@ -1,0 +1,106 @@
+#include "reports/judge_agreement.h"
+
+#include <algorithm>
+#include <map>
+#include <optional>
+
+#include "core/statistics/rater_agreement.h"
+
+namespace evac {
+namespace {
+
+bool Says(const std::vector<std::string>& judges, const std::string& name) {
+  return std::ranges::find(judges, name) != judges.end();
+}
+
+/// People before the simulator's physics, that before any other.
+std::string TruthOf(const RunSummary& summary) {
+  for (const char* name : {"human", "oracle"}) {
+    if (Says(summary.judges, name)) return name;
+  }
+  return summary.options.judge;
+}
+
+bool Decides(const Verdict& verdict) { return verdict.label == Label::kSuccess || verdict.label == Label::kFailure; }
+
+struct Probabilities {
+  std::vector<double> stated;
+  std::vector<int> outcomes;
+};
+
+void Count(const Verdict& verdict, const Verdict& truth, JudgeAgreement& agreement, Probabilities& probabilities) {
+  if (!Decides(verdict) || !Decides(truth)) {
+    ++agreement.apart;
+    return;
+  }
+  const bool said = verdict.label == Label::kSuccess, is = truth.label == Label::kSuccess;
+  agreement.confusion.both_success += said && is;
+  agreement.confusion.only_judge_success += said && !is;
+  agreement.confusion.only_human_success += !said && is;
+  agreement.confusion.both_failure += !said && !is;
+  if (!verdict.probability) return;
+  probabilities.stated.push_back(*verdict.probability);
+  probabilities.outcomes.push_back(is ? 1 : 0);
+}
+
+JudgeAgreement AgreementOf(const RunSummary& summary, const std::string& judge, const std::string& truth,
+                           const std::string& world) {
+  JudgeAgreement agreement;
+  agreement.judge = judge;
+  agreement.against = truth;
+  agreement.world = world;
+  Probabilities probabilities;
+  for (const Episode& episode : summary.data.episodes) {
+    if (episode.key.world != world) continue;
+    const auto verdicts = summary.data.verdicts.find(episode.key.Id());
+    if (verdicts == summary.data.verdicts.end()) continue;
+    const auto own = verdicts->second.find(judge), true_one = verdicts->second.find(truth);
+    if (own == verdicts->second.end()) continue;
+    ++agreement.judged;
+    if (true_one != verdicts->second.end()) Count(own->second, true_one->second, agreement, probabilities);
+  }
+  agreement.with_probability = static_cast<std::int64_t>(probabilities.stated.size());
+  agreement.statistics = StatisticsOf(agreement.confusion, summary.options.confidence);
+  if (!probabilities.stated.empty())
+    agreement.calibration = CalibrationOf(probabilities.stated, probabilities.outcomes);
+  return agreement;
+}
+
+/// Raters by episodes; 1 success, 0 failure, nothing where a rater was not asked or could not tell.
+void AddRaters(const RunSummary& summary, JudgeReport& report) {
+  for (const std::string& judge : summary.judges) {
+    if (judge.starts_with("human:")) report.raters.push_back(judge);
+  }
+  if (report.raters.size() < 2) return;
+  std::vector<std::vector<std::optional<double>>> ratings(report.raters.size());
+  for (const auto& [episode, verdicts] : summary.data.verdicts) {
+    std::int64_t given = 0;
+    for (std::size_t rater = 0; rater < report.raters.size(); ++rater) {
+      const auto own = verdicts.find(report.raters[rater]);
+      const bool decides = own != verdicts.end() && Decides(own->second);
+      ratings[rater].push_back(decides ? std::optional(own->second.label == Label::kSuccess ? 1.0 : 0.0)
+                                       : std::nullopt);
+      given += decides;
+    }
+    report.rated_twice += given >= 2;
+  }
+  report.alpha = KrippendorffAlpha(ratings, RatingMetric::kNominal);
+}
+
+}  // namespace
+
+JudgeReport JudgesOf(const RunSummary& summary) {
+  JudgeReport report;
+  report.truth = TruthOf(summary);
+  for (const std::string& judge : summary.judges) {
+    if (judge == report.truth) continue;
+    for (const WorldInfo& world : summary.data.worlds) {
+      JudgeAgreement agreement = AgreementOf(summary, judge, report.truth, world.name);
+      if (agreement.judged > 0) report.judges.push_back(std::move(agreement));
+    }
+  }
+  AddRaters(summary, report);
+  return report;
+}
+
+}  // namespace evac

@@ -1,0 +1,37 @@
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "core/statistics/confusion.h"
+#include "core/statistics/estimate.h"
+#include "reports/summary.h"
+
+/// How far each judge may be believed: against the best judge there is, in each world, since a judge that reads real
+/// videos well may misread imagined ones (statistics.md 3.3).
+namespace evac {
+
+/// One judge in one world.
+struct JudgeAgreement {
+  std::string judge, against, world;
+  Confusion confusion;      ///< episodes that both called success or failure
+  std::int64_t apart = 0;   ///< that both judged, and one of them called neither
+  std::int64_t judged = 0;  ///< verdicts of the judge in this world
+  ConfusionStatistics statistics;
+  Calibration calibration;  ///< of its probabilities of success, where it gives any
+  std::int64_t with_probability = 0;
+  bool IsCalibrated() const { return confusion.total() > 0; }
+};
+
+struct JudgeReport {
+  std::string truth;                   ///< "human" where people judged, else "oracle", else the judge that is counted
+  std::vector<JudgeAgreement> judges;  ///< every judge but the truth, by judge and world; those that spoke there
+  std::vector<std::string> raters;     ///< "human:anna", …
+  Number alpha = Undefined{"fewer than two human raters"};  ///< Krippendorff's, nominal, over the raters
+  std::int64_t rated_twice = 0;                             ///< episodes that two or more raters judged
+};
+
+JudgeReport JudgesOf(const RunSummary& summary);
+
+}  // namespace evac

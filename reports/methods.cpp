@@ -1,0 +1,127 @@
+#include "reports/methods.h"
+
+#include <fmt/format.h>
+
+#include <set>
+
+#include "reports/wording.h"
+
+namespace evac {
+namespace {
+
+std::int64_t Size(std::size_t size) { return static_cast<std::int64_t>(size); }
+
+std::string Joined(const std::set<std::string>& parts) {
+  std::string text;
+  for (const std::string& part : parts) text += (text.empty() ? "" : "; ") + part;
+  return text;
+}
+
+std::string What(const ReportData& report) {
+  const RunSummary& summary = report.summary;
+  std::set<std::pair<std::string, std::string>> states;
+  std::set<std::uint64_t> seeds;
+  for (const JudgedEpisode& judged : summary.episodes) {
+    states.insert({judged.episode.key.pair.task, judged.episode.key.pair.initial_state});
+    seeds.insert(judged.episode.key.pair.seed);
+  }
+  std::string worlds;
+  for (const WorldInfo& world : summary.data.worlds)
+    worlds += (worlds.empty() ? "" : ", ") + world.name + (world.is_real ? " (the reference)" : "");
+  return fmt::format(
+      "We evaluated {} on {} in {} ({}) from {} with {} each: {} in all, judged by {}{}. ",
+      Counted(Size(summary.policies.size()), "policy", "policies"), Counted(Size(summary.data.tasks.size()), "task"),
+      Counted(Size(summary.data.worlds.size()), "world"), worlds, Counted(Size(states.size()), "initial state"),
+      Counted(Size(seeds.size()), "seed"), Counted(Size(summary.episodes.size()), "episode"), summary.options.judge,
+      summary.options.judge == "oracle" ? ", which reads the simulators’ physics" : "");
+}
+
+std::string Apart(const RunSummary& summary) {
+  std::string apart;
+  for (const Outcome outcome : {Outcome::kError, Outcome::kCannotTell, Outcome::kInvalid, Outcome::kUnjudged}) {
+    if (summary.Count(outcome) > 0)
+      apart += (apart.empty() ? "" : ", ") + CountInWords(outcome, summary.Count(outcome));
+  }
+  return apart.empty() ? "No episode was excluded. " : "Excluded from all rates: " + apart + ". ";
+}
+
+std::string Rates(const RunSummary& summary) {
+  std::set<std::string> methods;
+  for (const RateCell& cell : summary.rates) {
+    if (cell.rate.interval) methods.insert(cell.rate.method);
+  }
+  if (methods.empty()) return "";
+  return fmt::format("Success rates carry {:.0f} % intervals ({}). ", 100 * summary.options.confidence,
+                     Joined(methods));
+}
+
+std::string Policies(const ReportData& report) {
+  if (report.candidates.empty()) return "";
+  std::set<std::string> tests, intervals;
+  bool paired = false;
+  for (const Candidate& candidate : report.candidates) {
+    const ComparisonRow& all = candidate.comparison.all;
+    paired = paired || all.is_paired;
+    if (all.p) tests.insert(all.test);
+    if (all.difference.interval) intervals.insert(all.difference.method);
+    for (const ComparisonRow& row : candidate.comparison.tasks) {
+      if (row.p) tests.insert(row.test);
+      if (row.difference.interval) intervals.insert(row.difference.method);
+    }
+  }
+  if (tests.empty()) return "";
+  return fmt::format(
+      "Policies were compared with {} in {}{} ({}; two-sided), with intervals of the difference by {}; p-values are "
+      "Holm-adjusted over tasks within a comparison and over the {}. ",
+      report.baseline, report.world, paired ? ", paired by initial state and seed" : "", Joined(tests),
+      Joined(intervals), Counted(Size(report.candidates.size()), "comparison"));
+}
+
+std::string Worlds(const ReportData& report) {
+  std::string text;
+  for (const WorldComparison& comparison : report.summary.comparisons) {
+    const CorrelationGroup& group = comparison.correlation;
+    text += fmt::format("{} and {} were compared over {} that share task, initial state, policy, checkpoint and seed",
+                        comparison.other, comparison.real, Counted(comparison.agreement.n, "pair"));
+    text += group.pearson.value
+                ? fmt::format(" by Pearson, Spearman and MMRV ({}) over {} ({}). ", Name(group.options.convention),
+                              Counted(group.pearson.n, "(task, policy) point"), group.pearson.method)
+                : fmt::format("; no correlation is reported ({}). ", group.pearson.value.reason());
+  }
+  for (const TrustReport& trust : report.trust) {
+    text += fmt::format(
+        "{} is trusted on a task where the {:.0f} % interval of its bias against {} (Tango, on effective pairs) lies "
+        "within ±{:.0f} points. ",
+        trust.world, 100 * trust.options.confidence, trust.real, 100 * trust.options.margin);
+  }
+  if (!report.stages.partings.empty()) {
+    text +=
+        "Stages were compared by exact McNemar tests among the pairs that had reached every stage before, "
+        "Holm-adjusted "
+        "over stages and tasks. ";
+  }
+  return text;
+}
+
+std::string Judges(const ReportData& report) {
+  std::int64_t calibrated = 0;
+  for (const JudgeAgreement& judge : report.judges.judges) calibrated += judge.IsCalibrated();
+  if (report.summary.judges.size() < 2) return "No second judge was consulted. ";
+  return fmt::format(
+      "Judges were held against {} per world by Cohen’s kappa with the standard error of Fleiss, Cohen and Everitt "
+      "({}). ",
+      report.judges.truth, Counted(calibrated, "judge and world", "judges and worlds"));
+}
+
+}  // namespace
+
+std::string MethodsParagraph(const ReportData& report) {
+  std::string text =
+      What(report) + Apart(report.summary) + Rates(report.summary) + Policies(report) + Worlds(report) + Judges(report);
+  if (!report.checkpoints.empty())
+    text += "First and last checkpoints were compared like policies, without adjustment for their number. ";
+  text.pop_back();
+  return text;
+}
+
+}  // namespace evac

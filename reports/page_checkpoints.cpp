@@ -1,0 +1,44 @@
+#include <fmt/format.h>
+
+#include "reports/charts.h"
+#include "reports/html.h"
+#include "reports/page_parts.h"
+
+namespace evac {
+namespace {
+
+std::string Curve(const CheckpointCurve& curve) {
+  std::string keys, words;
+  for (std::size_t world = 0; world < curve.worlds.size(); ++world) {
+    keys += WorldKey(world, curve.worlds[world]);
+    words += "<p>" + Escaped(TrendInWords(curve, world)) + "</p>";
+  }
+  return fmt::format(
+      "<figure><figcaption><b>{}</b> <span class=\"keys\">{}</span></figcaption>{}<div "
+      "class=\"quiet\">{}</div></figure>",
+      Breakable(curve.task), keys, InPage(CheckpointDrawing(curve)), words);
+}
+
+}  // namespace
+
+std::string CheckpointsPart(const ReportData& report) {
+  if (report.checkpoints.empty()) return "";
+  std::string html =
+      "<section id=\"checkpoints\"><h2>Checkpoints</h2><p class=\"quiet\">Success rate by checkpoint, Wilson "
+      "intervals. "
+      "The sentence compares the last checkpoint with the first one, on the same initial states.</p>";
+  std::string policy;
+  for (const CheckpointCurve& curve : report.checkpoints) {
+    if (curve.policy != policy) {
+      html += policy.empty() ? "" : "</div>";
+      html += fmt::format("<h3>{}</h3><p class=\"quiet\">{}</p><div class=\"multiples\">", Breakable(curve.policy),
+                          curve.has_steps ? "In the order of the numbers that end their names."
+                                          : "In the order of the suite: not all names end with a number.");
+      policy = curve.policy;
+    }
+    html += Curve(curve);
+  }
+  return html + "</div></section>";
+}
+
+}  // namespace evac

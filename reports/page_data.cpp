@@ -1,0 +1,132 @@
+#include <algorithm>
+
+#include "reports/html.h"
+#include "reports/page_columns.h"
+#include "reports/page_parts.h"
+
+namespace evac {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+/// Of all sentences of a page together: what a page of 5 MB has room for beside the rest.
+constexpr std::size_t kMostTextBytes = 2'400'000;
+
+/// "11100": which stages were reached, in the rubric's order; "" where the verdict does not tell.
+std::string StagesOf(const JudgedEpisode& judged, const Task* task) {
+  std::string reached;
+  if (task == nullptr || !judged.verdict) return reached;
+  for (const Stage& stage : task->rubric.stages) {
+    const auto found = judged.verdict->stages.find(stage.name);
+    if (found == judged.verdict->stages.end()) return "";
+    reached += found->second ? '1' : '0';
+  }
+  return reached;
+}
+
+/// All that the script knows of an episode.
+class EpisodeColumns {
+ public:
+  explicit EpisodeColumns(const RunSummary& summary) : summary_(summary) {
+    for (const Task& task : summary.data.tasks) tasks_by_id_[task.id] = &task;
+    for (const std::string& judge : summary.judges) {
+      if (judge != summary.options.judge) others_.push_back({judge, {}, {}});
+    }
+    for (std::size_t i = 0; i < summary.episodes.size(); ++i) Add(summary.episodes[i], i);
+  }
+
+  Json ToJson() const {
+    Json json = {{"task", task_.Json()},     {"state", state_.Json()},     {"policy", policy_.Json()},
+                 {"seed", seed_.Json()},     {"world", world_.Json()},     {"file", file_.Json()},
+                 {"stages", stages_.Json()}, {"outcome", outcome_.Json()}, {"stop", stop_.Json()}};
+    const std::size_t share = kMostTextBytes / (2 + others_.size());
+    json["reason"] = reason_.Json(share);
+    json["end"] = end_.Json(share);
+    json["other_videos"] = videos_;
+    json["other_thumbnails"] = thumbnails_;
+    json["judges"] = Json::array();
+    for (const Other& other : others_)
+      json["judges"].push_back(
+          {{"name", other.judge}, {"label", other.label.Json()}, {"reason", other.reason.Json(share)}});
+    return json;
+  }
+
+ private:
+  struct Other {
+    std::string judge;
+    Column label;
+    TextColumn reason;
+  };
+
+  void Add(const JudgedEpisode& judged, std::size_t index) {
+    const Episode& episode = judged.episode;
+    const auto& [pair, world] = episode.key;
+    const auto task = tasks_by_id_.find(pair.task);
+    task_.Add(pair.task);
+    state_.Add(pair.initial_state);
+    policy_.Add(PolicyLabel(pair.policy, pair.checkpoint));
+    file_.Add(pair.policy + "@" + pair.checkpoint);
+    seed_.Add(std::to_string(pair.seed));
+    world_.Add(world);
+    outcome_.Add(Name(judged.outcome));
+    stop_.Add(Name(episode.stop));
+    stages_.Add(StagesOf(judged, task == tasks_by_id_.end() ? nullptr : task->second));
+    reason_.Add(!episode.failure.empty() ? episode.failure : judged.verdict ? judged.verdict->reason : "");
+    end_.Add(episode.stop_reason);
+    AddFiles(episode, index);
+    AddOthers(episode);
+  }
+
+  /// Nearly all lie where their id says; the others are named.
+  void AddFiles(const Episode& episode, std::size_t index) {
+    const std::string id = episode.key.Id();
+    if (episode.video != "videos/" + id + ".mp4") videos_[std::to_string(index)] = episode.video;
+    if (episode.thumbnail != "thumbs/" + id + ".jpg") thumbnails_[std::to_string(index)] = episode.thumbnail;
+  }
+
+  void AddOthers(const Episode& episode) {
+    if (others_.empty()) return;
+    const auto verdicts = summary_.data.verdicts.find(episode.key.Id());
+    for (Other& other : others_) {
+      const Verdict* verdict = nullptr;
+      if (verdicts != summary_.data.verdicts.end()) {
+        const auto own = verdicts->second.find(other.judge);
+        if (own != verdicts->second.end()) verdict = &own->second;
+      }
+      other.label.Add(verdict == nullptr ? "" : Name(verdict->label));
+      other.reason.Add(verdict == nullptr ? "" : verdict->reason);
+    }
+  }
+
+  const RunSummary& summary_;
+  std::map<std::string, const Task*> tasks_by_id_;
+  Column task_, state_, policy_, file_, seed_, world_, outcome_, stop_, stages_;
+  TextColumn reason_, end_;
+  std::vector<Other> others_;
+  Json videos_ = Json::object(), thumbnails_ = Json::object();  // by the episode's number
+};
+
+Json TasksJson(const RunSummary& summary) {
+  Json tasks = Json::object();
+  for (const Task& task : summary.data.tasks) {
+    Json stages = Json::array();
+    for (const Stage& stage : task.rubric.stages) stages.push_back(stage.name);
+    tasks[task.id] = {{"ratio", AspectRatio(summary, task.id)}, {"period_s", task.period_s}, {"stages", stages}};
+  }
+  return tasks;
+}
+
+}  // namespace
+
+std::string DataPart(const RunSummary& summary, const PageOptions& options) {
+  const bool beside = options.run_folder.empty() || options.run_folder == ".";
+  Json json = {{"run", beside ? "" : Link(options.run_folder + "/")},
+               {"real", summary.reference},
+               {"judge", summary.options.judge},
+               {"n", summary.episodes.size()}};
+  json["tasks"] = TasksJson(summary);
+  json["episodes"] = EpisodeColumns(summary).ToJson();
+  return "<script type=\"application/json\" id=\"run-data\">" + ForScript(json) + "</script>";
+}
+
+}  // namespace evac

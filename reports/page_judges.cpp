@@ -1,0 +1,78 @@
+#include <fmt/format.h>
+
+#include "reports/html.h"
+#include "reports/page_parts.h"
+#include "reports/wording.h"
+
+namespace evac {
+namespace {
+
+std::string NumberCell(const Number& number) {
+  return number ? fmt::format("<td class=\"num\">{}</td>", Plain(*number))
+                : fmt::format("<td class=\"num\" title=\"{}\">–</td>", Escaped(number.reason()));
+}
+
+std::string ConfusionCell(const Confusion& confusion) {
+  return fmt::format(
+      "<td class=\"num\" title=\"both success, only the judge, only the truth, both failure\">{} · {} · "
+      "{} · {}</td>",
+      confusion.both_success, confusion.only_judge_success, confusion.only_human_success, confusion.both_failure);
+}
+
+std::string JudgeRow(const JudgeAgreement& judge) {
+  std::string html = fmt::format("<tr><th scope=\"row\">{}</th><td>{}</td><td class=\"num\">{}</td>",
+                                 Breakable(judge.judge), Breakable(judge.world), judge.judged);
+  if (!judge.IsCalibrated()) {
+    return html + fmt::format("<td colspan=\"6\">{} no episode was judged by {} too</td></tr>", Tag("uncalibrated"),
+                              Escaped(judge.against));
+  }
+  const std::string calibration =
+      judge.with_probability > 0 && judge.calibration.brier
+          ? fmt::format("Brier {}, ECE {} (n = {})", Plain(*judge.calibration.brier),
+                        judge.calibration.ece ? Plain(*judge.calibration.ece) : "–", judge.with_probability)
+          : "gives none";
+  return html + fmt::format("<td class=\"num\">{}</td>", judge.statistics.n) + ConfusionCell(judge.confusion) +
+         fmt::format("<td class=\"num\">{}</td>", Escaped(NumberWithInterval(judge.statistics.kappa))) +
+         NumberCell(judge.statistics.sensitivity) + NumberCell(judge.statistics.specificity) + "<td>" + calibration +
+         "</td></tr>";
+}
+
+std::string Raters(const JudgeReport& judges) {
+  if (judges.raters.empty()) return "";
+  if (judges.raters.size() < 2) return "<p>One human rater: nobody to agree with.</p>";
+  return fmt::format("<p>{} human raters, {} judged by two or more: Krippendorff’s alpha {}.</p>", judges.raters.size(),
+                     Counted(judges.rated_twice, "episode"),
+                     judges.alpha ? Plain(*judges.alpha) : "undefined: " + Escaped(judges.alpha.reason()));
+}
+
+}  // namespace
+
+std::string JudgesPart(const ReportData& report) {
+  const JudgeReport& judges = report.judges;
+  std::string html = fmt::format("<section id=\"judges\"><h2>Judges</h2><p>Counted on this page: <b>{}</b>.</p>",
+                                 Escaped(report.summary.options.judge));
+  if (judges.judges.empty()) {
+    return html +
+           fmt::format("<p>{} No other judge has spoken, so nothing says how often {} errs.{}</p>", Tag("uncalibrated"),
+                       Escaped(report.summary.options.judge),
+                       report.summary.options.judge == "oracle"
+                           ? " It reads the simulator’s physics against the rubric; whether people would call the same "
+                             "episodes a success is not measured."
+                           : "") +
+           Raters(judges) + "</section>";
+  }
+  html += fmt::format(
+      "<p class=\"quiet\">Each judge held against <b>{}</b>, world by world. Matrix: both success · only the judge · "
+      "only "
+      "{} · both failure.</p><div class=\"wide\"><table class=\"points\"><thead><tr><th scope=\"col\">judge</th><th "
+      "scope=\"col\">world</th><th scope=\"col\" class=\"num\">judged</th><th scope=\"col\" "
+      "class=\"num\">compared</th><th "
+      "scope=\"col\" class=\"num\">matrix</th><th scope=\"col\" class=\"num\">kappa [{:.0f} %]</th><th scope=\"col\" "
+      "class=\"num\">sensitivity</th><th scope=\"col\" class=\"num\">specificity</th><th "
+      "scope=\"col\">probabilities</th></tr></thead><tbody>",
+      Escaped(judges.truth), Escaped(judges.truth), 100 * report.summary.options.confidence);
+  for (const JudgeAgreement& judge : judges.judges) html += JudgeRow(judge);
+  return html + "</tbody></table></div>" + Raters(judges) + "</section>";
+}
+
+}  // namespace evac

@@ -1,0 +1,96 @@
+#include "reports/report_data.h"
+
+#include <algorithm>
+#include <map>
+
+#include "core/error.h"
+#include "core/statistics/many_comparisons.h"
+#include "reports/gate_data.h"
+#include "reports/wording.h"
+
+namespace evac {
+namespace {
+
+std::string BaselineOf(const RunSummary& summary, const std::string& wanted) {
+  if (wanted.empty()) return summary.policies.size() < 2 ? "" : summary.policies.front();
+  if (std::ranges::find(summary.policies, wanted) != summary.policies.end()) return wanted;
+  std::string known;
+  for (const std::string& policy : summary.policies) known += (known.empty() ? "" : ", ") + policy;
+  throw InvalidInput("--baseline: found {}, wanted a policy of the run: {}", wanted, known);
+}
+
+std::map<std::string, ComparedPolicy> EpisodesByPolicy(const RunSummary& summary, const std::string& world) {
+  std::map<std::string, ComparedPolicy> policies;
+  for (const JudgedEpisode& judged : summary.episodes) {
+    if (judged.episode.key.world != world) continue;
+    const std::string label = PolicyLabel(judged.episode.key.pair.policy, judged.episode.key.pair.checkpoint);
+    ComparedPolicy& policy = policies[label];
+    policy.name = label;
+    policy.episodes.push_back(judged);
+  }
+  return policies;
+}
+
+void AdjustForCandidates(std::vector<Candidate>& candidates) {
+  std::vector<double> p_values;
+  for (const Candidate& candidate : candidates) {
+    if (candidate.comparison.all.p) p_values.push_back(*candidate.comparison.all.p);
+  }
+  const std::vector<double> adjusted = HolmAdjusted(p_values);
+  auto next = adjusted.begin();
+  for (Candidate& candidate : candidates) {
+    if (candidate.comparison.all.p) candidate.p_holm = *next++;
+  }
+}
+
+std::vector<Candidate> CandidatesOf(const RunSummary& summary, const std::string& baseline, const std::string& world) {
+  std::map<std::string, ComparedPolicy> policies = EpisodesByPolicy(summary, world);
+  std::vector<Candidate> candidates;
+  if (!policies.contains(baseline)) return candidates;
+  for (const std::string& policy : summary.policies) {
+    if (policy == baseline || !policies.contains(policy)) continue;
+    candidates.push_back(
+        {ComparePolicies(policies[policy], policies[baseline], {.alpha = 1 - summary.options.confidence})});
+  }
+  AdjustForCandidates(candidates);
+  return candidates;
+}
+
+TrustReport TrustIn(const RunSummary& summary, const std::string& world, TrustOptions options) {
+  options.confidence = summary.options.confidence;
+  options.bootstrap = {summary.options.bootstrap_replicates, summary.options.bootstrap_seed,
+                       summary.options.confidence};
+  const std::vector<RealTrial>& trials = summary.data.real_trials;
+  const std::string real = trials.empty() ? "the world " + summary.reference
+                                          : Counted(static_cast<std::int64_t>(trials.size()), "imported real trial");
+  return {world, real, summary.options.judge, options, TrustOf(TrustInputOf(summary, trials, world), options)};
+}
+
+void AddTrust(const TrustOptions& options, ReportData& report) try {
+  for (const WorldInfo& world : report.summary.data.worlds) {
+    if (!world.is_real) report.trust.push_back(TrustIn(report.summary, world.name, options));
+  }
+  if (report.trust.empty()) report.no_trust = "the run has no world beside the real one";
+} catch (const Error& error) {  // no real trials, or no verdicts yet: the page says so
+  report.trust.clear();
+  report.no_trust = error.what();
+}
+
+}  // namespace
+
+ReportData ReportDataOf(RunSummary summary, const ReportOptions& options) {
+  ReportData report;
+  report.summary = std::move(summary);
+  const RunSummary& run = report.summary;
+  report.baseline = BaselineOf(run, options.baseline);
+  report.world = !run.reference.empty() || run.data.worlds.empty() ? run.reference : run.data.worlds.front().name;
+  if (!report.baseline.empty()) report.candidates = CandidatesOf(run, report.baseline, report.world);
+  if (!run.data.gates.empty()) report.gates = LastGates(run.data.gates, DataHash(run.data));
+  AddTrust(options.trust, report);
+  report.stages = StagesOf(run);
+  report.judges = JudgesOf(run);
+  report.checkpoints = CheckpointsOf(run);
+  return report;
+}
+
+}  // namespace evac

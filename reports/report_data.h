@@ -1,0 +1,45 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "reports/checkpoints.h"
+#include "reports/gate_decision.h"
+#include "reports/judge_agreement.h"
+#include "reports/policy_comparison.h"
+#include "reports/stages.h"
+#include "reports/summary.h"
+#include "reports/trust_output.h"
+
+/// Everything a report says, counted once: what `RunSummary` holds, and what follows from it.
+namespace evac {
+
+struct ReportOptions {
+  std::string baseline = {};  ///< the policy others are held against, "visual_pick@good"; empty: the first declared
+  TrustOptions trust = {};    ///< its confidence and bootstrap follow the summary's
+};
+
+/// One policy against the baseline.
+struct Candidate {
+  PolicyComparison comparison;                          ///< first: the candidate; second: the baseline
+  Number p_holm = Undefined{"no episodes to compare"};  ///< of all tasks together, over all candidates
+};
+
+struct ReportData {
+  RunSummary summary;
+  std::string baseline;               ///< empty where the run has fewer than two policies
+  std::string world;                  ///< where candidates are compared: the real one, else the first
+  std::vector<Candidate> candidates;  ///< in the order declared
+  std::vector<TrustReport>
+      trust;                     ///< one per world beside the real one; empty where there is nothing to hold it against
+  std::string no_trust;          ///< why `trust` is empty, else empty
+  std::vector<ShownGate> gates;  ///< the last decision of each gate that was held against this run
+  StageReport stages;
+  JudgeReport judges;
+  std::vector<CheckpointCurve> checkpoints;
+};
+
+/// @throws InvalidInput if the baseline is no policy of the run, naming those there are.
+ReportData ReportDataOf(RunSummary summary, const ReportOptions& options = {});
+
+}  // namespace evac

@@ -1,0 +1,167 @@
+#include "reports/dashboard.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <httplib.h>
+
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <thread>
+
+#include "core/error.h"
+#include "reports/dashboard_paths.h"
+#include "tests/reports/stored_run.h"
+#include "tests/support/temp_folder.h"
+
+namespace evac {
+namespace {
+
+using testing::HasSubstr;
+using testing::Not;
+
+/// A dashboard at work, on a port of its own.
+class Served {
+ public:
+  explicit Served(std::vector<std::filesystem::path> runs)
+      : dashboard_({.runs = std::move(runs), .look_every_s = 0.05, .program = "evac test"}),
+        thread_([this] { dashboard_.Serve(); }) {}
+  ~Served() {
+    dashboard_.Stop();
+    thread_.join();
+  }
+  httplib::Client Client() const {
+    httplib::Client client("127.0.0.1", dashboard_.port());
+    client.set_read_timeout(60);
+    return client;
+  }
+  /// Exactly these bytes as the path: nothing is tidied up on the way.
+  int StatusOf(const std::string& path, const httplib::Headers& headers = {}) const {
+    const auto answer = Client().Get(path.c_str(), headers);
+    return answer ? answer->status : -1;
+  }
+
+ private:
+  Dashboard dashboard_;
+  std::thread thread_;
+};
+
+TEST(Dashboard, ListsItsRunsWithTheirHistoryAndServesEachReport) {
+  const StoredRun monday("monday", "sssf", "ssff"), tuesday("tuesday", "ssss", "ssff");
+  const Served served({monday.folder(), tuesday.folder()});
+  httplib::Client client = served.Client();
+  const auto index = client.Get("/");
+  ASSERT_TRUE(index);
+  EXPECT_EQ(index->status, 200);
+  EXPECT_THAT(index->body, HasSubstr("monday"));
+  EXPECT_THAT(index->body, HasSubstr("href=\"runs/1/\""));
+  const auto page = client.Get("/runs/1/");
+  EXPECT_THAT(page->body, HasSubstr("Policy evaluation"));
+  EXPECT_THAT(page->body, HasSubstr("\"run\":\"files/\""));
+  EXPECT_THAT(page->get_header_value("X-Content-Type-Options"), "nosniff");
+  const auto history = nlohmann::json::parse(client.Get("/history.json")->body);
+  EXPECT_EQ(history.at("runs").at(0).at("rates").at(0).at("success_rate").at("value"), 0.75);
+  EXPECT_EQ(history.at("runs").at(1).at("rates").at(0).at("success_rate").at("value"), 1.0);
+  EXPECT_EQ(nlohmann::json::parse(client.Get("/runs/0/report.json")->body).at("episodes").size(), 8u);
+}
+
+TEST(Dashboard, ShowsWhatARunWroteMeanwhileAndTellsThatThereIsMore) {
+  StoredRun run("growing", "ss", "ss");
+  const Served served({run.folder()});
+  httplib::Client client = served.Client();
+  EXPECT_EQ(nlohmann::json::parse(client.Get("/runs/0/report.json")->body).at("episodes").size(), 4u);
+  std::string heard;
+  std::thread writer([&run] {
+    std::this_thread::sleep_for(std::chrono::milliseconds(300));
+    run.Add("41-0100", 's', 'f');
+  });
+  httplib::Client listener = served.Client();
+  listener.Get("/events", [&heard](const char* bytes, std::size_t count) {
+    heard.append(bytes, count);
+    const std::size_t first = heard.find("data: ");
+    return first == std::string::npos || heard.find("data: ", first + 1) == std::string::npos;  // until the second
+  });
+  writer.join();
+  EXPECT_THAT(heard, testing::MatchesRegex("data: .*\n\n(.|\n)*data: .*\n\n")) << "the state, then news";
+  EXPECT_EQ(nlohmann::json::parse(client.Get("/runs/0/report.json")->body).at("episodes").size(), 6u);
+}
+
+TEST(Dashboard, GivesVideosInPieces) {
+  const StoredRun run("videos", "s", "s");
+  const Served served({run.folder()});
+  const std::string path = "/runs/0/files/videos/real/take/pick@1/41-0000-s1.mp4";
+  httplib::Client client = served.Client();
+  const auto whole = client.Get(path);
+  ASSERT_TRUE(whole);
+  ASSERT_EQ(whole->status, 200);
+  EXPECT_EQ(whole->get_header_value("Content-Type"), "video/mp4");
+  EXPECT_EQ(whole->body.substr(4, 4), "ftyp");
+  const auto piece = client.Get(path, {httplib::make_range_header({{4, 7}})});
+  EXPECT_EQ(piece->status, 206);
+  EXPECT_EQ(piece->body, "ftyp");
+  EXPECT_EQ(served.StatusOf("/runs/0/files/thumbs/real/take/pick@1/41-0000-s1.jpg"), 200);
+}
+
+TEST(Dashboard, NothingOutsideTheVideosAndThumbnailsOfARunIsGivenOut) {
+  const StoredRun run("closed", "s", "s");
+  TempFolder outside;
+  std::ofstream(outside.path() / "secret.mp4") << "secret";
+  std::filesystem::create_symlink(outside.path() / "secret.mp4", run.folder() / "videos" / "leak.mp4");
+  std::filesystem::create_directory_symlink(outside.path(), run.folder() / "videos" / "there");
+  const Served served({run.folder()});
+  for (const std::string path :
+       {"/runs/0/files/evac.sqlite", "/runs/0/files/videos/../evac.sqlite", "/runs/0/files/videos/../../x.mp4",
+        "/runs/0/files/videos/%2e%2e/%2e%2e/etc/passwd", "/runs/0/files/videos/..%2f..%2fsecret.mp4",
+        "/runs/0/files//etc/hosts.mp4", "/runs/0/files/videos/leak.mp4", "/runs/0/files/videos/there/secret.mp4",
+        "/runs/0/files/videos", "/runs/0/files/videos/", "/runs/1/", "/runs/99999999999999999999/", "/runs/-1/",
+        "/runs/0", "/index.html", "/runs/0/files/videos/real/take/pick@1/41-0000-s1.mp4%00.mp4"}) {
+    EXPECT_EQ(served.StatusOf(path), 404) << path;
+  }
+}
+
+TEST(Dashboard, AnswersReadersAloneAndNoOtherSitesName) {
+  const StoredRun run("guarded", "s", "s");
+  const Served served({run.folder()});
+  httplib::Client client = served.Client();
+  EXPECT_EQ(client.Post("/", "x", "text/plain")->status, 405);
+  EXPECT_EQ(client.Delete("/runs/0/")->status, 405);
+  EXPECT_EQ(served.StatusOf("/", {{"Host", "evil.example"}}), 403);
+  EXPECT_EQ(served.StatusOf("/", {{"Host", "localhost:1234"}}), 200);
+}
+
+TEST(Dashboard, ARunThatIsNotThereYetIsListedWithTheReason) {
+  TempFolder empty;
+  const Served served({empty.path() / "<b>soon</b>"});
+  httplib::Client client = served.Client();
+  const std::string index = client.Get("/")->body;
+  EXPECT_THAT(index, Not(HasSubstr("<b>soon")));
+  EXPECT_THAT(index, HasSubstr("&lt;b&gt;soon"));
+  EXPECT_EQ(served.StatusOf("/runs/0/"), 200);
+}
+
+TEST(Dashboard, AnAddressThatIsTakenIsRefused) {
+  TempFolder empty;
+  const Dashboard first({.runs = {empty.path()}});
+  EXPECT_GT(first.port(), 0);
+  EXPECT_THROW(Dashboard({.runs = {empty.path()}, .host = "no.such.host.invalid"}), Error);
+}
+
+TEST(DashboardPath, OnlyWhatAPageNamesIsThere) {
+  EXPECT_EQ(ParseDashboardPath("/")->view, DashboardView::kIndex);
+  EXPECT_EQ(ParseDashboardPath("/runs/12/")->run, 12u);
+  EXPECT_EQ(ParseDashboardPath("/runs/3/files/videos/a/b@1/c d.mp4")->file, "videos/a/b@1/c d.mp4");
+  for (const std::string_view bad :
+       {"", "runs/0/", "/runs//", "/runs/0x/", "/runs/+1/", "/runs/0/files/videos/a\\b.mp4",
+        "/runs/0/files/videos/./a.mp4", "/runs/0/files/thumbs/a.mp4", "/events/"})
+    EXPECT_FALSE(ParseDashboardPath(bad)) << bad;
+}
+
+TEST(DashboardPath, LoopbackHasFewNames) {
+  for (const char* host : {"127.0.0.1", "127.0.0.1:80", "localhost:8765", "[::1]:1", "[::1]"})
+    EXPECT_TRUE(IsLoopbackHost(host)) << host;
+  for (const char* host :
+       {"", "127.0.0.1.evil.example", "localhost.evil", "127.0.0.1:", "127.0.0.1:x", "[::1", "[::2]"})
+    EXPECT_FALSE(IsLoopbackHost(host)) << host;
+}
+
+}  // namespace
+}  // namespace evac

@@ -1,0 +1,163 @@
+#include "reports/report_data.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "core/error.h"
+#include "reports/headlines.h"
+#include "reports/methods.h"
+#include "tests/reports/sample_run.h"
+
+namespace evac {
+namespace {
+
+using testing::HasSubstr;
+using testing::Not;
+
+ReportData LargeReport() { return ReportDataOf(LargeRun().Summary(), {.baseline = "pick@good"}); }
+
+/// One policy, in twenty states: sim grasps in twelve where real does not.
+const SampleRun& KindSim() {
+  static const SampleRun run({{"take_bottle", "pick", "1", "ssssffffffffffffffff", "ssssssssssssssssffff"}});
+  return run;
+}
+
+std::string AllText(const std::vector<Headline>& headlines) {
+  std::string text;
+  for (const Headline& headline : headlines) {
+    text += headline.question + "\n";
+    for (const HeadlineItem& item : headline.items) text += "[" + item.tag + "] " + item.text + "\n";
+  }
+  return text;
+}
+
+TEST(Stages, TheSharesOfAFunnelNeverRise) {
+  for (const StageFunnel& funnel : LargeReport().stages.funnels) {
+    for (const StageRow& row : funnel.worlds) {
+      ASSERT_EQ(row.reached.size(), funnel.stages.size());
+      for (std::size_t i = 1; i < row.reached.size(); ++i) EXPECT_LE(*row.reached[i].value, *row.reached[i - 1].value);
+    }
+  }
+}
+
+TEST(Stages, AWorldThatGraspsWhatRealDropsIsKinderAtGraspAndNowhereElse) {
+  const StageReport stages = StagesOf(KindSim().Summary());
+  ASSERT_EQ(stages.partings.size(), 2u);
+  const StageParting& reach = stages.partings[0];
+  const StageParting& grasp = stages.partings[1];
+  EXPECT_EQ(reach.flips.only_first + reach.flips.only_second, 0);
+  EXPECT_EQ(reach.pairs, 20);
+  EXPECT_EQ(grasp.flips.only_first, 12);
+  EXPECT_EQ(grasp.flips.only_second, 0);
+  EXPECT_LT(*grasp.p_holm, 0.001);
+  EXPECT_THAT(PartingInWords(grasp, "real"),
+              HasSubstr("sim is kinder than real at grasp: of 20 pairs, 12 went on in sim alone"));
+  EXPECT_THAT(PartingInWords(reach, "real"), HasSubstr("not decided at reach"));
+}
+
+TEST(Stages, WithoutVerdictsThereIsNoFunnel) {
+  const StageReport stages = StagesOf(SampleRun({{"a", "pick", "1", "uu", "uu"}}).Summary());
+  EXPECT_TRUE(stages.funnels.empty());
+  EXPECT_TRUE(stages.partings.empty());
+}
+
+TEST(Judges, AJudgeIsHeldAgainstPeopleInEachWorldApart) {
+  SampleRun run({{"a", "pick", "1", "ssff", "ssff"}});
+  std::vector<Verdict> verdicts;
+  for (const Episode& episode : run.store().Episodes()) {
+    const bool in_real = episode.key.world == "real";
+    if (!in_real) continue;
+    Verdict human;
+    human.episode_id = episode.key.Id();
+    human.judge = "human";
+    human.label = episode.key.pair.initial_state == "41-0003" ? Label::kSuccess : Label::kFailure;
+    verdicts.push_back(human);
+  }
+  run.store().AddVerdicts(verdicts);
+  const JudgeReport judges = JudgesOf(run.Summary());
+  EXPECT_EQ(judges.truth, "human");
+  ASSERT_EQ(judges.judges.size(), 2u);
+  EXPECT_EQ(judges.judges[0].world, "real");
+  EXPECT_EQ(judges.judges[0].confusion.only_judge_success, 2);
+  EXPECT_EQ(judges.judges[0].confusion.only_human_success, 1);
+  EXPECT_EQ(judges.judges[0].confusion.both_failure, 1);
+  EXPECT_TRUE(judges.judges[0].IsCalibrated());
+  EXPECT_EQ(judges.judges[1].world, "sim");
+  EXPECT_EQ(judges.judges[1].judged, 4);
+  EXPECT_FALSE(judges.judges[1].IsCalibrated()) << "nobody looked at sim";
+}
+
+TEST(Checkpoints, TheirOrderIsThatOfTheNumbersInTheirNames) {
+  EXPECT_EQ(StepOf("step_20000"), 20000);
+  EXPECT_EQ(StepOf("120k"), 120000);
+  EXPECT_EQ(StepOf("2M"), 2e6);
+  EXPECT_EQ(StepOf("good"), std::nullopt);
+  EXPECT_EQ(StepOf(""), std::nullopt);
+  const SampleRun run({{"a", "pick", "s10", "sss", "sss"}, {"a", "pick", "s9", "fff", "fff"}});
+  const std::vector<CheckpointCurve> curves = CheckpointsOf(run.Summary());
+  ASSERT_EQ(curves.size(), 1u);
+  EXPECT_TRUE(curves[0].has_steps);
+  EXPECT_EQ(curves[0].points[0].checkpoint, "s9") << "9 < 10, though \"s10\" < \"s9\"";
+  EXPECT_THAT(TrendInWords(curves[0], 0), HasSubstr("In real, from s9 to s10: 0 % → 100 %, +100 points"));
+  EXPECT_THAT(TrendInWords(curves[0], 0), HasSubstr("1 of 1 step rise"));
+}
+
+TEST(Checkpoints, APolicyWithOneIsNoCurve) {
+  EXPECT_TRUE(CheckpointsOf(SampleRun({{"a", "pick", "1", "s", "s"}}).Summary()).empty());
+}
+
+TEST(Headlines, AnswerWorseWhereTrustAndNextInThatOrder) {
+  const std::vector<Headline> headlines = HeadlinesOf(LargeReport());
+  ASSERT_EQ(headlines.size(), 4u);
+  EXPECT_EQ(headlines[0].question, "Is any policy worse than pick@good?");
+  EXPECT_EQ(headlines[1].question, "Where?");
+  EXPECT_EQ(headlines[2].question, "Can I trust sim to within ±10 points?");
+  EXPECT_EQ(headlines[3].question, "What next?");
+  for (const Headline& headline : headlines) EXPECT_FALSE(headline.items.empty()) << headline.question;
+}
+
+TEST(Headlines, AClearLossIsWorseWithItsNumbersAndASmallOneIsNotDecided) {
+  const std::string text = AllText(HeadlinesOf(LargeReport()));
+  EXPECT_THAT(text, HasSubstr("[worse] pick@blind: 5 % against 85 %, -80 points"));
+  const SampleRun small({{"a", "pick", "good", "sssf", "sssf"}, {"a", "pick", "new", "ssff", "sssf"}});
+  const std::string small_text = AllText(HeadlinesOf(ReportDataOf(small.Summary())));
+  EXPECT_THAT(small_text, HasSubstr("Is pick@new worse than pick@good?"));
+  EXPECT_THAT(small_text, HasSubstr("[not decided] pick@new: 50 % against 75 %"));
+  EXPECT_THAT(small_text, Not(HasSubstr("[worse]")));
+}
+
+TEST(Headlines, TheBaselineCanBeNamedAndMustBeAPolicyOfTheRun) {
+  const ReportData report = ReportDataOf(LargeRun().Summary(), {.baseline = "pick@blind"});
+  EXPECT_THAT(AllText(HeadlinesOf(report)), HasSubstr("[better] pick@good: 85 % against 5 %"));
+  try {
+    ReportDataOf(LargeRun().Summary(), {.baseline = "pick"});
+    FAIL() << "pick is no policy without its checkpoint";
+  } catch (const Error& error) {
+    EXPECT_THAT(error.what(), HasSubstr("found pick, wanted a policy of the run: pick@biased, pick@blind"));
+  }
+}
+
+TEST(Headlines, EveryRunHasAllFourAnswers) {
+  for (const char* outcomes : {"s", "u", "e", "?"}) {
+    const ReportData report = ReportDataOf(SampleRun({{"a", "pick", "1", outcomes, outcomes}}).Summary());
+    for (const Headline& headline : HeadlinesOf(report)) EXPECT_FALSE(headline.items.empty()) << outcomes;
+  }
+}
+
+TEST(Methods, NameTheTestsThatWereUsedAndNoOthers) {
+  const std::string text = MethodsParagraph(LargeReport());
+  EXPECT_THAT(text, HasSubstr("4 policies on 2 tasks in 2 worlds (real (the reference), sim)"));
+  EXPECT_THAT(text, HasSubstr("exact McNemar"));
+  EXPECT_THAT(text, HasSubstr("paired by initial state and seed"));
+  EXPECT_THAT(text, HasSubstr("paired state bootstrap"));
+  EXPECT_THAT(text, Not(HasSubstr("Boschloo")));
+  EXPECT_THAT(text, HasSubstr("No episode was excluded."));
+  const SampleRun apart({{"a", "pick", "1", "ssffe", "-----"}, {"a", "pick", "2", "-----ssff", "---------"}});
+  const std::string unpaired = MethodsParagraph(ReportDataOf(apart.Summary()));
+  EXPECT_THAT(unpaired, HasSubstr("Boschloo"));
+  EXPECT_THAT(unpaired, Not(HasSubstr("paired by initial state")));
+  EXPECT_THAT(unpaired, HasSubstr("Excluded from all rates: 1 error."));
+}
+
+}  // namespace
+}  // namespace evac
