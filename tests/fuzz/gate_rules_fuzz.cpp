@@ -6,8 +6,8 @@
 #include "core/error.h"
 #include "reports/gate_rules.h"
 
-/// Whatever the bytes: the rules are refused with one message, or every number in them is in its range, every name is
-/// there once, and their hash is that of their meaning.
+/// Whatever the bytes: the rules are refused with one message, or every number in them is in its range and every
+/// rule has the threshold it needs.
 namespace {
 
 void Require(bool holds) {
@@ -31,7 +31,6 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     const std::string text(reinterpret_cast<const char*>(data), size);
     const evac::GateRules rules = evac::ReadGateRules(evac::Config::FromText(text, "fuzz.yaml"));
     Check(rules);
-    Require(evac::ReadGateRules(evac::Config::FromText("# the same\n" + text, "fuzz.yaml")).hash == rules.hash);
   } catch (const evac::Error& error) {
     Require(error.exit_code() == evac::ExitCode::kInvalidInput);
   }

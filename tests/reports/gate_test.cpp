@@ -63,6 +63,8 @@ TEST(Gate, TheSameOutcomesPassWhenTheyAreManyAndAreInconclusiveWhenFew) {
   EXPECT_EQ(many.outcome, GateOutcome::kPass);
   EXPECT_THAT(many.rules[0].statement, HasSubstr("not worse by 10 points"));
   EXPECT_EQ(many.rules[0].more, "");
+  EXPECT_EQ(Decided(Rules(kMcnemar), Repeat(25, 's'), Repeat(25, 's')).outcome, GateOutcome::kPass);
+  EXPECT_EQ(Decided(Rules(kMcnemar), Repeat(24, 's'), Repeat(24, 's')).outcome, GateOutcome::kInconclusive);
   const GateDecision few = Decided(Rules(kMcnemar), "ssssssf", "sssssfs");
   EXPECT_EQ(few.outcome, GateOutcome::kInconclusive);
   EXPECT_THAT(few.rules[0].more, HasSubstr("more pairs to show it not worse by 10 points"));
