@@ -9,7 +9,7 @@
 namespace evac {
 namespace {
 
-constexpr std::size_t kMostItems = 5;
+constexpr std::size_t kMostItems = 5, kMostNamed = 3;
 
 bool IsDecided(const Number& p) { return p && *p < kAlpha; }
 
@@ -33,6 +33,22 @@ std::vector<HeadlineItem> GateItems(const ReportData& report) {
   return items;
 }
 
+HeadlineItem CandidateItem(const Candidate& candidate) {
+  const ComparisonRow& all = candidate.comparison.all;
+  std::string text = candidate.comparison.first;
+  if (all.first.value && all.second.value && candidate.p_holm) {
+    const std::string n = all.is_paired ? Counted(all.shared, "pair") : Counted(all.first_episodes, "episode");
+    text += fmt::format(": {} against {}, {} ({}, {})", Percent(*all.first.value), Percent(*all.second.value),
+                        PointsWithInterval(all.difference), n, PValue(*candidate.p_holm));
+  } else {
+    text += ": no episode of both is judged";
+  }
+  return {TagOf(all.difference, candidate.p_holm), text, "#rates"};
+}
+
+/// What is worse comes first, then what is open.
+int Urgency(const HeadlineItem& item) { return item.tag == "worse" ? 0 : item.tag == "not decided" ? 1 : 2; }
+
 Headline Worse(const ReportData& report) {
   Headline headline;
   headline.items = GateItems(report);
@@ -45,35 +61,34 @@ Headline Worse(const ReportData& report) {
   headline.question = report.candidates.size() == 1
                           ? fmt::format("Is {} worse than {}?", report.candidates[0].comparison.first, report.baseline)
                           : fmt::format("Is any policy worse than {}?", report.baseline);
-  for (const Candidate& candidate : report.candidates) {
-    const ComparisonRow& all = candidate.comparison.all;
-    std::string text = candidate.comparison.first;
-    if (all.first.value && all.second.value && candidate.p_holm) {
-      text += fmt::format(": {} against {}, {} ({}, {})", Percent(*all.first.value), Percent(*all.second.value),
-                          PointsWithInterval(all.difference),
-                          Counted(all.is_paired ? all.shared : all.first_episodes, all.is_paired ? "pair" : "episode"),
-                          PValue(*candidate.p_holm));
-    } else {
-      text += ": no episode of both is judged";
-    }
-    headline.items.push_back({TagOf(all.difference, candidate.p_holm), text, "#rates"});
+  std::vector<HeadlineItem> items;
+  for (const Candidate& candidate : report.candidates) items.push_back(CandidateItem(candidate));
+  std::ranges::stable_sort(items, {}, Urgency);
+  if (items.size() > kMostItems) {
+    const auto left_out = static_cast<std::int64_t>(items.size() - kMostItems);
+    items.resize(kMostItems);
+    items.push_back({"", Counted(left_out, "further policy is", "further policies are") + " below", "#rates"});
   }
+  headline.items.insert(headline.items.end(), items.begin(), items.end());
   return headline;
 }
 
-/// "visual_pick@fair -45 points [-62, -25]" of the candidates that differ at this task.
+/// "take_toast: visual_pick@fair -45 points [-62, -25]; …" of the candidates that differ here, the largest loss first.
 HeadlineItem LossesAt(const ReportData& report, const std::string& task) {
-  HeadlineItem item{"", "", "#rates"};
-  int worse = 0, better = 0;
+  std::vector<std::pair<double, std::string>> found;
   for (const Candidate& candidate : report.candidates) {
     for (const ComparisonRow& row : candidate.comparison.tasks) {
       if (row.task != task || !IsDecided(row.p_holm) || !row.difference.value) continue;
-      ++(*row.difference.value < 0 ? worse : better);
-      item.text += fmt::format("{}{} {}", item.text.empty() ? task + ": " : "; ", candidate.comparison.first,
-                               PointsWithInterval(row.difference));
+      found.emplace_back(*row.difference.value, candidate.comparison.first + " " + PointsWithInterval(row.difference));
     }
   }
-  if (worse + better > 0) item.tag = better == 0 ? "worse" : worse == 0 ? "better" : "both ways";
+  HeadlineItem item{"", "", "#rates"};
+  if (found.empty()) return item;
+  std::ranges::stable_sort(found, {}, &std::pair<double, std::string>::first);
+  item.tag = found.back().first < 0 ? "worse" : found.front().first > 0 ? "better" : "both ways";
+  for (std::size_t i = 0; i < found.size() && i < kMostNamed; ++i)
+    item.text += (i == 0 ? task + ": " : "; ") + found[i].second;
+  if (found.size() > kMostNamed) item.text += fmt::format("; and {} more", found.size() - kMostNamed);
   return item;
 }
 

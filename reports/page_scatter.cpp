@@ -74,7 +74,8 @@ std::string StatisticsTable(const WorldComparison& comparison) {
 
 std::string PointsTable(const WorldComparison& comparison, const std::vector<PointStyle>& styles) {
   std::string html = fmt::format(
-      "<table class=\"points\"><thead><tr><th scope=\"col\"><span class=\"sr\">point</span></th><th scope=\"col\">"
+      "<div class=\"wide\"><table class=\"points\"><thead><tr><th scope=\"col\"><span "
+      "class=\"sr\">point</span></th><th scope=\"col\">"
       "policy, task</th><th scope=\"col\" class=\"num\">{}</th><th scope=\"col\" class=\"num\">{}</th>"
       "<th scope=\"col\" class=\"num\">pairs</th></tr></thead><tbody>",
       Escaped(comparison.real), Escaped(comparison.other));
@@ -86,7 +87,7 @@ std::string PointsTable(const WorldComparison& comparison, const std::vector<Poi
         point.letter, PointIcon(styles[i]), Breakable(point.policy), Breakable(point.task), RateCellOf(point.real),
         RateCellOf(point.other), point.real.n);
   }
-  return html + "</tbody></table>";
+  return html + "</tbody></table></div>";
 }
 
 /// Within each task: fewer points, so wider intervals, but no task's difficulty that stands in for agreement.
