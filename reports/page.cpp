@@ -120,15 +120,16 @@ std::string PageScript(PageScripts scripts) {
 }
 
 std::string PageHead(const std::string& title, PageScripts scripts) {
+  const bool is_live = scripts != PageScripts::kReport;
+  const std::string served = is_live ? "connect-src 'self'; " : "";  // a page on a disk has nobody to connect to
+  const std::string icon = is_live ? "<link rel=\"icon\" href=\"data:,\">" : "";  // else a browser asks for one
   return "<!doctype html>\n<html lang=\"en\"><head><meta charset=\"utf-8\">"
          "<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">"
          "<meta name=\"color-scheme\" content=\"light dark\"><meta name=\"referrer\" content=\"no-referrer\">"
-         "<meta http-equiv=\"Content-Security-Policy\" content=\"default-src 'none'; img-src 'self' file:; media-src "
-         "'self' "
-         "file:; style-src 'unsafe-inline'; " +
-         std::string(scripts == PageScripts::kReport ? "" : "connect-src 'self'; ") + "script-src '" +
-         HashOf(PageScript(scripts)) + "'\"><title>" + Escaped(title) + "</title>\n<style>" + ColoursCss() +
-         ChartsCss() + PageCss() + "</style></head>\n";
+         "<meta http-equiv=\"Content-Security-Policy\" content=\"default-src 'none'; img-src 'self' file: data:; "
+         "media-src 'self' file:; style-src 'unsafe-inline'; " +
+         served + "script-src '" + HashOf(PageScript(scripts)) + "'\">" + icon + "<title>" + Escaped(title) +
+         "</title>\n<style>" + ColoursCss() + ChartsCss() + PageCss() + "</style></head>\n";
 }
 
 std::string Tag(const std::string& word) {
