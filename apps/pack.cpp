@@ -141,8 +141,9 @@ Packing Plan(const PackArguments& arguments) {
   packing.how = {arguments.period_s, arguments.cameras, static_cast<std::size_t>(config.views), arguments.arms,
                  static_cast<std::size_t>(config.chunk + 1)};
   packing.clip.picture_px = {static_cast<int>(config.image_width_px), static_cast<int>(config.image_height_px)};
-  packing.clip.pose_map = PoseMapOptions::ForHeight(packing.clip.picture_px.height);
-  packing.clip.pose_map.drop_line_m = config.pose_map.drop_line_m;
+  nn::ModelConfig scaled = config;
+  scaled.pose_map.scaled = true;
+  packing.clip.pose_map = PoseMapOptions::Of(scaled);
   LookAtAll(arguments, packing);
   LeaveOutOtherRobots(packing);
   for (const PackSource& source : packing.sources) packing.tasks.push_back(source.task);

@@ -9,7 +9,6 @@ namespace evac {
 namespace {
 
 constexpr double kTurn = 0.5236;        // radians about the tool axis
-constexpr float kToolLength_m = 0.23F;  // from the flange to where the fingers meet
 constexpr float kAxisLength_m = 0.1F;
 constexpr float kClosedGripper = 120.0F;
 constexpr float kNear_m = 1e-3F;
@@ -26,7 +25,7 @@ const cv::Scalar kAxisColours[2][3] = {{{0, 0, 255}, {255, 255, 0}, {0, 255, 255
 const cv::Scalar kDropColours[2] = {{0, 160, 255}, {255, 160, 0}};
 
 /// The pose the released model's picture shows, in the frame `to`.
-Eigen::Matrix4f FromTool(const DrawnGripper& gripper, const Eigen::Matrix4f& to_from_base) {
+Eigen::Matrix4f FromTool(const DrawnGripper& gripper, const Eigen::Matrix4f& to_from_base, float tool_length_m) {
   const float i = gripper.quat_xyzw[0], j = gripper.quat_xyzw[1], k = gripper.quat_xyzw[2], r = gripper.quat_xyzw[3];
   const float s = 2.0F / (r * r + i * i + j * j + k * k);
   Eigen::Matrix4f pose = Eigen::Matrix4f::Identity();
@@ -35,7 +34,7 @@ Eigen::Matrix4f FromTool(const DrawnGripper& gripper, const Eigen::Matrix4f& to_
       s * (i * k - j * r), s * (j * k + i * r), 1 - s * (i * i + j * j);
   pose.topRightCorner<3, 1>() = gripper.xyz_m;
   Eigen::Matrix4f tool = Eigen::Matrix4f::Identity();
-  tool(2, 3) = kToolLength_m;
+  tool(2, 3) = tool_length_m;
   return Eigen::Matrix4f(Eigen::Matrix4f(to_from_base * pose) * tool);
 }
 
@@ -82,7 +81,7 @@ std::vector<Placed> Visible(std::span<const DrawnGripper> grippers, const PoseMa
                             const PoseMapOptions& options) {
   std::vector<Placed> visible;
   for (const DrawnGripper& gripper : grippers) {
-    const Eigen::Matrix4f camera_from_tool = FromTool(gripper, view.camera_from_base);
+    const Eigen::Matrix4f camera_from_tool = FromTool(gripper, view.camera_from_base, options.tool_length_m);
     const auto point = [&](float x, float y, float z) {
       return Eigen::Vector3f((camera_from_tool * Eigen::Vector4f(x, y, z, 1)).head<3>());
     };
@@ -101,7 +100,7 @@ std::vector<Placed> Visible(std::span<const DrawnGripper> grippers, const PoseMa
 
 /// Straight down from the tool to a height, with a mark where it ends.
 void DrawDropLine(const Placed& placed, const PoseMapView& view, const PoseMapOptions& options, cv::Mat& map) {
-  const Eigen::Vector3f tool = FromTool(*placed.gripper, Eigen::Matrix4f::Identity()).topRightCorner<3, 1>();
+  const Eigen::Vector3f tool = FromTool(*placed.gripper, Eigen::Matrix4f::Identity(), options.tool_length_m).topRightCorner<3, 1>();
   const Eigen::Vector4f foot(tool.x(), tool.y(), static_cast<float>(*options.drop_line_m), 1);
   const Eigen::Vector3f end = (view.camera_from_base * foot).head<3>();
   const Projected shown = Project(InFront(placed.origin, end), view.intrinsics);
@@ -133,6 +132,7 @@ PoseMapOptions PoseMapOptions::ForHeight(int height_px) {
 PoseMapOptions PoseMapOptions::Of(const nn::ModelConfig& config) {
   PoseMapOptions options = config.pose_map.scaled ? ForHeight(static_cast<int>(config.image_height_px)) : PoseMapOptions();
   options.drop_line_m = config.pose_map.drop_line_m;
+  options.tool_length_m = static_cast<float>(config.pose_map.tool_length_m);
   return options;
 }
 

@@ -35,6 +35,7 @@ struct PoseMapOptions {
   int thickness_px = 8;  ///< of the axes
   /// Quirk draw_behind_camera: the reference knows no depth and draws mirrored what is behind the camera.
   bool draw_behind_camera = false;
+  float tool_length_m = 0.23F;  ///< from the gripper's pose to where its fingers meet: what is drawn
   /// Height in metres, base frame, to which a line is drawn straight down from each gripper. Not in the paper.
   std::optional<double> drop_line_m = std::nullopt;
 

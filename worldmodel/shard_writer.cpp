@@ -81,9 +81,8 @@ void WriteShard(const std::filesystem::path& path, std::span<const Clip> clips, 
 }
 
 std::string PoseMapWords(const PoseMapOptions& options) {
-  std::string words = fmt::format("radius_px={} thickness_px={}", options.radius_px, options.thickness_px);
-  if (options.drop_line_m) words += fmt::format(" drop_line_m={}", *options.drop_line_m);
-  return words;
+  const nn::PoseMapConfig drawn{.drop_line_m = options.drop_line_m, .tool_length_m = options.tool_length_m};
+  return fmt::format("radius_px={} thickness_px={}{}", options.radius_px, options.thickness_px, drawn.Differences());
 }
 
 }  // namespace evac

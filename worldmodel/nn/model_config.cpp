@@ -1,5 +1,7 @@
 #include "worldmodel/nn/model_config.h"
 
+#include <cmath>
+#include <cstdio>
 #include <utility>
 
 #include "core/tensor_file.h"
@@ -59,7 +61,19 @@ void CheckEncoder(const ImageEncoderConfig& clip) {
   Require(clip.image_px % clip.patch_px == 0, "clip.image", clip.image_px, "a multiple of clip.patch");
 }
 
+std::string Field(const char* name, double value) {
+  char text[64];
+  std::snprintf(text, sizeof text, " %s=%.6g", name, value);
+  return text;
+}
+
 }  // namespace
+
+std::string PoseMapConfig::Differences() const {
+  const PoseMapConfig published;
+  return (drop_line_m ? Field("drop_line_m", *drop_line_m) : "") +
+         (std::fabs(tool_length_m - published.tool_length_m) > 1e-6 ? Field("tool_length_m", tool_length_m) : "");
+}
 
 void ModelConfig::Check() const {
   CheckUNet(unet);

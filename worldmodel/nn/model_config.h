@@ -87,6 +87,12 @@ struct PoseMapConfig {
   /// Height in metres, base frame, to which a line is drawn straight down from each gripper: which point of the table it
   /// is above, which one camera alone does not show. Not in the paper.
   std::optional<double> drop_line_m;
+  /// From the recorded pose to where the fingers meet, along the tool axis: what the disc is drawn at. AgiBot records the
+  /// flange; 0 for robots whose poses are the fingertips'.
+  double tool_length_m = 0.23;
+
+  /// What is not as published, for files that were drawn so: " drop_line_m=0 tool_length_m=0", or nothing.
+  std::string Differences() const;
 };
 
 struct ModelConfig {

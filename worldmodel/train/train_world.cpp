@@ -78,10 +78,12 @@ void Save(const std::filesystem::path& path, const TrainableWeights& weights, co
 void CheckShards(const ShardSet& shards, const nn::ModelConfig& config, const WorldStart& start) {
   nn::CheckShape("the shards' pictures", shards.shards().front().frames,
                  {-1, config.views, config.image_height_px, config.image_width_px, 3});
-  const bool lines = shards.metadata().at("pose_map").find("drop_line_m") != std::string::npos;
-  if (lines != config.pose_map.drop_line_m.has_value())
-    throw TensorError(std::string("the shards' pose maps were packed ") + (lines ? "with" : "without") +
-                      " lines to the table (pose_map.drop_line_m), the page wants them " + (lines ? "without" : "with"));
+  const std::string& drawn = shards.metadata().at("pose_map");
+  const std::size_t sizes_end = drawn.find(' ', drawn.find("thickness_px"));
+  const std::string differences = sizes_end == std::string::npos ? "" : drawn.substr(sizes_end);
+  if (differences != config.pose_map.Differences())
+    throw TensorError("the shards' pose maps were drawn with '" + drawn + "', the page's pose_map wants '" +
+                      config.pose_map.Differences() + "' behind the sizes: pack again with this page");
   if (!start.codec_sha256.empty() && shards.codec() != start.codec_sha256)
     throw TensorError(start.codec.string() + " did not make the shards' latents (they are of codec " + shards.codec() +
                       "): wanted `evac encode` with this codec");
