@@ -20,6 +20,7 @@ void AddDoctor(CLI::App& app, ExitCode& exit_code);
 void AddCompare(CLI::App& app, ExitCode& exit_code);
 void AddImportReal(CLI::App& app, ExitCode& exit_code);
 void AddGate(CLI::App& app, ExitCode& exit_code);
+void AddFidelity(CLI::App& app, ExitCode& exit_code);
 void AddTrust(CLI::App& app, ExitCode& exit_code);
 void AddPlan(CLI::App& app, ExitCode& exit_code);
 void AddLs(CLI::App& app, ExitCode& exit_code);

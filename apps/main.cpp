@@ -27,6 +27,7 @@ int main(int argc, char** argv) {
     evac::AddImportReal(app, exit_code);
     evac::AddTrust(app, exit_code);
     evac::AddGate(app, exit_code);
+    evac::AddFidelity(app, exit_code);
     evac::AddValidate(app, exit_code);
     evac::AddDoctor(app, exit_code);
     evac::AddLs(app, exit_code);

@@ -4,6 +4,8 @@
 #include <fstream>
 #include <nlohmann/json.hpp>
 
+#include <fmt/format.h>
+
 #include "core/file.h"
 #include "core/store.h"
 #include "tests/core/store_samples.h"

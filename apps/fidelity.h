@@ -1,0 +1,62 @@
+#pragma once
+
+#include <filesystem>
+#include <set>
+#include <string>
+#include <vector>
+
+#include "core/error.h"
+#include "core/store.h"
+#include "harness/suite.h"
+
+/// `evac fidelity`: is the world model true? (docs/fidelity.md) It fills OUT/closed, OUT/open, OUT/counterfactual_NAME and
+/// OUT/horizon, each a run of its own that any kill leaves resumable, and counts them (reports/fidelity.h).
+namespace evac {
+
+enum class FidelityPart { kClosed, kOpen, kCounterfactual, kHorizon };
+
+struct FidelityArguments {
+  std::string suite, out;
+  std::vector<std::string> assignments;
+  std::vector<std::string> parts = {"closed", "open", "counterfactual", "horizon"};
+  std::string classifier;       ///< weights of the judge of imagined clips
+  int counterfactual_states = 10;  ///< successes per task that are made to fail
+  int horizon_states = 3;          ///< long rollouts per task
+  int horizon_chunks = 30;         ///< of the network's K frames
+};
+ExitCode RunFidelity(const FidelityArguments& arguments);
+
+/// The three worlds of a fidelity suite.
+struct FidelityWorlds {
+  SuiteWorld real;   ///< `role: real`
+  SuiteWorld again;  ///< the same profile under another name: other noise
+  SuiteWorld model;  ///< type evac
+};
+/// @throws InvalidInput naming which of them the suite lacks.
+FidelityWorlds WorldsOf(const Suite& suite);
+
+/// Actions to be executed from an initial state, whatever is observed.
+struct Replay {
+  PairKey pair;
+  const Task* task = nullptr;
+  InitialState initial;
+  std::vector<Arms> actions;
+};
+
+/// The executed actions of every episode of a world that did not fail. The jobs point into `suite.tasks`.
+std::vector<Replay> ReplaysOf(const Store& store, const std::string& world, const Suite& suite);
+
+/// Where replays are run, and what from.
+struct ReplayRun {
+  const Suite& suite;
+  std::filesystem::path folder;
+  std::string name;               ///< "open loop": shown, and part of the run's hash
+  std::vector<Task> tasks;        ///< as they are declared in the store
+  std::vector<SuiteWorld> worlds; ///< in the order they run
+  std::filesystem::path scenes;   ///< the run whose first frames imagined episodes start from; empty: this one
+};
+/// Runs what is missing. @returns the store, judged by the oracle where there is physics.
+/// @throws InternalError if it was interrupted.
+Store RunReplays(const ReplayRun& run, const std::vector<Replay>& replays);
+
+}  // namespace evac

@@ -1,0 +1,104 @@
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "core/statistics/estimate.h"
+#include "core/types.h"
+#include "reports/comparison.h"
+#include "reports/outcome.h"
+
+/// Is a world model true? What `evac fidelity` measured, counted (docs/fidelity.md): outcomes of the same initial states
+/// in reality, in reality once more, and as imagined; and how pictures drift apart. Pure functions of what was measured;
+/// `apps/fidelity_*` measures.
+namespace evac {
+
+/// One initial state under one policy, or under recorded actions. An outcome is empty where there is none: the episode
+/// failed, its judge could not tell, or that world was not asked.
+struct FidelityRow {
+  std::string kind;  ///< closed_loop, open_loop, counterfactual:NAME
+  PairKey pair;
+  std::optional<bool> real;   ///< what truly happened
+  std::optional<bool> again;  ///< in reality once more, with other noise of the world
+  std::optional<bool> model;  ///< what the judge says of the imagined clip
+  std::string real_video, model_video;  ///< relative to the folder of the page; empty: none
+};
+
+/// One chunk of K frames, averaged over clips. PSNRs in dB of squared errors that were averaged first.
+struct ChunkDrift {
+  std::int64_t clips = 0;
+  Number psnr = Undefined{"no clip is so long"};         ///< of all pixels
+  Number psnr_moving = Undefined{"nothing moved"};       ///< of pixels that differ from the first frame in reality
+  Number psnr_moving_copy = Undefined{"nothing moved"};  ///< of those, had the first frame stood still
+  Number gripper_px = Undefined{"not found"};            ///< mean distance of the gripper from where it really is
+};
+
+/// Of replays: what pictures say, apart from outcomes.
+struct OpenLoopDrift {
+  std::vector<double> object_px;  ///< per clip: of the object's middle at the end, head camera; lost: the diagonal
+  std::vector<ChunkDrift> chunks;
+};
+
+/// The judge against the truth, on real clips.
+struct JudgeQualityOnReal {
+  std::string name;
+  Number auroc = Undefined{"no clips"}, ece = Undefined{"no clips"};
+  Estimate kappa;
+  Number kappa_masked = Undefined{"not asked"};  ///< with the object's pixels painted over
+};
+
+struct FidelityInput {
+  std::string suite_hash, model_hash;  ///< hex
+  std::vector<FidelityRow> rows;
+  OpenLoopDrift open_loop;
+  std::vector<ChunkDrift> horizon;  ///< of long rollouts
+  Number seconds_per_chunk = Undefined{"nothing was imagined"};
+  JudgeQualityOnReal judge;
+};
+
+/// One policy on one task, closed loop; rates over the states that count in both worlds.
+struct FidelityCell {
+  std::string task, policy, checkpoint;
+  std::int64_t n = 0;
+  Number real = Undefined{"no pairs"}, again = Undefined{"no pairs"}, model = Undefined{"no pairs"},
+         agreement = Undefined{"no pairs"};
+};
+
+/// How often two columns of outcomes agree, and how they do not.
+struct OutcomeMatch {
+  std::int64_t n = 0;
+  Estimate agreement;
+  Estimate hallucinated;  ///< success said, of those that truly failed
+  Estimate missed;        ///< failure said, of those that truly succeeded
+  Estimate kappa;
+};
+enum class FidelityColumn { kAgain, kModel };
+OutcomeMatch MatchOf(const std::vector<FidelityRow>& rows, const std::string& kind, FidelityColumn column);
+
+struct Fidelity {
+  FidelityInput input;
+  std::vector<FidelityCell> cells;
+  WorldComparison model, again;  ///< of the closed loop, against reality
+  Number mmrv = Undefined{"no task has two policies"}, mmrv_again = Undefined{"no task has two policies"};  ///< mean over tasks
+  OutcomeMatch closed, closed_again, open;
+  struct Counterfactual {
+    std::string kind;
+    OutcomeMatch match;
+  };
+  std::vector<Counterfactual> counterfactuals;
+  std::optional<std::int64_t> usable_horizon_chunks;  ///< up to the first that gains less than 2 dB over a still picture
+};
+Fidelity FidelityOf(FidelityInput input);
+
+/// fidelity.json (docs/fidelity.md); undefined numbers are null, their reasons stand under "undefined".
+std::string FidelityJson(const Fidelity& fidelity);
+/// kind,task,policy,checkpoint,initial_state,seed,real_outcome,real2_outcome,wm_verdict
+std::string FidelityCsv(const std::vector<FidelityRow>& rows);
+/// One page that opens from disk.
+std::string FidelityPage(const Fidelity& fidelity);
+/// A table for a terminal.
+std::string FidelityText(const Fidelity& fidelity);
+
+}  // namespace evac

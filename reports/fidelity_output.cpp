@@ -1,0 +1,188 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <nlohmann/json.hpp>
+
+#include "core/statistics/bootstrap.h"
+#include "reports/fidelity.h"
+#include "reports/text_table.h"
+
+namespace evac {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+constexpr double kObjectQuantile = 0.85;
+
+/// Numbers of one object; where one is undefined its reason is kept apart, so that readers find a number or null.
+class NumberWriter {
+ public:
+  void Put(const std::string& key, const Number& number) {
+    json_[key] = number ? Json(*number) : Json(nullptr);
+    if (!number) reasons_[key] = number.reason();
+  }
+  void Put(const std::string& key, std::int64_t count) { json_[key] = count; }
+  void Put(const std::string& key, Json value) { json_[key] = std::move(value); }
+  void PutReasonsOf(const std::string& key, NumberWriter part) { json_[key] = part.Take(); }
+  Json Take() {
+    if (!reasons_.empty()) json_["undefined"] = reasons_;
+    return std::move(json_);
+  }
+
+ private:
+  Json json_ = Json::object(), reasons_ = Json::object();
+};
+
+Number LowOf(const Estimate& estimate) {
+  if (!estimate.interval) return Undefined{estimate.interval.reason()};
+  return estimate.interval->low;
+}
+
+Json ByChunk(const std::vector<ChunkDrift>& chunks, Number ChunkDrift::*what) {
+  Json list = Json::array();
+  for (const ChunkDrift& chunk : chunks) list.push_back(chunk.*what ? Json(*(chunk.*what)) : Json(nullptr));
+  return list;
+}
+
+Json DriftsOf(const std::vector<ChunkDrift>& chunks) {
+  Json clips = Json::array();
+  for (const ChunkDrift& chunk : chunks) clips.push_back(chunk.clips);
+  return {{"clips_by_chunk", clips},
+          {"gripper_px_error_by_chunk", ByChunk(chunks, &ChunkDrift::gripper_px)},
+          {"psnr_by_chunk", ByChunk(chunks, &ChunkDrift::psnr)},
+          {"psnr_moving_by_chunk", ByChunk(chunks, &ChunkDrift::psnr_moving)},
+          {"psnr_moving_copy_by_chunk", ByChunk(chunks, &ChunkDrift::psnr_moving_copy)}};
+}
+
+Number ObjectError(const OpenLoopDrift& drift) {
+  if (drift.object_px.empty()) return Undefined{"the object was found in no real clip's end"};
+  std::vector<double> sorted = drift.object_px;
+  std::sort(sorted.begin(), sorted.end());
+  return Quantile(sorted, kObjectQuantile);
+}
+
+Json OpenLoopJson(const Fidelity& fidelity) {
+  NumberWriter open;
+  open.Put("n", fidelity.open.n);
+  open.Put("agreement", fidelity.open.agreement.value);
+  open.Put("hallucinated", fidelity.open.hallucinated.value);
+  open.Put("missed", fidelity.open.missed.value);
+  open.Put("object_px_error_p85", ObjectError(fidelity.input.open_loop));
+  Json json = open.Take();
+  json.update(DriftsOf(fidelity.input.open_loop.chunks));
+  return json;
+}
+
+Json CellsJson(const std::vector<FidelityCell>& cells) {
+  Json list = Json::array();
+  for (const FidelityCell& cell : cells) {
+    NumberWriter writer;
+    writer.Put("task", Json(cell.task));
+    writer.Put("policy", Json(cell.policy));
+    writer.Put("checkpoint", Json(cell.checkpoint));
+    writer.Put("n", cell.n);
+    writer.Put("real_sr", cell.real);
+    writer.Put("real2_sr", cell.again);
+    writer.Put("wm_sr", cell.model);
+    writer.Put("agreement", cell.agreement);
+    list.push_back(writer.Take());
+  }
+  return list;
+}
+
+Json CounterfactualsJson(const Fidelity& fidelity) {
+  Json list = Json::array();
+  for (const Fidelity::Counterfactual& one : fidelity.counterfactuals) {
+    NumberWriter writer;
+    writer.Put("kind", Json(one.kind.substr(one.kind.find(':') + 1)));
+    writer.Put("n", one.match.n);
+    writer.Put("hallucinated", one.match.hallucinated.value);
+    list.push_back(writer.Take());
+  }
+  return list;
+}
+
+Json JudgeJson(const JudgeQualityOnReal& judge) {
+  NumberWriter writer;
+  writer.Put("name", Json(judge.name));
+  writer.Put("auroc", judge.auroc);
+  writer.Put("kappa", judge.kappa.value);
+  writer.Put("ece", judge.ece);
+  writer.Put("kappa_masked", judge.kappa_masked);
+  return writer.Take();
+}
+
+std::string Cell(const std::optional<bool>& outcome) { return !outcome ? "" : *outcome ? "1" : "0"; }
+
+/// Quoted where a comma, a quote or a line's end asks for it.
+std::string CsvText(const std::string& text) {
+  if (text.find_first_of(",\"\n\r") == std::string::npos) return text;
+  std::string quoted = "\"";
+  for (const char c : text) quoted += c == '"' ? std::string("\"\"") : std::string(1, c);
+  return quoted + "\"";
+}
+
+std::string Words(const Number& number) { return number ? fmt::format("{:.3f}", *number) : "–"; }
+
+}  // namespace
+
+std::string FidelityJson(const Fidelity& fidelity) {
+  const CorrelationGroup& correlation = fidelity.model.correlation;
+  NumberWriter all;
+  all.Put("suite_hash", Json(fidelity.input.suite_hash));
+  all.Put("model_hash", Json(fidelity.input.model_hash));
+  all.Put("cells", CellsJson(fidelity.cells));
+  all.Put("pearson", correlation.pearson.value);
+  all.Put("pearson_low", LowOf(correlation.pearson));
+  all.Put("spearman", correlation.spearman.value);
+  all.Put("mmrv", fidelity.mmrv);
+  all.Put("mmrv_real_real", fidelity.mmrv_again);
+  all.Put("agreement", fidelity.closed.agreement.value);
+  all.Put("agreement_real_real", fidelity.closed_again.agreement.value);
+  all.Put("kappa", fidelity.closed.kappa.value);
+  all.Put("hallucinated", fidelity.closed.hallucinated.value);
+  all.Put("hallucinated_real_real", fidelity.closed_again.hallucinated.value);
+  all.Put("missed", fidelity.closed.missed.value);
+  all.Put("missed_real_real", fidelity.closed_again.missed.value);
+  all.Put("open_loop", OpenLoopJson(fidelity));
+  all.Put("counterfactual", CounterfactualsJson(fidelity));
+  all.Put("horizon", DriftsOf(fidelity.input.horizon));
+  all.Put("usable_horizon_chunks", fidelity.usable_horizon_chunks ? Json(*fidelity.usable_horizon_chunks) : Json(nullptr));
+  all.Put("seconds_per_chunk", fidelity.input.seconds_per_chunk);
+  all.Put("judge", JudgeJson(fidelity.input.judge));
+  return all.Take().dump(1) + "\n";
+}
+
+std::string FidelityCsv(const std::vector<FidelityRow>& rows) {
+  std::string csv = "kind,task,policy,checkpoint,initial_state,seed,real_outcome,real2_outcome,wm_verdict\n";
+  for (const FidelityRow& row : rows)
+    csv += fmt::format("{},{},{},{},{},{},{},{},{}\n", CsvText(row.kind), CsvText(row.pair.task), CsvText(row.pair.policy),
+                       CsvText(row.pair.checkpoint), CsvText(row.pair.initial_state), row.pair.seed, Cell(row.real),
+                       Cell(row.again), Cell(row.model));
+  return csv;
+}
+
+std::string FidelityText(const Fidelity& fidelity) {
+  std::vector<std::vector<std::string>> rows = {{"task", "policy", "n", "real", "again", "model", "agreement"}};
+  for (const FidelityCell& cell : fidelity.cells)
+    rows.push_back({cell.task, PolicyLabel(cell.policy, cell.checkpoint), std::to_string(cell.n), Words(cell.real),
+                    Words(cell.again), Words(cell.model), Words(cell.agreement)});
+  std::string text = TextTable(rows) + "\n";
+  std::vector<std::vector<std::string>> whole = {{"", "n", "agreement", "hallucinated", "missed"}};
+  const auto add = [&](const std::string& name, const OutcomeMatch& match) {
+    whole.push_back({name, std::to_string(match.n), Words(match.agreement.value), Words(match.hallucinated.value),
+                     Words(match.missed.value)});
+  };
+  add("closed loop", fidelity.closed);
+  add("real against real", fidelity.closed_again);
+  if (fidelity.open.n > 0) add("open loop", fidelity.open);
+  for (const Fidelity::Counterfactual& one : fidelity.counterfactuals) add(one.kind, one.match);
+  text += TextTable(whole) + "\n";
+  const CorrelationGroup& correlation = fidelity.model.correlation;
+  text += fmt::format("Pearson {} (low {}), Spearman {}, MMRV {} (real against real {})\n", Words(correlation.pearson.value),
+                      Words(LowOf(correlation.pearson)), Words(correlation.spearman.value), Words(fidelity.mmrv),
+                      Words(fidelity.mmrv_again));
+  return text;
+}
+
+}  // namespace evac

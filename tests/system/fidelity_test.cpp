@@ -1,0 +1,91 @@
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <signal.h>
+#include <sys/wait.h>
+
+#include <nlohmann/json.hpp>
+#include <sstream>
+#include <thread>
+
+#include "core/file.h"
+#include "tests/support/command.h"
+#include "tests/support/temp_folder.h"
+#include "tests/system/run_support.h"
+#include "worldmodel/evac_config.h"
+#include "worldmodel/nn/weights.h"
+
+namespace evac {
+namespace {
+
+namespace fs = std::filesystem;
+using testing::HasSubstr;
+
+/// A world model of random weights, asked how true it is.
+class FidelityRun : public testing::Test {
+ protected:
+  FidelityRun() {
+    nn::RandomWeights random(5);
+    nn::SaveWeights(weights_, random, ReadEvacConfig(EVAC_SOURCE_DIR "/tests/system/evac_small.yaml"));
+  }
+
+  std::vector<std::string> Words(const fs::path& out) const {
+    return {Binary("evac"), "fidelity", EVAC_SOURCE_DIR "/tests/system/fidelity.yaml", "--out", out.string(),
+            "--set", "worlds.2.weights=" + weights_.string(), "--counterfactual-states", "1", "--horizon-states", "1",
+            "--horizon-chunks", "3"};
+  }
+
+  const TempFolder folder_;
+  const fs::path weights_ = folder_ / "small.safetensors";
+};
+
+/// What was measured, but for how long it took.
+nlohmann::json Numbers(const fs::path& out) {
+  nlohmann::json json = nlohmann::json::parse(ReadFile(out / "fidelity.json"));
+  json.erase("seconds_per_chunk");
+  return json;
+}
+
+TEST_F(FidelityRun, AsksEveryPartAndEndsInTheSameNumbersWhenItWasKilled) {
+  const fs::path whole = folder_ / "whole", killed = folder_ / "killed";
+  const auto begin = std::chrono::steady_clock::now();
+  const CommandResult straight = RunCommand(Words(whole));
+  const double whole_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+  ASSERT_EQ(straight.exit_code, 0) << straight.err;
+  EXPECT_THAT(straight.err, HasSubstr("nobody judges the imagined clips"));
+
+  std::istringstream rows(ReadFile(whole / "episodes.csv"));
+  std::vector<std::string> lines;
+  for (std::string line; std::getline(rows, line);) lines.push_back(line);
+  ASSERT_EQ(lines.size(), 6u) << "a head, closed loop, open loop, three counterfactuals";
+  EXPECT_EQ(lines[1], "closed_loop,take_toast,visual_pick,good,3-0000,1,1,1,");
+  EXPECT_EQ(lines[2], "open_loop,take_toast,visual_pick,good,3-0000,1,1,,");
+  for (std::size_t i = 3; i < 6; ++i) EXPECT_THAT(lines[i], HasSubstr(",3-0000,1,0,,")) << "it fails in truth";
+
+  const nlohmann::json numbers = Numbers(whole);
+  EXPECT_GE(numbers["open_loop"]["psnr_by_chunk"].size(), 2u);
+  EXPECT_EQ(numbers["horizon"]["psnr_moving_by_chunk"].size(), 3u);
+  EXPECT_TRUE(fs::exists(whole / "index.html"));
+
+  for (const double part : {0.2, 0.5}) {
+    const pid_t pid = StartCommand(Words(killed), folder_ / "log");
+    std::this_thread::sleep_for(std::chrono::duration<double>(part * whole_s));
+    ::kill(pid, SIGKILL);
+    ::waitpid(pid, nullptr, 0);
+  }
+  const CommandResult last = RunCommand(Words(killed));
+  ASSERT_EQ(last.exit_code, 0) << last.err;
+  EXPECT_EQ(Numbers(killed), numbers);
+  EXPECT_EQ(ReadFile(killed / "episodes.csv"), ReadFile(whole / "episodes.csv"));
+}
+
+TEST_F(FidelityRun, SaysWhichWorldTheSuiteLacks) {
+  std::vector<std::string> words = Words(folder_ / "out");
+  words[2] = EVAC_SOURCE_DIR "/tests/system/imagined.yaml";
+  words[6] = "worlds.1.weights=" + weights_.string();
+  const CommandResult result = RunCommand(words);
+  EXPECT_EQ(result.exit_code, 2) << result.err;
+  EXPECT_THAT(result.err, HasSubstr("wanted another of type mujoco with the real world's profile"));
+}
+
+}  // namespace
+}  // namespace evac
