@@ -12,6 +12,7 @@
 #include "apps/training_page.h"
 #include "core/file.h"
 #include "core/hash.h"
+#include "worldmodel/nn/memory.h"
 #include "worldmodel/nn/threads.h"
 #include "worldmodel/train/train_world.h"
 
@@ -29,6 +30,7 @@ ExitCode RunCodec(const TrainArguments& arguments) {
   const CatchInterrupts catch_interrupts;
   TrainingProgress progress(stderr);
   const train::JobPlace place = PlaceOf(arguments, progress);
+  nn::KeepFreedMemory();
   const nn::LibraryThreads threads(LibraryThreadsOf(place, options.job));
   return End(TrainCodec(place, options), arguments.out, "codec.safetensors");
 }
@@ -54,6 +56,7 @@ ExitCode RunWorld(const TrainArguments& arguments) {
   const CatchInterrupts catch_interrupts;
   TrainingProgress progress(stderr);
   const train::JobPlace place = PlaceOf(arguments, progress);
+  nn::KeepFreedMemory();
   const nn::LibraryThreads threads(LibraryThreadsOf(place, options.job));
   const auto look = [&](std::int64_t step, const train::Strips& strips) { WriteStrips(arguments.out, step, strips); };
   return End(TrainWorld(place, options, start, look), arguments.out, "weights.safetensors");
@@ -107,6 +110,7 @@ ExitCode RunJudge(const TrainArguments& arguments) {
   const CatchInterrupts catch_interrupts;
   TrainingProgress progress(stderr);
   const train::JobPlace place = PlaceOf(arguments, progress);
+  nn::KeepFreedMemory();
   const nn::LibraryThreads threads(1);
   return End(TrainJudge(place, options), arguments.out, "judge.safetensors");
 }
@@ -129,6 +133,7 @@ ExitCode RunPolicy(const TrainArguments& arguments) {
   const CatchInterrupts catch_interrupts;
   TrainingProgress progress(stderr);
   const train::JobPlace place = PlaceOf(arguments, progress);
+  nn::KeepFreedMemory();
   const nn::LibraryThreads threads(1);
   return End(TrainPolicy(place, options, arguments.keep_steps), arguments.out, "policy.safetensors");
 }
