@@ -121,7 +121,7 @@ void AddJudgeTraining(CLI::App& group, ExitCode& exit_code) {
   AddShared(*command, arguments);
   command->footer(
       "Example:\n"
-      "  evac train judge out/shards --training apps/configs/desk_training.yaml --out out/judge\n"
+      "  evac train judge out/shards --training apps/configs/desk_learning.yaml --out out/judge\n"
       "OUT: judge.safetensors with its card (docs/classifier_judge.md), metrics.csv, holdout.csv");
   command->callback([arguments, &exit_code] { exit_code = RunJudge(*arguments); });
 }
@@ -148,7 +148,7 @@ void AddPolicyTraining(CLI::App& group, ExitCode& exit_code) {
       ->delimiter(',');
   command->footer(
       "Example:\n"
-      "  evac train policy out/shards --training apps/configs/desk_training.yaml --keep-steps 500,1000,2000 --out out/policy\n"
+      "  evac train policy out/shards --training apps/configs/desk_learning.yaml --keep-steps 500,1000,2000 --out out/policy\n"
       "OUT: policy.safetensors and policy_<step>.safetensors, each with its card (docs/learned_policy.md)\n"
       "Then: evac-policy learned --checkpoint out/policy/policy.safetensors");
   command->callback([arguments, &exit_code] { exit_code = RunPolicy(*arguments); });

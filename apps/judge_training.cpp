@@ -38,7 +38,6 @@ train::Settings SettingsOf(JudgeOptions& options) {
                               {"drop_view", &options.drop_view},
                               {"jitter", &options.jitter},
                               {"object_weight", &options.object_weight},
-                              {"reconstructed_share", &options.reconstructed_share},
                               {"unsure", &options.unsure},
                               {"light", &options.changes.light},
                               {"offset", &options.changes.offset},

@@ -18,7 +18,6 @@ struct JudgeOptions {
   double drop_view = 0.5;            ///< share of clips of which the first view alone is shown
   double jitter = 0.3;               ///< pictures between first and last move by up to this part of their distance
   double object_weight = 1;          ///< of looking where the object is, beside the verdict
-  double reconstructed_share = 0.5;  ///< of clips as the codec gives them back, where there is one
   double unsure = 0.1;               ///< what the card says: closer to the threshold is `cannot tell`
   PictureChanges changes;
 };
