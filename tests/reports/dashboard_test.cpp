@@ -19,11 +19,19 @@ namespace {
 using testing::HasSubstr;
 using testing::Not;
 
+DashboardOptions OptionsFor(std::vector<std::filesystem::path> runs) {
+  DashboardOptions options;
+  options.runs = std::move(runs);
+  options.look_every_s = 0.05;
+  options.program = "evac test";
+  return options;
+}
+
 /// A dashboard at work, on a port of its own.
 class Served {
  public:
   explicit Served(std::vector<std::filesystem::path> runs)
-      : dashboard_({.runs = std::move(runs), .look_every_s = 0.05, .program = "evac test"}),
+      : dashboard_(OptionsFor(std::move(runs))),
         thread_([this] { dashboard_.Serve(); }) {}
   ~Served() {
     dashboard_.Stop();
