@@ -3,11 +3,15 @@
 #include <memory>
 
 #include "apps/commands.h"
+#include "apps/judge_with_vlm.h"
 #include "judges/classifier_judge.h"
 #include "judges/judge_episodes.h"
 #include "judges/oracle_judge.h"
 
 namespace evac {
+
+void AddCalibrate(CLI::App& judge, ExitCode& exit_code);  // command_calibrate.cpp: a subcommand of this one
+
 namespace {
 
 struct JudgeArguments {
@@ -15,33 +19,44 @@ struct JudgeArguments {
   std::string judge = "oracle";
   std::string weights;
   bool again = false;
+  VlmJudgeArguments vlm{};
 };
 
-/// "60 rated (42 success, 18 failure), 0 had a verdict, 1 failed and is not judged"
-std::string Sentence(const JudgeSummary& summary) {
-  std::string labels;
-  for (const auto& [label, count] : summary.labels)
-    labels += fmt::format("{}{} {}", labels.empty() ? "" : ", ", count, Name(label));
-  return fmt::format("{} rated{}, {} had a verdict already, {} failed episodes are not judged", summary.rated,
-                     labels.empty() ? "" : " (" + labels + ")", summary.already, summary.failed);
+ExitCode RateWithVlm(const JudgeArguments& arguments) {
+  VlmJudgeArguments vlm = arguments.vlm;
+  if (vlm.config.empty()) throw InvalidInput("--judge vlm: wanted --config PAGE.yaml as well (docs/vlm_judge.md)");
+  vlm.run = arguments.run;
+  vlm.again = arguments.again;
+  return JudgeWithVlm(vlm);
 }
 
 std::unique_ptr<Judge> MakeJudge(const JudgeArguments& arguments, const Store& store) {
   if (arguments.judge == "oracle" && !arguments.weights.empty())
     throw InvalidInput("--weights: the oracle has none, wanted --judge classifier");
   if (arguments.judge == "oracle") return std::make_unique<OracleJudge>(store);
-  if (arguments.judge != "classifier") throw InvalidInput("--judge: found '{}', wanted oracle or classifier", arguments.judge);
-  if (arguments.weights.empty()) throw InvalidInput("--judge classifier: wanted --weights, a file of `evac train judge`");
+  if (arguments.judge != "classifier")
+    throw InvalidInput("--judge: found '{}', wanted oracle, classifier or vlm", arguments.judge);
+  if (arguments.weights.empty())
+    throw InvalidInput("--judge classifier: wanted --weights, a file of `evac train judge`");
   auto judge = std::make_unique<ClassifierJudge>(arguments.weights, store.folder());
   judge->CheckKnows(store.Tasks());
   return judge;
 }
 
 ExitCode Rate(const JudgeArguments& arguments) {
+  if (arguments.run.empty()) throw InvalidInput("wanted the run's folder: evac judge RUN --judge NAME");
+  if (arguments.judge == "vlm") return RateWithVlm(arguments);
   Store store = Store::Open(arguments.run, Store::Mode::kReadWrite);
   const std::unique_ptr<Judge> judge = MakeJudge(arguments, store);
   fmt::print("{}: {}\n", judge->Name(), Sentence(JudgeEpisodes(*judge, store, {.again = arguments.again})));
   return ExitCode::kOk;
+}
+
+void AddVlmOptions(CLI::App& command, VlmJudgeArguments& vlm) {
+  command.add_option("--config", vlm.config, "vlm: the model server's page (docs/vlm_judge.md)");
+  command.add_flag("--dry-run", vlm.dry_run, "vlm: say how many requests and tokens it would take, and ask nothing");
+  command.add_flag("--offline", vlm.offline, "vlm: answers of earlier calls alone; no network");
+  command.add_flag("--retest", vlm.retest, "vlm: ask a share of the episodes twice, to see whether answers repeat");
 }
 
 }  // namespace
@@ -49,15 +64,26 @@ ExitCode Rate(const JudgeArguments& arguments) {
 void AddJudge(CLI::App& app, ExitCode& exit_code) {
   auto arguments = std::make_shared<JudgeArguments>();
   CLI::App* command = app.add_subcommand("judge", "Say of every episode of a run whether it succeeded");
-  command->add_option("run", arguments->run, "the run's folder")->required();
-  command->add_option("--judge", arguments->judge, "oracle: the task's rubric against the physics of the world; classifier: a network that sees the clip alone")
+  command->add_option("run", arguments->run, "the run's folder");
+  command
+      ->add_option(
+          "--judge", arguments->judge,
+          "oracle: the task's rubric against the physics of the world; classifier: a network that sees the clip alone; "
+          "vlm: a vision-language model that looks at the clip")
       ->capture_default_str();
   command->add_option("--weights", arguments->weights, "of the classifier (docs/classifier_judge.md)");
   command->add_flag("--again", arguments->again,
                     "rate also what this judge has rated; every verdict is kept, the last one counts");
-  command->footer("Examples:\n  evac judge out/demo --judge oracle\n  evac judge out/demo --judge oracle --again\n"
-                  "  evac judge out/demo --judge classifier --weights out/judge/judge.safetensors");
-  command->callback([arguments, &exit_code] { exit_code = Rate(*arguments); });
+  command->footer(
+      "Examples:\n  evac judge out/demo --judge oracle\n  evac judge out/demo --judge oracle --again\n"
+      "  evac judge out/demo --judge classifier --weights out/judge/judge.safetensors\n"
+      "  evac judge out/demo --judge vlm --config qwen.yaml --dry-run\n"
+      "  evac judge calibrate out/demo --judge vlm:qwen-1a2b3c4d");
+  AddVlmOptions(*command, arguments->vlm);
+  AddCalibrate(*command, exit_code);
+  command->callback([command, arguments, &exit_code] {
+    if (!command->got_subcommand("calibrate")) exit_code = Rate(*arguments);
+  });
 }
 
 }  // namespace evac

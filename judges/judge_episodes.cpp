@@ -1,5 +1,7 @@
 #include "judges/judge_episodes.h"
 
+#include <fmt/format.h>
+
 #include <string_view>
 
 #include "core/error.h"
@@ -35,6 +37,15 @@ bool HasVerdict(const std::map<std::string, std::map<std::string, Verdict>>& cur
 }
 
 }  // namespace
+
+std::string Sentence(const JudgeSummary& summary) {
+  std::string labels;
+  for (const auto& [label, count] : summary.labels)
+    labels += fmt::format("{}{} {}", labels.empty() ? "" : ", ", count, Name(label));
+  return fmt::format("{} rated{}, {} had a verdict already, {} failed episodes are not judged{}", summary.rated,
+                     labels.empty() ? "" : " (" + labels + ")", summary.already, summary.failed,
+                     summary.left_out > 0 ? fmt::format(", {} left out", summary.left_out) : "");
+}
 
 JudgeSummary JudgeEpisodes(Judge& judge, Store& store, const JudgeOptions& options) {
   std::map<std::string, Task> tasks;

@@ -26,6 +26,9 @@ struct JudgeSummary {
   std::string why_over;         ///< why the rest was not judged (interrupted, or an Error called judge_over), or empty
 };
 
+/// "60 rated (42 success, 18 failure), 0 had a verdict already, 1 failed episodes are not judged"
+std::string Sentence(const JudgeSummary& summary);
+
 /// Rates every episode of a store that did not fail and has no verdict by this judge yet, one at a time; each verdict
 /// is stored before the next is asked for, so that an interruption loses one at most. A judge that throws gives a
 /// verdict `invalid` with the message, never a failure; but after an Error called `not_judged` or `judge_over`

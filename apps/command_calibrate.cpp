@@ -1,0 +1,88 @@
+#include <fmt/format.h>
+
+#include <memory>
+#include <nlohmann/json.hpp>
+
+#include "apps/commands.h"
+#include "judges/judge_calibration.h"
+
+namespace evac {
+namespace {
+
+using nlohmann::json;
+
+struct CalibrateArguments {
+  std::string run, judge, against = "oracle";
+  bool as_json = false;
+};
+
+/// A number, or null with the reason beside it.
+json Json(const Number& number) { return number ? json(*number) : json(nullptr); }
+
+json Json(const JudgeQualityRow& row) {
+  const ConfusionStatistics& s = row.statistics;
+  json kappa = {{"value", Json(s.kappa.value)}, {"low", nullptr}, {"high", nullptr}};
+  if (s.kappa.value && s.kappa.interval) {
+    kappa["low"] = s.kappa.interval->low;
+    kappa["high"] = s.kappa.interval->high;
+  } else {
+    kappa["reason"] = s.kappa.value ? s.kappa.interval.reason() : s.kappa.value.reason();
+  }
+  return {{"group", row.group},
+          {"n", s.n},
+          {"both_success", row.confusion.both_success},
+          {"only_judge_success", row.confusion.only_judge_success},
+          {"only_truth_success", row.confusion.only_human_success},
+          {"both_failure", row.confusion.both_failure},
+          {"cannot_tell", row.cannot_tell},
+          {"errors", row.errors},
+          {"accuracy", Json(s.accuracy)},
+          {"kappa", kappa},
+          {"ac1", Json(s.gwet_ac1)},
+          {"sensitivity", Json(s.sensitivity)},
+          {"specificity", Json(s.specificity)},
+          {"bias", Json(s.bias)},
+          {"brier", Json(row.calibration.brier)},
+          {"ece", Json(row.calibration.ece)}};
+}
+
+json Json(const JudgeCalibrationReport& report) {
+  json rows = json::array(), probes = json::object();
+  for (const JudgeQualityRow& row : report.rows) rows.push_back(Json(row));
+  for (const auto& [probe, count] : report.consistency)
+    probes[probe] = {{"same", count.successes}, {"of", count.trials}};
+  return {{"judge", report.judge},
+          {"truth", report.truth},
+          {"rows", rows},
+          {"probes", probes},
+          {"missing", report.missing},
+          {"refusals", report.refusals},
+          {"accepted", report.missing.empty() && report.refusals.empty()}};
+}
+
+ExitCode Calibrate(const CalibrateArguments& arguments) {
+  const Store store = Store::Open(arguments.run, Store::Mode::kReadOnly);
+  const JudgeCalibrationReport report = CalibrateJudge(store, arguments.judge, arguments.against);
+  fmt::print("{}", arguments.as_json ? Json(report).dump(2) + "\n" : Text(report));
+  if (!report.missing.empty()) return ExitCode::kInconclusive;
+  return report.refusals.empty() ? ExitCode::kOk : ExitCode::kNo;
+}
+
+}  // namespace
+
+void AddCalibrate(CLI::App& judge, ExitCode& exit_code) {
+  auto arguments = std::make_shared<CalibrateArguments>();
+  CLI::App* command = judge.add_subcommand("calibrate", "Say how far a judge may be trusted: it against the truth");
+  command->add_option("run", arguments->run, "the run's folder")->required();
+  command->add_option("--judge", arguments->judge, "whose verdicts are looked at: the name that `evac ls --json` shows")
+      ->required();
+  command->add_option("--against", arguments->against, "whose verdicts are the truth: oracle, or human")
+      ->capture_default_str();
+  command->add_flag("--json", arguments->as_json, "for other programs");
+  command->footer(
+      "Exit code 0: a gate may count it; 1: it is not good enough; 3: too few episodes to say.\n"
+      "Example:\n  evac judge calibrate out/demo --judge vlm:qwen3-vl-1a2b3c4d");
+  command->callback([arguments, &exit_code] { exit_code = Calibrate(*arguments); });
+}
+
+}  // namespace evac

@@ -1,0 +1,108 @@
+#include "apps/judge_with_vlm.h"
+
+#include <fmt/chrono.h>
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <chrono>
+#include <ctime>
+#include <iterator>
+#include <thread>
+
+#include "core/seed.h"
+#include "core/store_calls.h"
+#include "judges/judge_episodes.h"
+#include "judges/vlm_judge.h"
+
+namespace evac {
+namespace {
+
+constexpr long kTextTokens = 700;  ///< of rubric, captions and question
+
+std::string Now() { return fmt::format("{:%Y-%m-%dT%H:%M:%SZ}", fmt::gmtime(std::time(nullptr))); }
+
+/// The same episodes every time, whatever else the run holds.
+bool IsProbed(const Episode& episode, double share) {
+  return SplitMix64(SeedFor(0, "probe " + episode.key.Id())).Uniform() < share;
+}
+
+/// What the next call of the same judge would ask for.
+ExitCode SayWhatItWouldCost(const VlmConfig& config, Store& store) {
+  std::map<std::string, Task> tasks;
+  for (Task& task : store.Tasks()) tasks.emplace(task.id, std::move(task));
+  const auto current = store.CurrentVerdicts();
+  long requests = 0, tokens = 0, clips = 0;
+  for (const Episode& episode : store.Episodes()) {
+    const auto verdicts = current.find(episode.key.Id());
+    const bool has_one = verdicts != current.end() && verdicts->second.contains(config.JudgeName());
+    if (IsFailure(episode.stop) || has_one || episode.video.empty()) continue;
+    const auto frames = ReadVlmFrames(store.folder() / episode.video, tasks.at(episode.key.pair.task), config.clip);
+    const long asked = std::ssize(kVlmWordings) + (IsProbed(episode, config.probe_share) ? 1 : 0);
+    ++clips;
+    requests += asked;
+    tokens += asked * (EstimatedTokens(frames) + kTextTokens);
+  }
+  const VlmSpent estimate{.requests = requests, .prompt_tokens = tokens, .completion_tokens = requests * 250};
+  fmt::print("{}: {} clips, {} requests, about {} prompt tokens", config.JudgeName(), clips, requests, tokens);
+  if (config.budget.usd_per_million_prompt_tokens > 0) fmt::print(", about {:.2f} USD", estimate.Usd(config.budget));
+  fmt::print("\n");
+  return ExitCode::kOk;
+}
+
+VlmClientOptions ClientOptions(const VlmConfig& config, bool offline) {
+  return {.base_url = config.base_url,
+          .bearer_key = offline ? "" : config.Key(),
+          .limits = config.limits,
+          .budget = config.budget,
+          .seed = static_cast<std::uint64_t>(config.sampling.seed),
+          .sleep_s = [](double wait_s) { std::this_thread::sleep_for(std::chrono::duration<double>(wait_s)); }};
+}
+
+/// Who answers, and whether it sees; without a network, who answered last.
+std::string Greet(const VlmConfig& config, VlmClient& client, CallCache& cache, bool offline) {
+  const std::string& model = config.sampling.model;
+  if (offline) {
+    const auto known = cache.Fingerprint(config.base_url, model);
+    if (!known) throw InvalidInput("--offline: {} was never asked for {} in this run", config.base_url, model);
+    return *known;
+  }
+  const std::string fingerprint = client.Fingerprint(model);
+  CheckThatItSees(client, config.sampling);
+  cache.SetFingerprint(config.base_url, model, fingerprint);
+  return fingerprint;
+}
+
+void ShowProgress(const Verdict& verdict) {
+  if (::isatty(STDERR_FILENO))
+    fmt::print(stderr, "{}: {} ({})\n", verdict.episode_id, Name(verdict.label), verdict.reason);
+}
+
+}  // namespace
+
+ExitCode JudgeWithVlm(const VlmJudgeArguments& arguments) {
+  const VlmConfig config = VlmConfig::FromFile(arguments.config);
+  Store store = Store::Open(arguments.run, Store::Mode::kReadWrite);
+  if (arguments.dry_run) return SayWhatItWouldCost(config, store);
+  CallCache cache(store.folder() / "judge_calls.sqlite");
+  VlmClient client(ClientOptions(config, arguments.offline));
+  VlmJudgeOptions options{.run_folder = store.folder(), .offline = arguments.offline, .now = Now};
+  options.fingerprint = Greet(config, client, cache, arguments.offline);
+  for (const VlmProbe probe : {VlmProbe::kNone, VlmProbe::kFlip, VlmProbe::kRetest}) {
+    if (probe == VlmProbe::kRetest && !arguments.retest) continue;
+    options.probe = probe;
+    VlmJudge judge(config, options, client, cache);
+    JudgeOptions how{.again = arguments.again, .on_verdict = ShowProgress};
+    if (probe != VlmProbe::kNone)
+      how.wanted = [&](const Episode& episode) { return IsProbed(episode, config.probe_share); };
+    const JudgeSummary summary = JudgeEpisodes(judge, store, how);
+    fmt::print("{}: {}\n", judge.Name(), Sentence(summary));
+    if (!summary.why_over.empty())
+      throw InternalError("{}\n      what was judged is stored; the same command goes on from there", summary.why_over);
+  }
+  const VlmSpent spent = client.spent();
+  fmt::print("{} requests, {} prompt and {} completion tokens\n", spent.requests, spent.prompt_tokens,
+             spent.completion_tokens);
+  return ExitCode::kOk;
+}
+
+}  // namespace evac
