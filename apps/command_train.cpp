@@ -7,8 +7,6 @@
 #include "apps/commands.h"
 #include "apps/interrupts.h"
 #include "apps/train_arguments.h"
-#include "apps/train_judge.h"
-#include "apps/train_policy.h"
 #include "apps/training_page.h"
 #include "core/file.h"
 #include "core/hash.h"
@@ -62,15 +60,11 @@ ExitCode RunWorld(const TrainArguments& arguments) {
   return End(TrainWorld(place, options, start, look), arguments.out, "weights.safetensors");
 }
 
-void AddConfig(CLI::App& command, const Arguments& arguments) {
-  command.add_option("--config", arguments->config, "the page of the network's sizes")->required()->check(CLI::ExistingFile);
-}
-
 void AddCodec(CLI::App& group, ExitCode& exit_code) {
   const auto arguments = std::make_shared<TrainArguments>();
   CLI::App* command = group.add_subcommand("codec", "Train the latent codec on pictures and pose maps.");
   AddShared(*command, arguments);
-  AddConfig(*command, arguments);
+  AddConfig(*command, arguments)->required();
   command->footer(
       "Example:\n"
       "  evac train codec out/shards --config apps/configs/desk_model.yaml --training apps/configs/desk_training.yaml \\\n"
@@ -83,7 +77,7 @@ void AddWorld(CLI::App& group, ExitCode& exit_code) {
   const auto arguments = std::make_shared<TrainArguments>();
   CLI::App* command = group.add_subcommand("world", "Train the world model on encoded shards.");
   AddShared(*command, arguments);
-  AddConfig(*command, arguments);
+  AddConfig(*command, arguments)->required();
   command->add_option("--codec", arguments->codec, "the codec's weights, which encoded the shards")
       ->required()
       ->check(CLI::ExistingFile);
@@ -103,57 +97,6 @@ void AddWorld(CLI::App& group, ExitCode& exit_code) {
   command->callback([arguments, &exit_code] { exit_code = RunWorld(*arguments); });
 }
 
-ExitCode RunJudge(const TrainArguments& arguments) {
-  JudgeOptions options;
-  ReadTrainingPage(arguments.training, "judge", arguments.settings, SettingsOf(options));
-  Override(arguments, options.job.trainer);
-  const CatchInterrupts catch_interrupts;
-  TrainingProgress progress(stderr);
-  const train::JobPlace place = PlaceOf(arguments, progress);
-  nn::KeepFreedMemory();
-  const nn::LibraryThreads threads(1);
-  return End(TrainJudge(place, options), arguments.out, "judge.safetensors");
-}
-
-void AddJudgeTraining(CLI::App& group, ExitCode& exit_code) {
-  const auto arguments = std::make_shared<TrainArguments>();
-  CLI::App* command = group.add_subcommand("judge", "Train the classifier judge on clips with a known outcome.");
-  AddShared(*command, arguments);
-  command->footer(
-      "Example:\n"
-      "  evac train judge out/shards --training apps/configs/desk_learning.yaml --out out/judge\n"
-      "OUT: judge.safetensors with its card (docs/classifier_judge.md), metrics.csv, holdout.csv");
-  command->callback([arguments, &exit_code] { exit_code = RunJudge(*arguments); });
-}
-
-ExitCode RunPolicy(const TrainArguments& arguments) {
-  PolicyOptions options;
-  ReadTrainingPage(arguments.training, "policy", arguments.settings, SettingsOf(options));
-  Override(arguments, options.job.trainer);
-  const CatchInterrupts catch_interrupts;
-  TrainingProgress progress(stderr);
-  const train::JobPlace place = PlaceOf(arguments, progress);
-  nn::KeepFreedMemory();
-  const nn::LibraryThreads threads(1);
-  return End(TrainPolicy(place, options, arguments.keep_steps), arguments.out, "policy.safetensors");
-}
-
-void AddPolicyTraining(CLI::App& group, ExitCode& exit_code) {
-  const auto arguments = std::make_shared<TrainArguments>();
-  CLI::App* command = group.add_subcommand("policy", "Train a policy to imitate recordings that succeeded.");
-  AddShared(*command, arguments);
-  command
-      ->add_option("--keep-steps", arguments->keep_steps,
-                   "steps after which a checkpoint is kept beside the last, with commas between them")
-      ->delimiter(',');
-  command->footer(
-      "Example:\n"
-      "  evac train policy out/shards --training apps/configs/desk_learning.yaml --keep-steps 500,1000,2000 --out out/policy\n"
-      "OUT: policy.safetensors and policy_<step>.safetensors, each with its card (docs/learned_policy.md)\n"
-      "Then: evac-policy learned --checkpoint out/policy/policy.safetensors");
-  command->callback([arguments, &exit_code] { exit_code = RunPolicy(*arguments); });
-}
-
 }  // namespace
 
 void AddTrain(CLI::App& app, ExitCode& exit_code) {
@@ -161,8 +104,8 @@ void AddTrain(CLI::App& app, ExitCode& exit_code) {
   group->require_subcommand(1);
   AddCodec(*group, exit_code);
   AddWorld(*group, exit_code);
-  AddJudgeTraining(*group, exit_code);
-  AddPolicyTraining(*group, exit_code);
+  AddTrainJudge(*group, exit_code);
+  AddTrainPolicy(*group, exit_code);
 }
 
 }  // namespace evac

@@ -27,6 +27,8 @@ void AddLs(CLI::App& app, ExitCode& exit_code);
 void AddWeights(CLI::App& app, ExitCode& exit_code);
 void AddImagine(CLI::App& app, ExitCode& exit_code);
 void AddTrain(CLI::App& app, ExitCode& exit_code);
+void AddTrainJudge(CLI::App& group, ExitCode& exit_code);
+void AddTrainPolicy(CLI::App& group, ExitCode& exit_code);
 void AddEncode(CLI::App& app, ExitCode& exit_code);
 void AddCollect(CLI::App& app, ExitCode& exit_code);
 void AddPack(CLI::App& app, ExitCode& exit_code);

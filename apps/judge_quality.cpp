@@ -76,7 +76,9 @@ std::vector<double> Logits(const ClassifierNet& net, const PackedSet& set, const
                           clips.begin() + static_cast<std::ptrdiff_t>(std::min(begin + kBatch, clips.size())));
     std::vector<at::Tensor> pictures;
     for (const PackedClip& clip : some) {
-      pictures.push_back(PicturesOf(set, clip, RowsOf(clip)).clone());
+      const std::vector<std::int64_t> rows = RowsOf(clip);
+      pictures.push_back(look.codec ? look.codec->Reconstructed(set.shards.shards()[clip.shard], rows)
+                                    : PicturesOf(set, clip, rows).clone());
       if (look.masks_object) MaskObject(set, clip, look.mask_radius, pictures.back());
     }
     ClassifierClips seen = ForNetwork(at::stack(pictures), some);

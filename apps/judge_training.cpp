@@ -38,6 +38,7 @@ train::Settings SettingsOf(JudgeOptions& options) {
                               {"drop_view", &options.drop_view},
                               {"jitter", &options.jitter},
                               {"object_weight", &options.object_weight},
+                              {"reconstructed_share", &options.reconstructed_share},
                               {"unsure", &options.unsure},
                               {"light", &options.changes.light},
                               {"offset", &options.changes.offset},
@@ -89,8 +90,9 @@ ClassifierClips ForNetwork(const at::Tensor& bytes, const JudgeClips& clips) {
   return {bytes.to(at::kFloat) / 127.5 - 1, at::ones({bytes.size(0), bytes.size(1)}), Indices(tasks)};
 }
 
-JudgeTraining::JudgeTraining(const PackedSet& set, const JudgeClips& fit, const JudgeOptions& options)
-    : set_(set), fit_(fit), options_(options) {
+JudgeTraining::JudgeTraining(const PackedSet& set, const JudgeClips& fit, const JudgeOptions& options,
+                             const JudgeCodec* codec)
+    : set_(set), fit_(fit), options_(options), codec_(codec) {
   if (options.batch < 1) throw InvalidInput("judge training: batch is {}, wanted at least 1", options.batch);
 }
 
@@ -104,8 +106,9 @@ JudgeTraining::Batch JudgeTraining::Draw(const train::StepPlace& place) const {
     const PackedClip& clip = fit_[static_cast<std::size_t>(pick.Below(static_cast<std::int64_t>(fit_.size())))];
     const std::vector<std::int64_t> rows = JitteredRows(clip, options_.jitter, pick);
     if (pick.Chance(options_.drop_view)) present[b].narrow(0, 1, set_.shards.views() - 1).zero_();
-    pictures.push_back(PicturesOf(set_, clip, rows));
     const train::Shard& shard = set_.shards.shards()[clip.shard];
+    const bool is_reconstructed = codec_ && pick.Chance(options_.reconstructed_share);
+    pictures.push_back(is_reconstructed ? codec_->Reconstructed(shard, rows) : PicturesOf(set_, clip, rows));
     objects.push_back(shard.object_px.index_select(0, Indices(rows)).transpose(0, 1));
     successes.push_back(clip.outcome == 1 ? 1.0F : 0.0F);
     clips.push_back(clip);

@@ -3,6 +3,7 @@
 #include <optional>
 #include <vector>
 
+#include "apps/judge_codec.h"
 #include "apps/packed_clips.h"
 #include "apps/picture_changes.h"
 #include "judges/classifier_net.h"
@@ -18,6 +19,7 @@ struct JudgeOptions {
   double drop_view = 0.5;            ///< share of clips of which the first view alone is shown
   double jitter = 0.3;               ///< pictures between first and last move by up to this part of their distance
   double object_weight = 1;          ///< of looking where the object is, beside the verdict
+  double reconstructed_share = 0.5;  ///< share of clips seen as a codec gives them back; without one, none
   double unsure = 0.1;               ///< what the card says: closer to the threshold is `cannot tell`
   PictureChanges changes;
 };
@@ -44,8 +46,8 @@ ClassifierClips ForNetwork(const at::Tensor& bytes, const JudgeClips& clips);
 
 class JudgeTraining {
  public:
-  /// @param set, fit  outlive this
-  JudgeTraining(const PackedSet& set, const JudgeClips& fit, const JudgeOptions& options);
+  /// @param set, fit, codec  outlive this
+  JudgeTraining(const PackedSet& set, const JudgeClips& fit, const JudgeOptions& options, const JudgeCodec* codec);
   at::Tensor Loss(const ClassifierNet& net, const train::StepPlace& place) const;
 
  private:
@@ -60,6 +62,7 @@ class JudgeTraining {
   const PackedSet& set_;
   const JudgeClips& fit_;
   JudgeOptions options_;
+  const JudgeCodec* codec_;
 };
 
 }  // namespace evac

@@ -29,6 +29,10 @@ void AddShared(CLI::App& command, const std::shared_ptr<TrainArguments>& argumen
       ->required();
 }
 
+CLI::Option* AddConfig(CLI::App& command, const std::shared_ptr<TrainArguments>& arguments) {
+  return command.add_option("--config", arguments->config, "the page of the network's sizes")->check(CLI::ExistingFile);
+}
+
 void Override(const TrainArguments& arguments, train::TrainerOptions& options) {
   if (arguments.minutes) options.minutes = *arguments.minutes;
   if (!arguments.steps) return;

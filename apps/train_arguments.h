@@ -26,6 +26,9 @@ struct TrainArguments {
 /// Adds what all trainings share: SHARDS, --training, --set, --minutes, --steps, --threads, --out.
 void AddShared(CLI::App& command, const std::shared_ptr<TrainArguments>& arguments);
 
+/// Adds --config, the page of the network's sizes.
+CLI::Option* AddConfig(CLI::App& command, const std::shared_ptr<TrainArguments>& arguments);
+
 /// What the command line says beside the page.
 void Override(const TrainArguments& arguments, train::TrainerOptions& options);
 

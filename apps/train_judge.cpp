@@ -2,52 +2,39 @@
 
 #include <fmt/format.h>
 
-#include <deque>
-
 #include "apps/judge_quality.h"
-#include "apps/relu_weights.h"
+#include "apps/learners.h"
 #include "core/error.h"
-#include "core/statistics/confusion.h"
 
 namespace evac {
 namespace {
-
-/// One copy of the network that is trained.
-struct JudgeWorker {
-  JudgeWorker(const ClassifierShape& shape, const JudgeOptions& options)
-      : random(options.job.trainer.seed),
-        weights(random),
-        net(shape, [this](const std::string& key, const std::vector<std::int64_t>& sizes) {
-          return weights.Take(key, sizes);
-        }) {}
-  JudgeWorker(const JudgeWorker&) = delete;
-  JudgeWorker& operator=(const JudgeWorker&) = delete;
-
-  ReluWeights random;
-  train::TrainableWeights weights;
-  ClassifierNet net;
-};
 
 /// What is written at the end, beside the weights.
 struct Judged {
   ClassifierCard card;
   MeasuredJudge whole, masked, first_view;
+  std::optional<MeasuredJudge> reconstructed;  ///< where there is a codec
 };
 
 /// What is learned from, calibrated with and measured on.
 struct JudgeData {
-  JudgeData(const std::filesystem::path& shards, const JudgeOptions& options)
+  JudgeData(const std::filesystem::path& shards, const JudgeOptions& options, const JudgeCodec* codec)
       : set(shards, train::Split::kTrain),
         holdout(shards, train::Split::kHoldout),
         split(SplitForJudge(set, options)),
-        unseen(Labelled(holdout)) {}
+        unseen(Labelled(holdout)) {
+    if (!codec) return;
+    codec->Open(set.shards);
+    codec->Open(holdout.shards);
+  }
 
   PackedSet set, holdout;
   JudgeSplit split;   ///< of `set`
   JudgeClips unseen;  ///< of `holdout`
 };
 
-Judged MeasureAll(const ClassifierNet& net, const JudgeData& data, const JudgeOptions& options) {
+Judged MeasureAll(const ClassifierNet& net, const JudgeData& data, const JudgeOptions& options,
+                  const JudgeCodec* codec) {
   Judged judged;
   judged.card = Calibrate(Logits(net, data.set, data.split.calibration, {}), data.split.calibration, options.unsure);
   const auto measure = [&](const JudgeLook& look) {
@@ -56,6 +43,7 @@ Judged MeasureAll(const ClassifierNet& net, const JudgeData& data, const JudgeOp
   judged.whole = measure({});
   judged.masked = measure({.masks_object = true});
   judged.first_view = measure({.first_view_only = true});
+  if (codec) judged.reconstructed = measure({.codec = codec});
   return judged;
 }
 
@@ -64,13 +52,14 @@ void Say(const train::JobPlace& place, const ClassifierNet& net, const JudgeData
   place.say("hold-out: " + judged.whole.Line());
   place.say("  object masked: " + judged.masked.Line());
   place.say("  first view alone: " + judged.first_view.Line());
+  if (judged.reconstructed) place.say("  as the codec gives the pictures back: " + judged.reconstructed->Line());
   const std::vector<double> logits = Logits(net, data.holdout, data.unseen, {});
   place.say("  failures taken for successes: " + MistakesByFate(logits, data.unseen, judged.card));
 }
 
 TensorMetadata CardText(const Judged& judged, const PackedSet& set, const JudgeOptions& options, std::int64_t steps) {
   const auto number = [](double value) { return fmt::format("{:.6g}", value); };
-  return {{"format", "evac-classifier 1"},
+  TensorMetadata card = {{"format", "evac-classifier 1"},
           {"tasks", Joined(set.tasks)},
           {"cameras", Joined(set.cameras)},
           {"frames", std::to_string(kClassifierFrames)},
@@ -89,44 +78,40 @@ TensorMetadata CardText(const Judged& judged, const PackedSet& set, const JudgeO
           {"kappa_masked", number(judged.masked.kappa)},
           {"kappa_first_view", number(judged.first_view.kappa)},
           {"licence", "as the project"}};
-}
-
-void Write(const std::filesystem::path& path, const train::TrainableWeights& weights, const TensorMetadata& card) {
-  std::vector<TensorView> views;
-  for (const train::NamedTensor& weight : weights.all())
-    views.push_back(nn::ViewOf(weight.name, weight.tensor.detach()));
-  WriteTensorFile(path, views, card);
+  if (judged.reconstructed) {
+    card["codec"] = set.shards.codec();
+    card["kappa_reconstructed"] = number(judged.reconstructed->kappa);
+  }
+  return card;
 }
 
 }  // namespace
 
-train::TrainerSummary TrainJudge(const train::JobPlace& place, const JudgeOptions& given) {
+train::TrainerSummary TrainJudge(const train::JobPlace& place, const JudgeOptions& given, const JudgeCodec* codec) {
   JudgeOptions options = given;
-  const JudgeData data(place.shards, options);
+  const JudgeData data(place.shards, options, codec);
   const train::ShardSet& shards = data.set.shards;
   const ClassifierShape shape{data.set.tasks, data.set.cameras, static_cast<int>(shards.height_px()),
                               static_cast<int>(shards.width_px())};
-  std::deque<JudgeWorker> workers;
-  for (std::int64_t i = 0; i < Workers(place, options.job); ++i) workers.emplace_back(shape, options);
-  const ClassifierNet& net = workers.front().net;
-  const JudgeTraining training(data.set, data.split.fit, options);
-  options.job.trainer.identity =
-      IdentityOf(SettingsOf(options)) + shards.metadata().at("recipe") + " workers " + std::to_string(workers.size());
-  train::Trainer trainer(workers.front().weights.all(), options.job.trainer, place.out);
-  for (std::size_t i = 1; i < workers.size(); ++i)
-    trainer.AddReplica(
-        {workers[i].weights.all(), [&, i](const train::StepPlace& at) { return training.Loss(workers[i].net, at); }});
+  const Learners<ClassifierNet> learners(shape, options.job.trainer.seed, Workers(place, options.job));
+  const ClassifierNet& net = learners.net();
+  const JudgeTraining training(data.set, data.split.fit, options, codec);
+  options.job.trainer.identity = IdentityOf(SettingsOf(options)) + shards.metadata().at("recipe") + shards.codec() +
+                                 " workers " + std::to_string(learners.count());
+  train::Trainer trainer(learners.weights().all(), options.job.trainer, place.out);
+  const auto loss = [&](const ClassifierNet& of, const train::StepPlace& at) { return training.Loss(of, at); };
+  learners.Replicate(trainer, loss);
   const JudgeClips& calibration = data.split.calibration;
   const train::TrainerSummary summary =
-      trainer.Run({.loss = [&](const train::StepPlace& at) { return training.Loss(net, at); },
+      trainer.Run({.loss = [&](const train::StepPlace& at) { return loss(net, at); },
                    .holdout = [&] { return LogLoss(Logits(net, data.set, calibration, {}), calibration); },
                    .interrupted = place.interrupted,
                    .on_progress = place.on_progress});
   if (!summary.IsDone()) return summary;
   trainer.WithBest([&] {
-    const Judged judged = MeasureAll(net, data, options);
+    const Judged judged = MeasureAll(net, data, options, codec);
     Say(place, net, data, judged);
-    Write(place.out / "judge.safetensors", workers.front().weights, CardText(judged, data.set, options, summary.step));
+    learners.Write(place.out / "judge.safetensors", CardText(judged, data.set, options, summary.step));
   });
   return summary;
 }

@@ -12,6 +12,7 @@
 #include "core/weight_file.h"
 #include "tests/apps/learning_shards.h"
 #include "tests/support/temp_folder.h"
+#include "worldmodel/train/encode_shards.h"
 
 namespace evac {
 namespace {
@@ -65,6 +66,61 @@ TEST_F(TrainJudgeTest, InterruptedAndGoneOnWithItEndsInTheSameBytes) {
   EXPECT_EQ(runs, 2);
   EXPECT_EQ(Sha256HexOfFile(folder_ / "parts" / "judge.safetensors"),
             Sha256HexOfFile(folder_ / "whole" / "judge.safetensors"));
+}
+
+class CodedJudgeTest : public TrainJudgeTest {
+ protected:
+  void SetUp() override {
+    TrainJudgeTest::SetUp();
+    config_ = {.channels = 32, .channel_mult = {1, 1}, .num_res_blocks = 1, .z_channels = 8, .scale_factor = 1, .patch_px = 2};
+    train::CodecOptions options;
+    options.job.trainer.steps = 60;
+    options.job.trainer.learning_rate = 5e-3;
+    options.job.trainer.clip_norm = 1;
+    options.codec.batch = 8;
+    train::JobPlace place = Place("codec");
+    place.config.vae = config_;
+    place.config.views = 2;
+    place.config.image_height_px = 16;
+    place.config.image_width_px = 24;
+    train::TrainCodec(place, options);
+    train::CheckpointWeights weights(codec());
+    const nn::Vae vae(nn::Scope(weights, train::kCodecPrefix), config_);
+    for (const auto& shard : train::ShardPaths(folder_ / "shards"))
+      train::EncodeShard(vae, shard, {Sha256HexOfFile(codec()), Sha256HexOfFile(shard)});
+  }
+  std::filesystem::path codec() const { return folder_ / "codec" / "codec.safetensors"; }
+  nn::VaeConfig config_;
+};
+
+TEST_F(CodedJudgeTest, ItLearnsFromClipsAsTheCodecGivesThemBackAndIsMeasuredOnThem) {
+  const JudgeCodec judge_codec(codec(), config_);
+  PackedSet set(folder_ / "shards", train::Split::kTrain);
+  judge_codec.Open(set.shards);
+  const PackedClip& clip = set.clips[3];
+  const std::vector<std::int64_t> rows = RowsOf(clip);
+  const at::Tensor whole = PicturesOf(set, clip, rows).to(at::kFloat);
+  const at::Tensor coded = judge_codec.Reconstructed(set.shards.shards()[clip.shard], rows).to(at::kFloat);
+  ASSERT_EQ(coded.sizes(), whole.sizes());
+  const double off = (coded - whole).abs().mean().item<double>();
+  EXPECT_GT(off, 0.5) << "it is not the picture itself";
+  EXPECT_LT(off, 0.5 * (whole.flip(0) - whole).abs().mean().item<double>() + 12) << "but like it, view by view";
+
+  TrainJudge(Place("judge"), Quick(150), &judge_codec);
+  const WeightFile file(folder_ / "judge" / "judge.safetensors", "evac-classifier 1");
+  EXPECT_EQ(file.Text("codec"), Sha256HexOfFile(codec()));
+  EXPECT_GT(file.Number("kappa"), 0.8);
+  EXPECT_GT(file.Number("kappa_reconstructed"), 0.8);
+}
+
+TEST_F(CodedJudgeTest, LatentsOfAnotherCodecAreRefused) {
+  for (const auto& shard : train::ShardPaths(folder_ / "shards")) {
+    train::CheckpointWeights weights(codec());
+    train::EncodeShard(nn::Vae(nn::Scope(weights, train::kCodecPrefix), config_), shard, {"another", "shard"});
+  }
+  const JudgeCodec judge_codec(codec(), config_);
+  EXPECT_THAT([&] { TrainJudge(Place("judge"), Quick(2), &judge_codec); },
+              ThrowsMessage<TensorError>(HasSubstr("did not make the shards' latents")));
 }
 
 TEST_F(TrainJudgeTest, CalibrationSharesNoInitialStateWithLearning) {
