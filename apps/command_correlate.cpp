@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "apps/commands.h"
+#include "apps/warnings.h"
 #include "core/file.h"
 #include "core/store.h"
 #include "reports/correlation_output.h"
@@ -18,27 +19,18 @@
 namespace evac {
 namespace {
 
-constexpr std::size_t kMaxWarnings = 20;
-
 struct CorrelateArguments {
   std::string run, pairs;
   RunCorrelationOptions options;
   bool json = false;
 };
 
-void Print(const std::vector<std::string>& warnings) {
-  for (std::size_t i = 0; i < std::min(warnings.size(), kMaxWarnings); ++i)
-    fmt::print(stderr, "evac: warning: {}\n", warnings[i]);
-  if (warnings.size() > kMaxWarnings)
-    fmt::print(stderr, "evac: warning: and {} more like these\n", warnings.size() - kMaxWarnings);
-}
-
 std::vector<CorrelationGroup> GroupsOf(const CorrelateArguments& arguments) {
   if (arguments.pairs.empty()) {
     return CorrelateRun(Store::Open(arguments.run, Store::Mode::kReadOnly), arguments.options);
   }
   const PairsCsv csv = ReadPairsCsv(ReadFile(arguments.pairs), arguments.pairs);
-  Print(csv.warnings);
+  PrintWarnings(csv.warnings);
   return CorrelatePoints(csv.points, arguments.options.correlation);
 }
 

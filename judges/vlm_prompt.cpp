@@ -6,7 +6,7 @@
 #include <opencv2/imgproc.hpp>
 
 #include "core/seed.h"
-#include "judges/base64.h"
+#include "core/base64.h"
 #include "judges/json_text.h"
 
 namespace evac {

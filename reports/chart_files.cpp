@@ -135,6 +135,12 @@ void AddCheckpoints(const std::vector<CheckpointCurve>& curves, Files& files) {
 
 }  // namespace
 
+std::vector<ChartFile> AsFiles(const std::vector<NamedDrawing>& drawings) {
+  Files files;
+  for (const NamedDrawing& one : drawings) files.Add(one.name, one.drawing, one.title);
+  return files.Take();
+}
+
 std::vector<ChartFile> ChartFilesOf(const ReportData& report) {
   Files files;
   AddRates(report.summary, files);

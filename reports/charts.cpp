@@ -123,8 +123,11 @@ std::string ScatterInWords(const WorldComparison& comparison) {
   std::string words = fmt::format("Success in {} against success in {}, one point per task and policy.",
                                   comparison.other, comparison.real);
   for (const ComparedPoint& point : comparison.points) {
+    const auto rate = [](const Estimate& of) {
+      return of.value && !of.interval ? Percent(*of.value) : PercentWithInterval(of);
+    };
     words += fmt::format(" {}: {}, {}: {} {}, {} {}.", point.letter, point.task, point.policy, comparison.real,
-                         PercentWithInterval(point.real), comparison.other, PercentWithInterval(point.other));
+                         rate(point.real), comparison.other, rate(point.other));
   }
   return words;
 }

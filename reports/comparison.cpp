@@ -145,12 +145,6 @@ TaskPoints PointsOf(TaskCounts counts) {
   return result;
 }
 
-/// "a" … "z", "aa", "ab", …
-std::string Letter(std::size_t index) {
-  std::string letter(1, static_cast<char>('a' + index % 26));
-  return index < 26 ? letter : Letter(index / 26 - 1) + letter;
-}
-
 /// Fills in one task's tables and points; adds its agreements.
 TaskCounts CompareTask(const std::vector<JudgedEpisode>& episodes, const std::string& task,
                        const ComparedWorlds& worlds, double confidence, WorldComparison& comparison) {
@@ -163,7 +157,7 @@ TaskCounts CompareTask(const std::vector<JudgedEpisode>& episodes, const std::st
     table.agreement = ClusteredRate(AgreementsByState(episodes, table), confidence);
     StateCounts by_state = CountsByState(episodes, table);
     if (by_state.empty()) continue;
-    comparison.points.push_back({task, policy, Letter(comparison.points.size()),
+    comparison.points.push_back({task, policy, PointLetter(comparison.points.size()),
                                  ClusteredWilsonInterval(Reals(by_state), confidence),
                                  ClusteredWilsonInterval(Others(by_state), confidence)});
     counts.policies.emplace_back(policy, std::move(by_state));
@@ -184,6 +178,29 @@ Estimate OverallAgreement(const std::vector<JudgedEpisode>& episodes, const Worl
 }
 
 }  // namespace
+
+std::string PointLetter(std::size_t index) {
+  std::string letter(1, static_cast<char>('a' + index % 26));
+  return index < 26 ? letter : PointLetter(index / 26 - 1) + letter;
+}
+
+WorldComparison AsComparison(const CorrelationGroup& group) {
+  WorldComparison comparison;
+  comparison.real = "real";
+  comparison.other = "sim";
+  for (const CorrelationPoint& point : group.points) {
+    const auto rate = [](double value) {
+      Estimate estimate;
+      estimate.value = value;
+      estimate.interval = Undefined{"its counts are not known"};
+      return estimate;
+    };
+    comparison.points.push_back({point.task, point.policy, PointLetter(comparison.points.size()), rate(point.real_sr),
+                                 rate(point.sim_sr)});
+  }
+  comparison.correlation = group;
+  return comparison;
+}
 
 Estimate RateOf(const std::vector<const JudgedEpisode*>& episodes, double confidence) {
   std::map<Cell, Count> states;

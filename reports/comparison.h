@@ -57,6 +57,13 @@ struct ComparedWorlds {
 WorldComparison Compare(const std::vector<JudgedEpisode>& episodes, const ComparedWorlds& worlds,
                         const BootstrapOptions& bootstrap);
 
+/// "a" … "z", "aa", "ab", …: the name of a point.
+std::string PointLetter(std::size_t index);
+
+/// Points of which only the rates are known (reports/pairs_csv.h), as the chart and the tables of a comparison show
+/// them.
+WorldComparison AsComparison(const CorrelationGroup& group);
+
 /// The success rate over episodes that count, clustered by (task, initial state). @returns undefined without any.
 Estimate RateOf(const std::vector<const JudgedEpisode*>& episodes, double confidence);
 

@@ -70,11 +70,20 @@ std::string Policies(const ReportData& report) {
     }
   }
   if (tests.empty()) return "";
+  std::string letters;
+  if (report.letters.pairs > 0) {
+    letters = fmt::format(
+        "Letters join policies whose difference on a task in a world is not significant (exact McNemar over shared "
+        "states and seeds{}; Holm over the {} of a world; Piepho 2004). ",
+        report.letters.has_unpaired ? ", Boschloo where fewer than 80 % are shared" : "",
+        Counted(report.letters.pairs, "pair"));
+  }
   return fmt::format(
       "Policies were compared with {} in {}{} ({}; two-sided), with intervals of the difference by {}; p-values are "
       "Holm-adjusted over tasks within a comparison and over the {}. ",
       report.baseline, report.world, paired ? ", paired by initial state and seed" : "", Joined(tests),
-      Joined(intervals), Counted(Size(report.candidates.size()), "comparison"));
+      Joined(intervals), Counted(Size(report.candidates.size()), "comparison")) +
+         letters;
 }
 
 std::string Worlds(const ReportData& report) {

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <set>
 
+#include "core/base64.h"
 #include "core/hash.h"
 #include "reports/charts.h"
 #include "reports/html.h"
@@ -67,16 +68,11 @@ std::string MissingVerdicts(const RunSummary& summary) {
 
 /// "sha256-…" of a script, as a policy names it: base64 of the hash's bytes.
 std::string HashOf(const std::string& script) {
-  static constexpr char kDigits[] = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
   const std::string hex = Sha256Hex(script);
-  std::string base64;
-  for (std::size_t at = 0; at < hex.size(); at += 6) {  // three bytes are four digits
-    const std::string group = hex.substr(at, 6);
-    const unsigned long bits = std::stoul(group + std::string(6 - group.size(), '0'), nullptr, 16);
-    for (std::size_t digit = 0; digit < 4; ++digit)
-      base64 += digit * 6 < group.size() * 4 ? kDigits[(bits >> (18 - 6 * digit)) & 63] : '=';
-  }
-  return "sha256-" + base64;
+  std::string bytes;
+  for (std::size_t at = 0; at < hex.size(); at += 2)
+    bytes += static_cast<char>(std::stoul(hex.substr(at, 2), nullptr, 16));
+  return "sha256-" + Base64(bytes);
 }
 
 }  // namespace
@@ -109,6 +105,8 @@ std::string ClipId(const Episode& episode) { return "clip-" + Anchor(episode.key
 
 std::string PageScript(PageScripts scripts) {
   switch (scripts) {
+    case PageScripts::kNone:
+      return "";
     case PageScripts::kReport:
       return PageJs();
     case PageScripts::kLive:
@@ -120,7 +118,8 @@ std::string PageScript(PageScripts scripts) {
 }
 
 std::string PageHead(const std::string& title, PageScripts scripts) {
-  const bool is_live = scripts != PageScripts::kReport;
+  const bool is_live = scripts == PageScripts::kLive || scripts == PageScripts::kLiveReport;
+  const std::string script = scripts == PageScripts::kNone ? "none" : HashOf(PageScript(scripts));
   const std::string served = is_live ? "connect-src 'self'; " : "";  // a page on a disk has nobody to connect to
   const std::string icon = is_live ? "<link rel=\"icon\" href=\"data:,\">" : "";  // else a browser asks for one
   return "<!doctype html>\n<html lang=\"en\"><head><meta charset=\"utf-8\">"
@@ -128,7 +127,7 @@ std::string PageHead(const std::string& title, PageScripts scripts) {
          "<meta name=\"color-scheme\" content=\"light dark\"><meta name=\"referrer\" content=\"no-referrer\">"
          "<meta http-equiv=\"Content-Security-Policy\" content=\"default-src 'none'; img-src 'self' file: data:; "
          "media-src 'self' file:; style-src 'unsafe-inline'; " +
-         served + "script-src '" + HashOf(PageScript(scripts)) + "'\">" + icon + "<title>" + Escaped(title) +
+         served + "script-src '" + script + "'\">" + icon + "<title>" + Escaped(title) +
          "</title>\n<style>" + ColoursCss() + ChartsCss() + PageCss() + "</style></head>\n";
 }
 
@@ -155,7 +154,7 @@ std::string ReportPage(const ReportData& report, const PageOptions& options) {
   if (!options.events.empty()) html += "<p class=\"live\" role=\"status\"></p>";
   html += MissingVerdicts(summary) + HeadlinesPart(report) + "\n" + Navigation(report) + "\n";
   for (const std::string& part :
-       {GatesPart(report, options), RatesPart(summary), FindingsPart(summary), TrustPart(report), ScatterPart(summary),
+       {GatesPart(report, options), RatesPart(report), FindingsPart(summary), TrustPart(report), ScatterPart(summary),
         StatesPart(summary, options), StagesPart(report), CheckpointsPart(report), JudgesPart(report),
         ClipsPart(summary), ErrorsPart(summary), MethodsPart(report), ProvenancePart(summary, options)}) {
     html += part + "\n";

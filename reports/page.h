@@ -1,5 +1,6 @@
 #pragma once
 
+#include <functional>
 #include <string>
 
 #include "reports/report_data.h"
@@ -11,6 +12,8 @@ struct PageOptions {
   std::string program;      ///< "evac 0.1.0": who wrote the page
   std::string events = {};  ///< inside a dashboard: where it tells of news, relative to the page; else empty
   std::size_t run = 0;      ///< inside a dashboard: which of its runs this is
+  /// Bytes of a thumbnail of the run, JPEG, to be carried inside the page; empty bytes, or no function: it is linked.
+  std::function<std::string(const std::string& file)> embedded = {};
 };
 
 /// The report as one HTML file: it opens from disk, needs no network, shows every chart without script, and is the same

@@ -1,5 +1,6 @@
 #include <algorithm>
 
+#include "core/base64.h"
 #include "reports/html.h"
 #include "reports/page_columns.h"
 #include "reports/page_parts.h"
@@ -27,7 +28,7 @@ std::string StagesOf(const JudgedEpisode& judged, const Task* task) {
 /// All that the script knows of an episode.
 class EpisodeColumns {
  public:
-  explicit EpisodeColumns(const RunSummary& summary) : summary_(summary) {
+  EpisodeColumns(const RunSummary& summary, const PageOptions& options) : summary_(summary), options_(options) {
     for (const Task& task : summary.data.tasks) tasks_by_id_[task.id] = &task;
     for (const std::string& judge : summary.judges) {
       if (judge != summary.options.judge) others_.push_back({judge, {}, {}});
@@ -44,6 +45,7 @@ class EpisodeColumns {
     json["end"] = end_.Json(share);
     json["other_videos"] = videos_;
     json["other_thumbnails"] = thumbnails_;
+    json["embedded"] = embedded_;
     json["judges"] = Json::array();
     for (const Other& other : others_)
       json["judges"].push_back(
@@ -82,6 +84,9 @@ class EpisodeColumns {
     const std::string id = episode.key.Id();
     if (episode.video != "videos/" + id + ".mp4") videos_[std::to_string(index)] = episode.video;
     if (episode.thumbnail != "thumbs/" + id + ".jpg") thumbnails_[std::to_string(index)] = episode.thumbnail;
+    if (!options_.embedded || episode.thumbnail.empty()) return;
+    const std::string bytes = options_.embedded(episode.thumbnail);
+    if (!bytes.empty()) embedded_[std::to_string(index)] = Base64(bytes);
   }
 
   void AddOthers(const Episode& episode) {
@@ -99,11 +104,12 @@ class EpisodeColumns {
   }
 
   const RunSummary& summary_;
+  const PageOptions& options_;
   std::map<std::string, const Task*> tasks_by_id_;
   Column task_, state_, policy_, file_, seed_, world_, outcome_, stop_, stages_;
   TextColumn reason_, end_;
   std::vector<Other> others_;
-  Json videos_ = Json::object(), thumbnails_ = Json::object();  // by the episode's number
+  Json videos_ = Json::object(), thumbnails_ = Json::object(), embedded_ = Json::object();  // by the episode's number
 };
 
 Json TasksJson(const RunSummary& summary) {
@@ -125,7 +131,7 @@ std::string DataPart(const RunSummary& summary, const PageOptions& options) {
                {"judge", summary.options.judge},
                {"n", summary.episodes.size()}};
   json["tasks"] = TasksJson(summary);
-  json["episodes"] = EpisodeColumns(summary).ToJson();
+  json["episodes"] = EpisodeColumns(summary, options).ToJson();
   return "<script type=\"application/json\" id=\"run-data\">" + ForScript(json) + "</script>";
 }
 

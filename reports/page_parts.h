@@ -2,6 +2,7 @@
 
 #include <string>
 
+#include "reports/charts.h"
 #include "reports/page.h"
 
 /// The parts of the page, one function each, in the order they are read. All return HTML; texts are escaped inside.
@@ -10,9 +11,11 @@ namespace evac {
 std::string HeadlinesPart(const ReportData& report);                          ///< the first screen
 std::string GatesPart(const ReportData& report, const PageOptions& options);  ///< empty without gates
 std::string FindingsPart(const RunSummary& summary);                          ///< one question, one sentence
-std::string RatesPart(const RunSummary& summary);
+std::string RatesPart(const ReportData& report);
 std::string TrustPart(const ReportData& report);
 std::string ScatterPart(const RunSummary& summary);
+/// The scatter of one comparison, its statistics and its points.
+std::string ComparisonPart(const WorldComparison& comparison, const std::vector<PointStyle>& styles);
 std::string StatesPart(const RunSummary& summary, const PageOptions& options);
 std::string StagesPart(const ReportData& report);
 std::string CheckpointsPart(const ReportData& report);
@@ -27,6 +30,7 @@ std::string DataPart(const RunSummary& summary, const PageOptions& options);
 
 /// Which scripts a page carries.
 enum class PageScripts {
+  kNone,        ///< of a page that is only read
   kReport,      ///< of a report that lies on a disk: it connects to nothing
   kLive,        ///< of a dashboard's first page: it listens to /events
   kLiveReport,  ///< of a report inside a dashboard: both

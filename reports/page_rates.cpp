@@ -36,12 +36,12 @@ std::string Row(const RunSummary& summary, const RateCell& cell) {
   return fmt::format(
       "<tr><th scope=\"row\">{}{}</th><td class=\"plot\">{}</td><td class=\"num\"><a href=\"#clips\" "
       "data-show=\"{}\">{}/{}</a></td><td "
-      "class=\"num rate\">{}{}</td>"
+      "class=\"num rate\">{}{}</td><td class=\"letters\">{}</td>"
       "<td class=\"apart\">{}</td></tr>",
       MarkerIcon(WorldShape(world), fmt::format("dot w{}", world % 4)), Escaped(cell.world),
       RateStrip(cell.rate, world), ShowClips(cell.task, cell.policy, cell.world), successes, n,
       n == 0 ? "undefined: no verdict" : PercentWithInterval(cell.rate),
-      apart.empty() ? "" : "<small class=\"aside\">" + apart + "</small>",
+      apart.empty() ? "" : "<small class=\"aside\">" + apart + "</small>", cell.letters,
       apart.empty() ? "<span class=\"none\">–</span>" : apart);
 }
 
@@ -69,7 +69,8 @@ std::string TaskTable(const RunSummary& summary, const Task& task) {
       "scope=\"col\">world</th>"
       "<th scope=\"col\" class=\"plot\"><span class=\"sr\">success rate, percent</span>{}</th><th scope=\"col\" "
       "class=\"num\">k/n</th>"
-      "<th scope=\"col\" class=\"num rate\">success [{:.0f} %]</th><th scope=\"col\" "
+      "<th scope=\"col\" class=\"num rate\">success [{:.0f} %]</th><th scope=\"col\" class=\"letters\"><span "
+      "class=\"sr\">letters of policies that do not differ</span></th><th scope=\"col\" "
       "class=\"apart\">apart</th></tr></thead>",
       Escaped(task.id), Escaped(task.instruction), RateScale(), 100 * summary.options.confidence);
   for (const std::string& policy : ByRealRate(summary)) {
@@ -78,7 +79,7 @@ std::string TaskTable(const RunSummary& summary, const Task& task) {
       if (cell.task == task.id && cell.policy == policy) rows += Row(summary, cell);
     }
     if (!rows.empty())
-      html += fmt::format("<tbody><tr class=\"group\"><th scope=\"rowgroup\" colspan=\"5\">{}</th></tr>{}</tbody>",
+      html += fmt::format("<tbody><tr class=\"group\"><th scope=\"rowgroup\" colspan=\"6\">{}</th></tr>{}</tbody>",
                           Escaped(policy), rows);
   }
   return html + "</table></div>";
@@ -86,12 +87,20 @@ std::string TaskTable(const RunSummary& summary, const Task& task) {
 
 }  // namespace
 
-std::string RatesPart(const RunSummary& summary) {
+std::string RatesPart(const ReportData& report) {
+  const RunSummary& summary = report.summary;
   std::string html =
       "<section id=\"rates\"><h2>Success rates</h2><p class=\"quiet\">Dot: successes over successes and failures. Bar: "
       "Wilson interval"
       ", clustered by initial state where states repeat. Errors, “cannot tell” and invalid verdicts stand apart and "
-      "are in no rate.</p>";
+      "are in no rate.";
+  if (report.letters.pairs > 0) {
+    html += fmt::format(
+        " Policies that share a letter, on one task in one world, do not differ significantly: exact McNemar over "
+        "shared initial states, Holm over {} of a world, {:.0f} %.",
+        Counted(report.letters.pairs, "pair"), 100 * (1 - summary.options.confidence));
+  }
+  html += "</p>";
   if (summary.rates.empty()) return html + "<p>The run holds no episodes yet.</p></section>";
   html += "<div class=\"tasks\">";
   for (const Task& task : summary.data.tasks) html += TaskTable(summary, task);

@@ -37,11 +37,17 @@ std::string StackedCell(const Estimate& estimate) {
 
 /// "90 % [70, 97]", its interval on a line of its own where there is little room.
 std::string RateCellOf(const Estimate& rate) {
+  if (rate.value && !rate.interval) return "<td class=\"num\">" + Percent(*rate.value) + "</td>";
   const std::string words = PercentWithInterval(rate);
   const std::size_t interval = words.find('[');
   if (interval == std::string::npos) return "<td class=\"num\">" + Escaped(words) + "</td>";
   return "<td class=\"num\">" + words.substr(0, interval) + "<span class=\"ci\">" + words.substr(interval) +
          "</span></td>";
+}
+
+/// Rates from a table come without counts, and so without intervals.
+bool HasIntervals(const WorldComparison& comparison) {
+  return std::ranges::any_of(comparison.points, [](const ComparedPoint& point) { return !!point.real.interval; });
 }
 
 std::string StatisticsTable(const WorldComparison& comparison) {
@@ -69,7 +75,10 @@ std::string StatisticsTable(const WorldComparison& comparison) {
         Escaped(comparison.other), 100 * *group.distance.bias, 100 * *group.distance.mae);
   }
   return html + "<p class=\"quiet\">" + notes +
-         " The intervals say how much other initial states could change the number, not other policies or tasks.</p>";
+         (HasIntervals(comparison)
+              ? " The intervals say how much other initial states could change the number, not other policies or tasks."
+              : "") +
+         "</p>";
 }
 
 std::string PointsTable(const WorldComparison& comparison, const std::vector<PointStyle>& styles) {
@@ -85,7 +94,7 @@ std::string PointsTable(const WorldComparison& comparison, const std::vector<Poi
         "<tr><td class=\"key\"><b>{}</b>{}</td><th scope=\"row\">{} <span class=\"quiet\">{}</span></th>"
         "{}{}<td class=\"num\">{}</td></tr>",
         point.letter, PointIcon(styles[i]), Breakable(point.policy), Breakable(point.task), RateCellOf(point.real),
-        RateCellOf(point.other), point.real.n);
+        RateCellOf(point.other), point.real.n > 0 ? std::to_string(point.real.n) : "–");
   }
   return html + "</tbody></table></div>";
 }
@@ -116,22 +125,37 @@ std::string LeftOut(const WorldComparison& comparison) {
                        : "<p class=\"quiet\">No point, because no pair is judged in both worlds: " + names + ".</p>";
 }
 
+/// Nothing outside of the chart's square is drawn in it.
+bool FitsInto100Percent(const WorldComparison& comparison) {
+  const auto fits = [](const Estimate& rate) { return *rate.value >= 0 && *rate.value <= 1; };
+  return std::ranges::all_of(comparison.points,
+                             [&](const ComparedPoint& point) { return fits(point.real) && fits(point.other); });
+}
+
+std::string Figure(const WorldComparison& comparison, const std::vector<PointStyle>& styles) {
+  if (!FitsInto100Percent(comparison))
+    return "<p class=\"quiet\">No chart: a rate is outside of 0 to 100 %.</p>";
+  return "<figure>" + Scatter(comparison, styles) +
+         fmt::format(
+             "<figcaption>One point per task and policy{}. On the dashed line both worlds agree; above it {} is kinder. "
+             "Shape: policy. Fill: task.</figcaption></figure>",
+             HasIntervals(comparison) ? ", Wilson intervals both ways" : "", Escaped(comparison.other));
+}
+
 std::string OneComparison(const RunSummary& summary, const WorldComparison& comparison) {
-  const std::vector<PointStyle> styles = StylesOf(summary, comparison);
-  std::string html = fmt::format("<h3>{} against {}</h3>", Escaped(comparison.other), Escaped(comparison.real));
+  const std::string title =
+      fmt::format("<h3>{} against {}</h3>", Escaped(comparison.other), Escaped(comparison.real));
   if (comparison.points.empty())
-    return html + "<p>No pair of episodes has a success or failure in both worlds yet.</p>";
-  html += "<div class=\"comparison\"><figure>" + Scatter(comparison, styles) +
-          fmt::format(
-              "<figcaption>One point per task and policy, Wilson intervals both ways. On the dashed line both worlds "
-              "agree; above it {} is kinder. "
-              "Shape: policy. Fill: task.</figcaption></figure>",
-              Escaped(comparison.other));
-  return html + "<div>" + StatisticsTable(comparison) + ByTaskTable(comparison) + "</div></div>" +
-         PointsTable(comparison, styles) + LeftOut(comparison);
+    return title + "<p>No pair of episodes has a success or failure in both worlds yet.</p>";
+  return title + ComparisonPart(comparison, StylesOf(summary, comparison));
 }
 
 }  // namespace
+
+std::string ComparisonPart(const WorldComparison& comparison, const std::vector<PointStyle>& styles) {
+  return "<div class=\"comparison\">" + Figure(comparison, styles) + "<div>" + StatisticsTable(comparison) +
+         ByTaskTable(comparison) + "</div></div>" + PointsTable(comparison, styles) + LeftOut(comparison);
+}
 
 std::vector<PointStyle> StylesOf(const RunSummary& summary, const WorldComparison& comparison) {
   std::vector<PointStyle> styles;

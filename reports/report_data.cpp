@@ -81,6 +81,8 @@ void AddTrust(const TrustOptions& options, ReportData& report) try {
 ReportData ReportDataOf(RunSummary summary, const ReportOptions& options) {
   ReportData report;
   report.summary = std::move(summary);
+  report.letters =
+      GiveLetters(report.summary.episodes, 1 - report.summary.options.confidence, report.summary.rates);
   const RunSummary& run = report.summary;
   report.baseline = BaselineOf(run, options.baseline);
   report.world = !run.reference.empty() || run.data.worlds.empty() ? run.reference : run.data.worlds.front().name;

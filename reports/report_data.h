@@ -6,6 +6,7 @@
 #include "reports/checkpoints.h"
 #include "reports/gate_decision.h"
 #include "reports/judge_agreement.h"
+#include "reports/letters.h"
 #include "reports/policy_comparison.h"
 #include "reports/stages.h"
 #include "reports/summary.h"
@@ -30,6 +31,7 @@ struct ReportData {
   std::string baseline;               ///< empty where the run has fewer than two policies
   std::string world;                  ///< where candidates are compared: the real one, else the first
   std::vector<Candidate> candidates;  ///< in the order declared
+  LetterTests letters;                ///< what the letters of `summary.rates` rest on
   std::vector<TrustReport>
       trust;                     ///< one per world beside the real one; empty where there is nothing to hold it against
   std::string no_trust;          ///< why `trust` is empty, else empty

@@ -26,6 +26,7 @@ Json RatesJson(const RunSummary& summary) {
     Json row = {{"task", cell.task}, {"policy", cell.policy}, {"world", cell.world}, {"initial_states", cell.states}};
     for (std::size_t i = 0; i < kOutcomes; ++i) row["episodes"][Name(static_cast<Outcome>(i))] = cell.counts[i];
     row["success_rate"] = JsonOf(cell.rate);
+    row["letters"] = cell.letters;
     json.push_back(std::move(row));
   }
   return json;

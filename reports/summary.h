@@ -42,6 +42,7 @@ struct RateCell {
   std::string task, policy, world;               ///< policy with its checkpoint: "visual_pick@good"
   std::array<std::int64_t, kOutcomes> counts{};  ///< episodes by Outcome
   std::int64_t states = 0;                       ///< initial states with a success or a failure
+  std::string letters = {};  ///< reports/letters.h; empty before they were given, or without another policy
   Estimate rate;  ///< successes / (successes + failures); Wilson, clustered by initial state where states repeat
   std::int64_t Of(Outcome outcome) const { return counts[static_cast<std::size_t>(outcome)]; }
   std::int64_t Apart() const;  ///< episodes that are in no rate

@@ -62,7 +62,7 @@ const run = (() => {
     reason: sentences(e.reason), end: sentences(e.end),
     id: idOf,
     video: i => linkOf(e.other_videos[i] ?? `videos/${idOf(i)}.mp4`),
-    thumbnail: i => linkOf(e.other_thumbnails[i] ?? `thumbs/${idOf(i)}.jpg`),
+    thumbnail: i => e.embedded[i] ? "data:image/jpeg;base64," + e.embedded[i] : linkOf(e.other_thumbnails[i] ?? `thumbs/${idOf(i)}.jpg`),
     taskOf: i => data.tasks[columns.task.of(i)] ?? {ratio: "", period_s: 0.1, stages: []},
     // All worlds' episodes of i's initial state, policy and seed: the real one first.
     together: i => {

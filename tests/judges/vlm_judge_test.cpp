@@ -9,7 +9,7 @@
 
 #include "core/error.h"
 #include "core/video.h"
-#include "judges/base64.h"
+#include "core/base64.h"
 #include "judges/json_text.h"
 #include "judges/judge_episodes.h"
 #include "tests/support/scripted_server.h"

@@ -255,5 +255,14 @@ TEST(Html, LinksKeepFoldersAndEncodeTheRest) {
   EXPECT_EQ(Link("videos/a b@1/c#d%?.mp4"), "videos/a%20b@1/c%23d%25%3F.mp4");
 }
 
+TEST(ReportPage, CarriesThumbnailsInsideWhenAskedTo) {
+  PageOptions options = kBeside;
+  options.embedded = [](const std::string& file) { return file.find("pick@1") == std::string::npos ? "" : "JPEG"; };
+  const SampleRun run({{"a", "pick", "1", "sf", "sf"}, {"a", "pick", "2", "sf", "sf"}});
+  const std::string page = ReportPage(run.Summary(), options);
+  EXPECT_EQ(Matches(page, "(\"SlBFRw==\")").size(), 4U) << "of pick@1 in both worlds";
+  EXPECT_THAT(ReportPage(run.Summary(), kBeside), Not(HasSubstr("SlBFRw==")));
+}
+
 }  // namespace
 }  // namespace evac

@@ -1,3 +1,4 @@
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include <filesystem>
@@ -5,6 +6,7 @@
 #include <map>
 #include <nlohmann/json.hpp>
 
+#include "core/file.h"
 #include "tests/support/command.h"
 #include "tests/support/temp_folder.h"
 
@@ -104,6 +106,36 @@ TEST(CorrelateCommand, ReproducesEveryPublishedTableInEveryConvention) {
     }
     EXPECT_EQ(reproduced, groups.size());
   }
+}
+
+TEST(ReportCommand, ShowsEveryPublishedTableWithTheNumbersOfCorrelate) {
+  if (!std::filesystem::exists(kTables)) GTEST_SKIP() << kTables << " is not there";
+  const TempFolder folder;
+  std::ifstream stream(kTables);
+  const Json tables = Json::parse(stream).at("datasets");
+  WriteCsv(tables, folder / "rates.csv");
+  const CommandResult result = RunCommand({Binary("evac"), "report", "--pairs", (folder / "rates.csv").string(), "--out",
+                                           (folder / "report").string()});
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  const std::string page = ReadFile(folder / "report" / "index.html");
+  std::map<std::string, Json> groups;
+  const Json written = Json::parse(ReadFile(folder / "report" / "correlation.json"));
+  for (const Json& group : written.at("groups")) groups[group.at("group")] = group;
+  for (const Json& table : tables) {
+    for (const auto& [name, want] : table.at("recomputed_by_us").items()) {
+      const std::string group = GroupName(table, name);
+      ExpectReproduced(groups.at(group), want, "mmrv_simpler_code_gtxor_realgap");
+      if (want.is_null()) continue;
+      const std::string shown = fmt::format("<td class=\"num big\">{:.2f}", want.at("pearson").get<double>());
+      EXPECT_NE(page.find(shown), std::string::npos) << group << " " << shown;
+    }
+  }
+  EXPECT_FALSE(std::filesystem::is_empty(folder / "report" / "charts"));
+}
+
+TEST(ReportCommand, WantsARunOrATable) {
+  EXPECT_EQ(RunCommand({Binary("evac"), "report"}).exit_code, 2);
+  EXPECT_EQ(RunCommand({Binary("evac"), "report", "run", "--pairs", "rates.csv", "--out", "out"}).exit_code, 2);
 }
 
 TEST(CorrelateCommand, WarnsOnStderrAndRefusesWithCodeTwo) {

@@ -1,4 +1,4 @@
-#include "judges/base64.h"
+#include "core/base64.h"
 
 #include <algorithm>
 #include <cstdint>

@@ -1,0 +1,145 @@
+#include "reports/letters.h"
+
+#include <algorithm>
+#include <map>
+#include <numeric>
+#include <string>
+
+#include "core/statistics/many_comparisons.h"
+#include "core/statistics/mcnemar.h"
+#include "core/statistics/two_by_two.h"
+#include "reports/summary.h"
+
+namespace evac {
+namespace {
+
+constexpr double kPairedFrom = 0.8;
+
+/// One cell's outcomes that count, in the order of their key: a number for each (state, seed), and whether it succeeded.
+using Outcomes = std::vector<std::pair<std::size_t, bool>>;
+using Place = std::pair<std::string, std::string>;  // world, task
+
+struct Contestant {
+  RateCell* cell;
+  Outcomes outcomes;
+};
+
+/// Two contestants of one place, and the p-value of "they succeed equally often".
+struct Contest {
+  std::size_t first = 0, second = 0;
+  double p = 1;
+  bool is_paired = true;
+};
+
+double PairedP(const Outcomes& a, const Outcomes& b, std::size_t& shared) {
+  Flips flips;
+  shared = 0;
+  for (auto one = a.begin(), two = b.begin(); one != a.end() && two != b.end();) {
+    if (one->first != two->first) {
+      ++(one->first < two->first ? one : two);
+      continue;
+    }
+    flips.only_first += one->second && !two->second;
+    flips.only_second += !one->second && two->second;
+    ++shared, ++one, ++two;
+  }
+  return McNemarExact(flips).p_exact;
+}
+
+Count CountOf(const Outcomes& outcomes) {
+  return {std::count_if(outcomes.begin(), outcomes.end(), [](const auto& one) { return one.second; }),
+          static_cast<std::int64_t>(outcomes.size())};
+}
+
+Contest ContestOf(const std::vector<Contestant>& contestants, std::size_t first, std::size_t second) {
+  const Outcomes &a = contestants[first].outcomes, &b = contestants[second].outcomes;
+  std::size_t shared = 0;
+  const double paired = PairedP(a, b, shared);
+  if (static_cast<double>(shared) >= kPairedFrom * static_cast<double>(std::max(a.size(), b.size())))
+    return {first, second, paired, true};
+  return {first, second, BoschlooExact(CountOf(a), CountOf(b)).two_sided, false};
+}
+
+std::map<Place, std::vector<Contestant>> ContestantsOf(const std::vector<JudgedEpisode>& episodes,
+                                                       std::vector<RateCell>& cells) {
+  std::map<Place, std::vector<Contestant>> places;
+  std::map<std::pair<Place, std::string>, std::size_t> where;
+  for (RateCell& cell : cells) {
+    std::vector<Contestant>& contestants = places[{cell.world, cell.task}];
+    where[{{cell.world, cell.task}, cell.policy}] = contestants.size();
+    contestants.push_back({&cell, {}});
+  }
+  std::map<std::pair<std::string, std::uint64_t>, std::size_t> numbers;  // of (state, seed)
+  for (const JudgedEpisode& judged : episodes) {
+    if (!judged.Counts()) continue;
+    const EpisodeKey& key = judged.episode.key;
+    const Place place{key.world, key.pair.task};
+    const auto found = where.find({place, PolicyLabel(key.pair.policy, key.pair.checkpoint)});
+    if (found == where.end()) continue;
+    const std::size_t number =
+        numbers.try_emplace({key.pair.initial_state, key.pair.seed}, numbers.size()).first->second;
+    places[place][found->second].outcomes.emplace_back(number, judged.outcome == Outcome::kSuccess);
+  }
+  for (auto& [place, contestants] : places) {
+    for (Contestant& one : contestants) std::sort(one.outcomes.begin(), one.outcomes.end());
+  }
+  return places;
+}
+
+/// The best first, so that "a" is with the best; those without a verdict last.
+void SortByRate(std::vector<Contestant>& contestants) {
+  std::stable_sort(contestants.begin(), contestants.end(), [](const Contestant& a, const Contestant& b) {
+    const auto rate = [](const Contestant& one) { return one.cell->rate.value ? *one.cell->rate.value : -1; };
+    return rate(a) > rate(b);
+  });
+}
+
+std::vector<Contest> ContestsOf(const std::vector<Contestant>& contestants) {
+  std::vector<Contest> contests;
+  for (std::size_t i = 0; i < contestants.size(); ++i) {
+    for (std::size_t j = i + 1; j < contestants.size(); ++j) {
+      if (contestants[i].outcomes.empty() || contestants[j].outcomes.empty()) continue;
+      contests.push_back(ContestOf(contestants, i, j));
+    }
+  }
+  return contests;
+}
+
+}  // namespace
+
+LetterTests GiveLetters(const std::vector<JudgedEpisode>& episodes, double alpha, std::vector<RateCell>& cells) {
+  std::map<Place, std::vector<Contestant>> places = ContestantsOf(episodes, cells);
+  std::map<std::string, std::map<std::string, std::vector<Contest>>> worlds;  // world, task
+  for (auto& [place, contestants] : places) {
+    SortByRate(contestants);
+    worlds[place.first][place.second] = ContestsOf(contestants);
+  }
+  LetterTests tests;
+  for (const auto& [world, tasks] : worlds) {
+    std::vector<double> p_values;
+    for (const auto& [task, contests] : tasks) {
+      for (const Contest& contest : contests) {
+        p_values.push_back(contest.p);
+        tests.has_unpaired |= !contest.is_paired;
+      }
+    }
+    const std::vector<double> adjusted = HolmAdjusted(p_values);
+    tests.pairs = std::max(tests.pairs, static_cast<std::int64_t>(adjusted.size()));
+    auto p = adjusted.begin();
+    for (const auto& [task, contests] : tasks) {
+      std::vector<std::pair<std::size_t, std::size_t>> significant;
+      for (const Contest& contest : contests) {
+        if (*p++ <= alpha) significant.emplace_back(contest.first, contest.second);
+      }
+      const std::vector<Contestant>& contestants = places.at({world, task});
+      if (contests.empty()) continue;  // nobody to differ from
+      const std::vector<std::string> letters = CompactLetters(contestants.size(), significant);
+      for (std::size_t i = 0; i < contestants.size(); ++i) {
+        if (!contestants[i].outcomes.empty()) contestants[i].cell->letters = letters[i];
+      }
+    }
+  }
+  return tests;
+}
+
+}  // namespace evac

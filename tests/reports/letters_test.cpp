@@ -1,0 +1,74 @@
+#include "reports/letters.h"
+
+#include <gtest/gtest.h>
+
+#include <map>
+
+#include "reports/report_data.h"
+#include "tests/reports/sample_run.h"
+
+namespace evac {
+namespace {
+
+/// Of one world: "task policy" → letters.
+std::map<std::string, std::string> LettersOf(const ReportData& report, const std::string& world) {
+  std::map<std::string, std::string> letters;
+  for (const RateCell& cell : report.summary.rates) {
+    if (cell.world == world) letters[cell.task + " " + cell.policy] = cell.letters;
+  }
+  return letters;
+}
+
+using Letters = std::map<std::string, std::string>;
+
+TEST(Letters, JoinPoliciesThatDoNotDifferAndPartThoseThatDo) {
+  const std::string good(20, 's'), bad(20, 'f');
+  const std::string fair = std::string(17, 's') + "fff";
+  const ReportData report = ReportDataOf(
+      SampleRun({{"a", "pick", "bad", bad, good}, {"a", "pick", "good", good, good}, {"a", "pick", "fair", fair, good}})
+          .Summary());
+  EXPECT_EQ(report.letters.pairs, 3);
+  EXPECT_EQ(LettersOf(report, "real"), (Letters{{"a pick@good", "a"}, {"a pick@fair", "a"}, {"a pick@bad", "b"}}));
+  EXPECT_EQ(LettersOf(report, "sim"), (Letters{{"a pick@good", "a"}, {"a pick@fair", "a"}, {"a pick@bad", "a"}}));
+}
+
+TEST(Letters, AreHeldToAllPairsThatAWorldShows) {
+  // Six against none: p = .031 alone, and not significant as one of six.
+  const std::string better = "ssssssffff", worse = "ffffffffff";
+  const std::vector<SampleCell> alone = {{"a", "pick", "1", better, worse}, {"a", "pick", "2", worse, worse}};
+  EXPECT_EQ(LettersOf(ReportDataOf(SampleRun(alone).Summary()), "real"),
+            (Letters{{"a pick@1", "a"}, {"a pick@2", "b"}}));
+  std::vector<SampleCell> among = alone;
+  for (const char* task : {"b", "c", "d", "e", "f"}) {
+    among.push_back({task, "pick", "1", worse, worse});
+    among.push_back({task, "pick", "2", worse, worse});
+  }
+  const ReportData report = ReportDataOf(SampleRun(among).Summary());
+  EXPECT_EQ(report.letters.pairs, 6);
+  EXPECT_EQ(LettersOf(report, "real").at("a pick@2"), "a");
+}
+
+TEST(Letters, ComparePairsAndNotRates) {
+  // The same rates, 5 of 10 and 9 of 10: in other states for the first, where the flips cancel.
+  const std::vector<SampleCell> cells = {{"a", "pick", "1", "sssssssfff", "u"}, {"a", "pick", "2", "fffsssssss", "u"}};
+  const ReportData report = ReportDataOf(SampleRun(cells).Summary());
+  EXPECT_EQ(LettersOf(report, "real"), (Letters{{"a pick@1", "a"}, {"a pick@2", "a"}}));
+}
+
+TEST(Letters, PoliciesThatShareFewStatesAreComparedAsTwoSamples) {
+  const std::vector<SampleCell> cells = {
+      {"a", "pick", "1", "ssssssssss----------", "u"}, {"a", "pick", "2", "----------ffffffffff", "u"}};
+  const ReportData report = ReportDataOf(SampleRun(cells).Summary());
+  EXPECT_TRUE(report.letters.has_unpaired);
+  EXPECT_EQ(LettersOf(report, "real"), (Letters{{"a pick@1", "a"}, {"a pick@2", "b"}}));
+}
+
+TEST(Letters, NobodyToDifferFromGetsNone) {
+  const ReportData report =
+      ReportDataOf(SampleRun({{"a", "pick", "1", "sss", "sss"}, {"a", "pick", "2", "eee", "uuu"}}).Summary());
+  EXPECT_EQ(report.letters.pairs, 0);
+  EXPECT_EQ(LettersOf(report, "real"), (Letters{{"a pick@1", ""}, {"a pick@2", ""}}));
+}
+
+}  // namespace
+}  // namespace evac
