@@ -11,6 +11,7 @@
 namespace evac {
 
 void AddCalibrate(CLI::App& judge, ExitCode& exit_code);  // command_calibrate.cpp: a subcommand of this one
+void AddJudgeTrain(CLI::App& judge, ExitCode& exit_code);  // command_train_learners.cpp: another
 
 namespace {
 
@@ -37,7 +38,7 @@ std::unique_ptr<Judge> MakeJudge(const JudgeArguments& arguments, const Store& s
   if (arguments.judge != "classifier")
     throw InvalidInput("--judge: found '{}', wanted oracle, classifier or vlm", arguments.judge);
   if (arguments.weights.empty())
-    throw InvalidInput("--judge classifier: wanted --weights, a file of `evac train judge`");
+    throw InvalidInput("--judge classifier: wanted --weights, a file of `evac judge train` or `evac train judge`");
   auto judge = std::make_unique<ClassifierJudge>(arguments.weights, store.folder());
   judge->CheckKnows(store.Tasks());
   return judge;
@@ -81,8 +82,9 @@ void AddJudge(CLI::App& app, ExitCode& exit_code) {
       "  evac judge calibrate out/demo --judge vlm:qwen-1a2b3c4d");
   AddVlmOptions(*command, arguments->vlm);
   AddCalibrate(*command, exit_code);
+  AddJudgeTrain(*command, exit_code);
   command->callback([command, arguments, &exit_code] {
-    if (!command->got_subcommand("calibrate")) exit_code = Rate(*arguments);
+    if (command->get_subcommands().empty()) exit_code = Rate(*arguments);
   });
 }
 

@@ -3,6 +3,8 @@
 
 #include "apps/commands.h"
 #include "apps/interrupts.h"
+#include "apps/judge_run_clips.h"
+#include "apps/judge_shard_clips.h"
 #include "apps/train_arguments.h"
 #include "apps/train_judge.h"
 #include "apps/train_policy.h"
@@ -30,11 +32,28 @@ ExitCode RunLearner(const TrainArguments& arguments, const std::string& section,
 }
 
 ExitCode RunJudge(const TrainArguments& arguments) {
-  return RunLearner<JudgeOptions>(arguments, "judge", [&](const train::JobPlace& place, const JudgeOptions& options) {
-    if (arguments.codec.empty()) return TrainJudge(place, options);
-    const JudgeCodec codec(arguments.codec, place.config.vae);
-    return TrainJudge(place, options, &codec);
+  return RunLearner<JudgeTrainingOptions>(arguments, "judge", [&](const train::JobPlace& place, const JudgeTrainingOptions& options) {
+    std::optional<JudgeCodec> codec;
+    if (!arguments.codec.empty()) codec.emplace(arguments.codec, place.config.vae);
+    const ShardClips learn(place.shards, train::Split::kTrain, codec ? &*codec : nullptr),
+        holdout(place.shards, train::Split::kHoldout, codec ? &*codec : nullptr);
+    return TrainJudge(place, options, {learn, holdout});
   });
+}
+
+struct LabelledArguments {
+  LabelledRuns runs;
+  TrainArguments training;
+};
+
+ExitCode RunJudgeFromLabels(const LabelledArguments& arguments) {
+  return RunLearner<JudgeTrainingOptions>(
+      arguments.training, "judge", [&](const train::JobPlace& place, const JudgeTrainingOptions& options) {
+        LabelledRuns runs = arguments.runs;
+        runs.seed = options.job.trainer.seed;
+        const LabelledClips clips = ReadLabelledClips(runs, place.say);
+        return TrainJudge(place, options, {*clips.learn, *clips.holdout});
+      });
 }
 
 ExitCode RunPolicy(const TrainArguments& arguments) {
@@ -60,6 +79,40 @@ void AddTrainJudge(CLI::App& group, ExitCode& exit_code) {
       "                   --codec out/codec/codec.safetensors --out out/judge\n"
       "OUT: judge.safetensors with its card (docs/classifier_judge.md), metrics.csv, holdout.csv");
   command->callback([arguments, &exit_code] { exit_code = RunJudge(*arguments); });
+}
+
+void AddJudgeTrain(CLI::App& judge, ExitCode& exit_code) {
+  const auto arguments = std::make_shared<LabelledArguments>();
+  LabelledRuns& runs = arguments->runs;
+  CLI::App* command =
+      judge.add_subcommand("train", "Train a classifier for your own tasks, from clips that somebody has judged.");
+  command->add_option("RUNS", runs.runs, "folders of runs; their clips are what it learns from")
+      ->required()
+      ->check(CLI::ExistingDirectory);
+  command->add_option("--truth", runs.truth, "whose verdicts: a judge's name, human:STUDY say (evac ls shows them)")
+      ->capture_default_str();
+  command->add_option("--worlds", runs.worlds, "clips of these worlds alone, with commas between them")->delimiter(',');
+  command->add_option("--holdout", runs.holdout, "share of initial states that are kept apart to measure with")
+      ->check(CLI::Range(0.05, 0.9))
+      ->capture_default_str();
+  command->add_option("--least", runs.least, "labels of each kind that a task must have")
+      ->check(CLI::Range(1, 1000000))
+      ->capture_default_str();
+  const auto side = CLI::Range(8, 1024) & CLI::Validator(
+                                              [](const std::string& text) {
+                                                return std::stoi(text) % 8 == 0 ? "" : "wanted a multiple of 8";
+                                              },
+                                              "multiple of 8");
+  command->add_option("--height-px", runs.height_px, "of a picture as the judge sees it")->check(side)->capture_default_str();
+  command->add_option("--width-px", runs.width_px, "likewise")->check(side)->capture_default_str();
+  AddTraining(*command, std::shared_ptr<TrainArguments>(arguments, &arguments->training));
+  command->footer(
+      "Example:\n"
+      "  evac judge train out/mine --truth human:study --training apps/configs/desk_training.yaml --out out/judge\n"
+      "  evac judge out/next --judge classifier --weights out/judge/judge.safetensors\n"
+      "It does not judge clips that it learned from. OUT: judge.safetensors with its card, metrics.csv, holdout.csv,\n"
+      "curves.svg (docs/classifier_judge.md)");
+  command->callback([arguments, &exit_code] { exit_code = RunJudgeFromLabels(*arguments); });
 }
 
 void AddTrainPolicy(CLI::App& group, ExitCode& exit_code) {

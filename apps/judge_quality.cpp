@@ -19,15 +19,14 @@ constexpr int kGrey = 128;
 double Probability(double logit, const ClassifierCard& card) { return 1 / (1 + std::exp(-logit / card.temperature)); }
 
 /// Covers what lies within the radius of the object's middle. @param pictures  [V, T, H, W, 3] bytes, changed
-void MaskObject(const PackedSet& set, const PackedClip& clip, double radius, at::Tensor& pictures) {
-  const train::Shard& shard = set.shards.shards()[clip.shard];
+/// @param objects  [V, T, 2] pixels; where it is not a number nothing is covered
+void MaskObject(const at::Tensor& objects, double radius, const at::Tensor& pictures) {
   const std::int64_t height = pictures.size(2), width = pictures.size(3);
   const at::Tensor x = at::arange(width, at::kFloat) + 0.5, y = at::arange(height, at::kFloat) + 0.5;
-  const std::vector<std::int64_t> rows = RowsOf(clip);
   const double radius_px = radius * static_cast<double>(height);
   for (std::int64_t v = 0; v < pictures.size(0); ++v) {
     for (std::int64_t t = 0; t < pictures.size(1); ++t) {
-      const at::Tensor middle = shard.object_px[rows[static_cast<std::size_t>(t)]][v];
+      const at::Tensor middle = objects[v][t];
       const at::Tensor dx = x - middle[0], dy = y - middle[1];
       const at::Tensor disc = (dx * dx).unsqueeze(0) + (dy * dy).unsqueeze(1) < radius_px * radius_px;
       pictures[v][t].masked_fill_(disc.unsqueeze(-1), kGrey);
@@ -67,7 +66,7 @@ double OrNotANumber(const Number& number) { return number ? *number : std::numer
 
 }  // namespace
 
-std::vector<double> Logits(const ClassifierNet& net, const PackedSet& set, const JudgeClips& clips,
+std::vector<double> Logits(const ClassifierNet& net, const JudgeClipSource& source, const JudgeClips& clips,
                            const JudgeLook& look) {
   const at::NoGradGuard no_gradients;
   std::vector<double> logits;
@@ -77,9 +76,8 @@ std::vector<double> Logits(const ClassifierNet& net, const PackedSet& set, const
     std::vector<at::Tensor> pictures;
     for (const PackedClip& clip : some) {
       const std::vector<std::int64_t> rows = RowsOf(clip);
-      pictures.push_back(look.codec ? look.codec->Reconstructed(set.shards.shards()[clip.shard], rows)
-                                    : PicturesOf(set, clip, rows).clone());
-      if (look.masks_object) MaskObject(set, clip, look.mask_radius, pictures.back());
+      pictures.push_back(look.reconstructed ? source.Reconstructed(clip, rows) : source.Pictures(clip, rows).clone());
+      if (look.masks_object) MaskObject(source.Objects(clip, rows), look.mask_radius, pictures.back());
     }
     ClassifierClips seen = ForNetwork(at::stack(pictures), some);
     if (look.first_view_only) seen.present.narrow(1, 1, seen.present.size(1) - 1).zero_();

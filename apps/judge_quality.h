@@ -14,11 +14,11 @@ struct JudgeLook {
   bool masks_object = false;  ///< a grey disc of `mask_radius` of the picture's height lies over the object
   bool first_view_only = false;
   double mask_radius = 0.2;
-  const JudgeCodec* codec = nullptr;  ///< the clips are shown as it gives them back
+  bool reconstructed = false;  ///< the clips are shown as their codec gives them back
 };
 
 /// The network's logits of success, in the order of the clips.
-std::vector<double> Logits(const ClassifierNet& net, const PackedSet& set, const JudgeClips& clips,
+std::vector<double> Logits(const ClassifierNet& net, const JudgeClipSource& source, const JudgeClips& clips,
                            const JudgeLook& look);
 
 /// Mean logarithmic loss of uncalibrated logits.

@@ -32,7 +32,7 @@ at::Tensor Indices(const std::vector<std::int64_t>& rows) { return at::tensor(at
 
 }  // namespace
 
-train::Settings SettingsOf(JudgeOptions& options) {
+train::Settings SettingsOf(JudgeTrainingOptions& options) {
   train::Settings settings = {{"batch", &options.batch},
                               {"calibration", &options.calibration},
                               {"drop_view", &options.drop_view},
@@ -48,18 +48,10 @@ train::Settings SettingsOf(JudgeOptions& options) {
   return settings;
 }
 
-JudgeClips Labelled(const PackedSet& set) {
-  JudgeClips labelled;
-  for (const PackedClip& clip : set.clips) {
-    if (clip.outcome >= 0) labelled.push_back(clip);
-  }
-  return labelled;
-}
-
-JudgeSplit SplitForJudge(const PackedSet& set, const JudgeOptions& options) {
+JudgeSplit SplitForJudge(const JudgeClips& clips, const JudgeTrainingOptions& options) {
   const std::uint64_t seed = SeedFor(options.job.trainer.seed, "judge calibration");
   JudgeSplit split;
-  for (const PackedClip& clip : Labelled(set)) {
+  for (const PackedClip& clip : clips) {
     const bool calibrates = SplitMix64(SeedFor(seed, clip.state)).Uniform() < options.calibration;
     (calibrates ? split.calibration : split.fit).push_back(clip);
   }
@@ -80,19 +72,14 @@ std::vector<std::int64_t> RowsOf(const PackedClip& clip) {
   return rows;
 }
 
-at::Tensor PicturesOf(const PackedSet& set, const PackedClip& clip, const std::vector<std::int64_t>& rows) {
-  return set.shards.shards()[clip.shard].frames.index_select(0, Indices(rows)).transpose(0, 1);
-}
-
 ClassifierClips ForNetwork(const at::Tensor& bytes, const JudgeClips& clips) {
   std::vector<std::int64_t> tasks;
   for (const PackedClip& clip : clips) tasks.push_back(clip.task);
   return {bytes.to(at::kFloat) / 127.5 - 1, at::ones({bytes.size(0), bytes.size(1)}), Indices(tasks)};
 }
 
-JudgeTraining::JudgeTraining(const PackedSet& set, const JudgeClips& fit, const JudgeOptions& options,
-                             const JudgeCodec* codec)
-    : set_(set), fit_(fit), options_(options), codec_(codec) {
+JudgeTraining::JudgeTraining(const JudgeClipSource& source, const JudgeClips& fit, const JudgeTrainingOptions& options)
+    : source_(source), fit_(fit), options_(options) {
   if (options.batch < 1) throw InvalidInput("judge training: batch is {}, wanted at least 1", options.batch);
 }
 
@@ -101,15 +88,15 @@ JudgeTraining::Batch JudgeTraining::Draw(const train::StepPlace& place) const {
   JudgeClips clips;
   std::vector<at::Tensor> pictures, objects;
   std::vector<float> successes;
-  at::Tensor present = at::ones({options_.batch, set_.shards.views()});
+  const auto views = static_cast<std::int64_t>(source_.cameras.size());
+  at::Tensor present = at::ones({options_.batch, views});
   for (std::int64_t b = 0; b < options_.batch; ++b) {
     const PackedClip& clip = fit_[static_cast<std::size_t>(pick.Below(static_cast<std::int64_t>(fit_.size())))];
     const std::vector<std::int64_t> rows = JitteredRows(clip, options_.jitter, pick);
-    if (pick.Chance(options_.drop_view)) present[b].narrow(0, 1, set_.shards.views() - 1).zero_();
-    const train::Shard& shard = set_.shards.shards()[clip.shard];
-    const bool is_reconstructed = codec_ && pick.Chance(options_.reconstructed_share);
-    pictures.push_back(is_reconstructed ? codec_->Reconstructed(shard, rows) : PicturesOf(set_, clip, rows));
-    objects.push_back(shard.object_px.index_select(0, Indices(rows)).transpose(0, 1));
+    if (pick.Chance(options_.drop_view)) present[b].narrow(0, 1, views - 1).zero_();
+    const bool is_reconstructed = !source_.Codec().empty() && pick.Chance(options_.reconstructed_share);
+    pictures.push_back(is_reconstructed ? source_.Reconstructed(clip, rows) : source_.Pictures(clip, rows));
+    objects.push_back(source_.Objects(clip, rows));
     successes.push_back(clip.outcome == 1 ? 1.0F : 0.0F);
     clips.push_back(clip);
   }
@@ -117,7 +104,7 @@ JudgeTraining::Batch JudgeTraining::Draw(const train::StepPlace& place) const {
   batch.clips.pictures = Changed(batch.clips.pictures, options_.changes, change);
   batch.clips.present = present;
   const auto size =
-      at::tensor({static_cast<float>(set_.shards.width_px()), static_cast<float>(set_.shards.height_px())});
+      at::tensor({static_cast<float>(source_.width_px), static_cast<float>(source_.height_px)});
   const at::Tensor object = at::stack(objects) / size;                // [B, V, T, 2]
   const at::Tensor inside = ((object >= 0) * (object <= 1)).all(-1);  // false where it is not a number
   batch.visible = inside.to(at::kFloat) * present.unsqueeze(-1);

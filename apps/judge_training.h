@@ -3,16 +3,15 @@
 #include <optional>
 #include <vector>
 
-#include "apps/judge_codec.h"
-#include "apps/packed_clips.h"
+#include "apps/judge_clips.h"
 #include "apps/picture_changes.h"
 #include "judges/classifier_net.h"
 #include "worldmodel/train/settings.h"
 
-/// How the classifier judge is trained: on clips of a packing, whose outcome is the oracle's.
+/// How the classifier judge is trained: on clips with a known outcome.
 namespace evac {
 
-struct JudgeOptions {
+struct JudgeTrainingOptions {
   train::JobOptions job;             ///< of it the trainer's alone: a classifier is trained in floats
   std::int64_t batch = 32;           ///< clips
   double calibration = 0.15;         ///< share of the training split's initial states that only calibrates
@@ -23,22 +22,15 @@ struct JudgeOptions {
   double unsure = 0.1;               ///< what the card says: closer to the threshold is `cannot tell`
   PictureChanges changes;
 };
-train::Settings SettingsOf(JudgeOptions& options);
+train::Settings SettingsOf(JudgeTrainingOptions& options);
 
-/// A clip with a known outcome, and how it is looked at.
-using JudgeClips = std::vector<PackedClip>;
-
-/// The training split by initial state: most of it to learn from, the rest to calibrate with. Unknown outcomes are left
-/// out.
+/// Clips to learn from, by initial state: most of them to learn from, the rest to calibrate with.
 struct JudgeSplit {
   JudgeClips fit, calibration;
 };
-JudgeSplit SplitForJudge(const PackedSet& set, const JudgeOptions& options);
-/// Those with a known outcome.
-JudgeClips Labelled(const PackedSet& set);
+/// @throws InvalidInput if either part has outcomes of one kind alone.
+JudgeSplit SplitForJudge(const JudgeClips& clips, const JudgeTrainingOptions& options);
 
-/// [V, T, H, W, 3] bytes of a clip's eight pictures. @param rows  of the clip's shard, ascending
-at::Tensor PicturesOf(const PackedSet& set, const PackedClip& clip, const std::vector<std::int64_t>& rows);
 /// The rows that a classifier sees, evenly spaced.
 std::vector<std::int64_t> RowsOf(const PackedClip& clip);
 /// Bytes of clips [B, V, T, H, W, 3] as the network takes them, all views present.
@@ -46,8 +38,8 @@ ClassifierClips ForNetwork(const at::Tensor& bytes, const JudgeClips& clips);
 
 class JudgeTraining {
  public:
-  /// @param set, fit, codec  outlive this
-  JudgeTraining(const PackedSet& set, const JudgeClips& fit, const JudgeOptions& options, const JudgeCodec* codec);
+  /// @param source, fit  outlive this; fit are clips of the source
+  JudgeTraining(const JudgeClipSource& source, const JudgeClips& fit, const JudgeTrainingOptions& options);
   at::Tensor Loss(const ClassifierNet& net, const train::StepPlace& place) const;
 
  private:
@@ -59,10 +51,9 @@ class JudgeTraining {
   };
   Batch Draw(const train::StepPlace& place) const;
 
-  const PackedSet& set_;
+  const JudgeClipSource& source_;
   const JudgeClips& fit_;
-  JudgeOptions options_;
-  const JudgeCodec* codec_;
+  JudgeTrainingOptions options_;
 };
 
 }  // namespace evac

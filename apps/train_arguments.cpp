@@ -14,6 +14,10 @@ void AddShared(CLI::App& command, const std::shared_ptr<TrainArguments>& argumen
   command.add_option("SHARDS", arguments->shards, "a folder of `evac pack` (docs/formats/shards.md)")
       ->required()
       ->check(CLI::ExistingDirectory);
+  AddTraining(command, arguments);
+}
+
+void AddTraining(CLI::App& command, const std::shared_ptr<TrainArguments>& arguments) {
   command
       .add_option("--training", arguments->training, "the page of training options; what is left out is the paper's")
       ->check(CLI::ExistingFile);

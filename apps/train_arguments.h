@@ -23,7 +23,9 @@ struct TrainArguments {
   int threads = 0;
 };
 
-/// Adds what all trainings share: SHARDS, --training, --set, --minutes, --steps, --threads, --out.
+/// Adds what all trainings share: --training, --set, --minutes, --steps, --threads, --out.
+void AddTraining(CLI::App& command, const std::shared_ptr<TrainArguments>& arguments);
+/// The same and SHARDS.
 void AddShared(CLI::App& command, const std::shared_ptr<TrainArguments>& arguments);
 
 /// Adds --config, the page of the network's sizes.

@@ -5,12 +5,16 @@
 
 namespace evac {
 
+/// What a judge is made from.
+struct JudgeData {
+  const JudgeClipSource& learn;    ///< most of it is learned from, the rest calibrates
+  const JudgeClipSource& holdout;  ///< measured on once, at the end
+};
+
 /// Trains the classifier judge and writes OUT/judge.safetensors: its weights and its card (docs/classifier_judge.md).
-/// It learns from most initial states of the training split, is calibrated on the rest of them, and measured on the
-/// hold-out split, which nothing else sees. An interrupted training writes none.
-/// @param codec  whose latents the shards have: `reconstructed_share` of the clips are shown as it gives them back, which
-///   is how a world model's clips look. Null: none are
-train::TrainerSummary TrainJudge(const train::JobPlace& place, const JudgeOptions& options,
-                                 const JudgeCodec* codec = nullptr);
+/// Where the clips have a codec, `reconstructed_share` of them are shown as it gives them back, which is how a world
+/// model's clips look. An interrupted training writes none.
+/// @param place  of it `shards` and `config` are not read
+train::TrainerSummary TrainJudge(const train::JobPlace& place, const JudgeTrainingOptions& options, const JudgeData& data);
 
 }  // namespace evac

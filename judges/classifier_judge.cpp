@@ -74,6 +74,10 @@ ClassifierJudge::ClassifierJudge(const std::filesystem::path& weights, std::file
     : run_(std::move(run)) {
   WeightFile file(weights, "evac-classifier 1");
   card_ = CardOf(file);
+  if (file.card().contains("learned_from")) {
+    const std::vector<std::string> marks = file.Names("learned_from");
+    learned_from_ = {marks.begin(), marks.end()};
+  }
   network_ = std::make_unique<const Network>(file);
   name_ = "classifier:" + Sha256HexOfFile(weights).substr(0, kHashDigits);
 }
@@ -127,6 +131,8 @@ double ClassifierJudge::Probability(const Task& task, const std::filesystem::pat
 Verdict ClassifierJudge::Rate(const Task& task, const Episode& episode) {
   CheckKnows({&task, 1});
   if (episode.video.empty()) throw InvalidInput("{}: it has no clip", episode.key.Id());
+  if (learned_from_.contains(episode.video_sha256.substr(0, kHashDigits)))
+    throw InvalidInput("{}: {} learned from this clip, and cannot judge it", episode.key.Id(), name_);
   Verdict verdict;
   verdict.episode_id = episode.key.Id();
   verdict.judge = name_;

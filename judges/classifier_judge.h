@@ -2,6 +2,7 @@
 
 #include <filesystem>
 #include <memory>
+#include <set>
 #include <span>
 #include <string>
 #include <vector>
@@ -25,7 +26,8 @@ Label LabelOf(double probability, const ClassifierCard& card);
 /// threshold.
 ///
 /// Verdicts: `success`, `failure`, or `cannot_tell` near the threshold, with the probability. A clip that is missing or
-/// cannot be read, and a task or camera it does not know, throw: JudgeEpisodes makes them `invalid`, never a failure.
+/// cannot be read, a task or camera it does not know, and a clip that it learned from, throw: JudgeEpisodes makes them
+/// `invalid`, never a failure.
 class ClassifierJudge : public Judge {
  public:
   /// @param weights  of `evac train judge`
@@ -50,6 +52,7 @@ class ClassifierJudge : public Judge {
   std::filesystem::path run_;
   std::string name_;
   ClassifierCard card_;
+  std::set<std::string> learned_from_;  ///< first digits of clips' SHA-256
   std::unique_ptr<const Network> network_;
 };
 

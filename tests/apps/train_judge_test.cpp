@@ -6,6 +6,7 @@
 #include <fstream>
 
 #include "apps/judge_quality.h"
+#include "apps/judge_shard_clips.h"
 #include "core/error.h"
 #include "core/file.h"
 #include "core/hash.h"
@@ -20,8 +21,8 @@ namespace {
 using testing::HasSubstr;
 using testing::ThrowsMessage;
 
-JudgeOptions Quick(std::int64_t steps) {
-  JudgeOptions options;
+JudgeTrainingOptions Quick(std::int64_t steps) {
+  JudgeTrainingOptions options;
   options.batch = 8;
   options.calibration = 0.3;
   options.job.trainer.steps = steps;
@@ -42,11 +43,17 @@ class TrainJudgeTest : public testing::Test {
     place.out = folder_ / out;
     return place;
   }
+  train::TrainerSummary Train(const train::JobPlace& place, const JudgeTrainingOptions& options,
+                              const JudgeCodec* codec = nullptr) const {
+    const ShardClips learn(folder_ / "shards", train::Split::kTrain, codec),
+        holdout(folder_ / "shards", train::Split::kHoldout, codec);
+    return TrainJudge(place, options, {learn, holdout});
+  }
   const TempFolder folder_;
 };
 
 TEST_F(TrainJudgeTest, ATinyClassifierTellsClipsApartThatItHasNotSeen) {
-  TrainJudge(Place("judge"), Quick(150));
+  Train(Place("judge"), Quick(150));
   const WeightFile file(folder_ / "judge" / "judge.safetensors", "evac-classifier 1");
   EXPECT_GT(file.Number("auroc"), 0.95);
   EXPECT_GT(file.Number("kappa"), 0.8);
@@ -57,12 +64,12 @@ TEST_F(TrainJudgeTest, ATinyClassifierTellsClipsApartThatItHasNotSeen) {
 }
 
 TEST_F(TrainJudgeTest, InterruptedAndGoneOnWithItEndsInTheSameBytes) {
-  TrainJudge(Place("whole"), Quick(12));
+  Train(Place("whole"), Quick(12));
   train::JobPlace place = Place("parts");
   int steps = 0;
   place.interrupted = [&] { return ++steps % 5 == 0; };
   int runs = 0;
-  while (!TrainJudge(place, Quick(12)).IsDone()) ++runs;
+  while (!Train(place, Quick(12)).IsDone()) ++runs;
   EXPECT_EQ(runs, 2);
   EXPECT_EQ(Sha256HexOfFile(folder_ / "parts" / "judge.safetensors"),
             Sha256HexOfFile(folder_ / "whole" / "judge.safetensors"));
@@ -95,18 +102,17 @@ class CodedJudgeTest : public TrainJudgeTest {
 
 TEST_F(CodedJudgeTest, ItLearnsFromClipsAsTheCodecGivesThemBackAndIsMeasuredOnThem) {
   const JudgeCodec judge_codec(codec(), config_);
-  PackedSet set(folder_ / "shards", train::Split::kTrain);
-  judge_codec.Open(set.shards);
+  const ShardClips set(folder_ / "shards", train::Split::kTrain, &judge_codec);
   const PackedClip& clip = set.clips[3];
   const std::vector<std::int64_t> rows = RowsOf(clip);
-  const at::Tensor whole = PicturesOf(set, clip, rows).to(at::kFloat);
-  const at::Tensor coded = judge_codec.Reconstructed(set.shards.shards()[clip.shard], rows).to(at::kFloat);
+  const at::Tensor whole = set.Pictures(clip, rows).to(at::kFloat);
+  const at::Tensor coded = set.Reconstructed(clip, rows).to(at::kFloat);
   ASSERT_EQ(coded.sizes(), whole.sizes());
   const double off = (coded - whole).abs().mean().item<double>();
   EXPECT_GT(off, 0.5) << "it is not the picture itself";
   EXPECT_LT(off, 0.5 * (whole.flip(0) - whole).abs().mean().item<double>() + 12) << "but like it, view by view";
 
-  TrainJudge(Place("judge"), Quick(150), &judge_codec);
+  Train(Place("judge"), Quick(150), &judge_codec);
   const WeightFile file(folder_ / "judge" / "judge.safetensors", "evac-classifier 1");
   EXPECT_EQ(file.Text("codec"), Sha256HexOfFile(codec()));
   EXPECT_GT(file.Number("kappa"), 0.8);
@@ -119,13 +125,13 @@ TEST_F(CodedJudgeTest, LatentsOfAnotherCodecAreRefused) {
     train::EncodeShard(nn::Vae(nn::Scope(weights, train::kCodecPrefix), config_), shard, {"another", "shard"});
   }
   const JudgeCodec judge_codec(codec(), config_);
-  EXPECT_THAT([&] { TrainJudge(Place("judge"), Quick(2), &judge_codec); },
+  EXPECT_THAT([&] { Train(Place("judge"), Quick(2), &judge_codec); },
               ThrowsMessage<TensorError>(HasSubstr("did not make the shards' latents")));
 }
 
 TEST_F(TrainJudgeTest, CalibrationSharesNoInitialStateWithLearning) {
-  const PackedSet set(folder_ / "shards", train::Split::kTrain);
-  const JudgeSplit split = SplitForJudge(set, Quick(2));
+  const ShardClips set(folder_ / "shards", train::Split::kTrain, nullptr);
+  const JudgeSplit split = SplitForJudge(set.clips, Quick(2));
   EXPECT_EQ(split.fit.size() + split.calibration.size(), set.clips.size());
   for (const PackedClip& one : split.fit) {
     for (const PackedClip& other : split.calibration) EXPECT_NE(one.state, other.state);
@@ -133,14 +139,14 @@ TEST_F(TrainJudgeTest, CalibrationSharesNoInitialStateWithLearning) {
 }
 
 TEST_F(TrainJudgeTest, OutcomesOfOneKindAloneAreRefused) {
-  PackedSet set(folder_ / "shards", train::Split::kTrain);
+  ShardClips set(folder_ / "shards", train::Split::kTrain, nullptr);
   for (PackedClip& clip : set.clips) clip.outcome = 1;
-  EXPECT_THAT([&] { SplitForJudge(set, Quick(2)); }, ThrowsMessage<Error>(HasSubstr("wanted some of both kinds")));
+  EXPECT_THAT([&] { SplitForJudge(set.clips, Quick(2)); }, ThrowsMessage<Error>(HasSubstr("wanted some of both kinds")));
 }
 
 TEST_F(TrainJudgeTest, APackingThatSaysNothingOfStatesIsRefused) {
   std::ofstream(folder_ / "shards" / "shards.json") << "{}";
-  EXPECT_THAT([&] { TrainJudge(Place("judge"), Quick(2)); },
+  EXPECT_THAT([&] { Train(Place("judge"), Quick(2)); },
               ThrowsMessage<Error>(HasSubstr("wanted states, behaviours and fates per recording")));
 }
 

@@ -7,8 +7,10 @@
 #include <atomic>
 #include <cmath>
 #include <fstream>
+#include <iterator>
 
 #include "tests/support/temp_folder.h"
+#include "worldmodel/train/curves.h"
 
 namespace evac::train {
 namespace {
@@ -122,6 +124,39 @@ TEST(Trainer, LearnsWhatTheLossSays) {
   EXPECT_EQ(summary.why, "done");
   EXPECT_NEAR(regression.weight[1].item<double>(), -2, 0.05);
   EXPECT_NEAR(regression.bias[0].item<double>(), 3, 0.05);
+}
+
+std::size_t Occurrences(const std::string& text, const std::string& part) {
+  std::size_t count = 0;
+  for (std::size_t at = text.find(part); at != std::string::npos; at = text.find(part, at + 1)) ++count;
+  return count;
+}
+
+TEST(Trainer, DrawsHowItWent) {
+  const TempFolder folder;
+  Regression regression;
+  TrainerOptions options = Quick(60);
+  options.holdout_every = 20;
+  double score = 4;
+  Trainer(regression.Parameters(), options, folder.path())
+      .Run({.loss = [&](const StepPlace& place) { return regression.Loss(place); },
+            .holdout = [&] { return score = score == 2 ? 3 : score - 1; }});
+  std::ifstream file(folder / "curves.svg");
+  const std::string svg{std::istreambuf_iterator<char>(file), {}};
+  EXPECT_EQ(svg, CurvesSvg(folder.path()));
+  EXPECT_NE(svg.find("best 2 at step 40"), std::string::npos);
+  EXPECT_EQ(Occurrences(svg, "r=\"2\""), 3U) << "a dot for each hold-out";
+  EXPECT_EQ(Occurrences(svg, "nan"), 0U);
+  EXPECT_EQ(Occurrences(svg, "inf"), 0U);
+}
+
+TEST(Curves, OfNothingOrOfOneNumberAreStillAPicture) {
+  const TempFolder folder;
+  EXPECT_NE(CurvesSvg(folder.path()).find("</svg>"), std::string::npos);
+  std::ofstream(folder / "metrics.csv") << "step,loss\n0,nan\n1,-3\nrubbish\n";
+  const std::string svg = CurvesSvg(folder.path());
+  EXPECT_NE(svg.find("loss, by step"), std::string::npos);
+  EXPECT_EQ(Occurrences(svg, "nan"), 0U);
 }
 
 TEST(Trainer, GoesOnAfterAnyKillAsIfNothingHadHappened) {

@@ -10,6 +10,7 @@
 
 #include "worldmodel/nn/threads.h"
 #include "worldmodel/train/csv_log.h"
+#include "worldmodel/train/curves.h"
 
 namespace evac::train {
 namespace {
@@ -183,6 +184,7 @@ void Trainer::HoldOut(const TrainerCallbacks& callbacks) {
     if (callbacks.look) callbacks.look(step_);
   });
   CsvLog::Add(folder_ / "holdout.csv", Text("%lld,%.9g", static_cast<long long>(step_), *last_score_));
+  WriteCurves(folder_);
 }
 
 void Trainer::Record(const StepOutcome& outcome, double seconds) {
@@ -228,6 +230,7 @@ TrainerSummary Trainer::Run(const TrainerCallbacks& callbacks) {
       saved_ = Clock::now();
     }
   }
+  WriteCurves(folder_);
   return {step_, steps_, why, best_score_, best_step_};
 }
 

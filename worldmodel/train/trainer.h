@@ -81,6 +81,7 @@ struct TrainerSummary {
 ///                          again, a training goes on from there; on the CPU it ends in the same bytes.
 ///   metrics.csv            step,loss,learning_rate,gradient_norm,seconds
 ///   holdout.csv            step,holdout
+///   curves.svg             both as a picture (curves.h), after each hold-out and at the end
 class Trainer {
  public:
   /// @param parameters  floats; they stay where their holders see them (FlatParameters)
