@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <chrono>
 #include <map>
 
 #include "apps/evaluate.h"
@@ -12,7 +11,6 @@
 #include "apps/fidelity_judge.h"
 #include "apps/fidelity_plans.h"
 #include "apps/interrupts.h"
-#include "core/file.h"
 #include "core/version.h"
 #include "harness/scheduler.h"
 #include "worldmodel/evac_config.h"
@@ -25,10 +23,10 @@ namespace fs = std::filesystem;
 /// One call's work: what it was asked, and what it has measured so far.
 class Measuring {
  public:
-  explicit Measuring(const FidelityArguments& arguments)
+  Measuring(const FidelityArguments& arguments, const Suite& suite)
       : arguments_(arguments),
         out_(arguments.out),
-        suite_(ReadSuite(arguments.suite, arguments.assignments)),
+        suite_(suite),
         worlds_(WorldsOf(suite_)),
         model_(ReadEvacConfig(worlds_.model.evac->config)),
         chunk_(static_cast<int>(model_.chunk)),
@@ -114,38 +112,17 @@ class Measuring {
     input_.horizon = drift.Chunks();
   }
 
-  /// Several scenes at once, as in a run; measured anew every time.
+  /// Measured anew every time.
   void Speed() {
     const Store closed = Store::Open(out_ / "closed", Store::Mode::kReadOnly);
-    std::vector<Replay> replays = ReplaysOf(closed, worlds_.real.name, suite_);
-    std::erase_if(replays, [&](const Replay& replay) { return replay.actions.size() < static_cast<std::size_t>(chunk_); });
-    replays.resize(std::min<std::size_t>(replays.size(), static_cast<std::size_t>(suite_.lanes)));
-    if (replays.empty()) return;
-    SuiteWorld uncached = worlds_.model;
-    uncached.evac->cache_folder.reset();
-    const std::unique_ptr<World> world = MakeWorld(uncached, suite_, &closed);
-    std::vector<ActionChunk> chunks;
-    for (std::size_t i = 0; i < replays.size(); ++i) {
-      world->Reset(static_cast<SceneId>(i), *replays[i].task, replays[i].initial, 0);
-      chunks.push_back({{replays[i].actions.begin(), replays[i].actions.begin() + chunk_}, false, 0});
-    }
-    std::vector<SceneChunk> batch;
-    for (std::size_t i = 0; i < chunks.size(); ++i) batch.push_back({static_cast<SceneId>(i), &chunks[i]});
-    world->Advance(batch);  // pages are touched, kernels compiled
-    const auto begin = std::chrono::steady_clock::now();
-    world->Advance(batch);
-    const std::chrono::duration<double> spent = std::chrono::steady_clock::now() - begin;
-    input_.seconds_per_chunk = spent.count() / static_cast<double>(batch.size());
+    input_.seconds_per_chunk =
+        SecondsPerChunk(worlds_.model, suite_, closed, ReplaysOf(closed, worlds_.real.name, suite_), chunk_);
   }
 
-  Fidelity Finish() {
+  void Finish() {
     if (judge_.name().empty())
       fmt::print(stderr, "evac: warning: nobody judges the imagined clips: give --classifier WEIGHTS (docs/classifier_judge.md)\n");
-    const Fidelity fidelity = FidelityOf(std::move(input_));
-    WriteFileAtomically(out_ / "episodes.csv", FidelityCsv(fidelity.input.rows));
-    WriteFileAtomically(out_ / "fidelity.json", FidelityJson(fidelity));
-    WriteFileAtomically(out_ / "index.html", FidelityPage(fidelity));
-    return fidelity;
+    FinishFidelity(out_, std::move(input_));
   }
 
  private:
@@ -201,15 +178,16 @@ ExitCode RunFidelity(const FidelityArguments& arguments) {
     if (!kParts.contains(part)) throw InvalidInput("--parts: found '{}', wanted some of closed, open, counterfactual, horizon", part);
   }
   const CatchInterrupts catch_interrupts;
-  Measuring measuring(arguments);
+  const Suite suite = ReadSuite(arguments.suite, arguments.assignments);
+  if (suite.recording) return RunRecordedFidelity(arguments, suite);
+  Measuring measuring(arguments, suite);
   const ExitCode closed = measuring.Closed();  // what all other parts are made from
   if (closed != ExitCode::kOk) return closed;
   if (Asks(arguments, "open")) measuring.Open();
   if (Asks(arguments, "counterfactual")) measuring.Counterfactual();
   if (Asks(arguments, "horizon")) measuring.Horizon();
   measuring.Speed();
-  const Fidelity fidelity = measuring.Finish();
-  fmt::print("{}\n{}\n", FidelityText(fidelity), (fs::path(arguments.out) / "index.html").string());
+  measuring.Finish();
   return ExitCode::kOk;
 }
 

@@ -1,13 +1,17 @@
 #pragma once
 
 #include <filesystem>
+#include <functional>
+#include <memory>
 #include <set>
 #include <string>
 #include <vector>
 
 #include "core/error.h"
 #include "core/store.h"
+#include "core/world.h"
 #include "harness/suite.h"
+#include "reports/fidelity.h"
 
 /// `evac fidelity`: is the world model true? (docs/fidelity.md) It fills OUT/closed, OUT/open, OUT/counterfactual_NAME and
 /// OUT/horizon, each a run of its own that any kill leaves resumable, and counts them (reports/fidelity.h).
@@ -25,6 +29,10 @@ struct FidelityArguments {
   int horizon_chunks = 30;         ///< of the network's K frames
 };
 ExitCode RunFidelity(const FidelityArguments& arguments);
+
+/// Of a suite with a `recording`: the actions of every recording of that folder, replayed in the suite's world model and
+/// held against the recorded pictures. Nobody knows how they ended, so only pictures are compared.
+ExitCode RunRecordedFidelity(const FidelityArguments& arguments, const Suite& suite);
 
 /// The three worlds of a fidelity suite.
 struct FidelityWorlds {
@@ -53,10 +61,21 @@ struct ReplayRun {
   std::string name;               ///< "open loop": shown, and part of the run's hash
   std::vector<Task> tasks;        ///< as they are declared in the store
   std::vector<SuiteWorld> worlds; ///< in the order they run
-  std::filesystem::path scenes;   ///< the run whose first frames imagined episodes start from; empty: this one
+  std::filesystem::path scenes = {};  ///< the run whose first frames imagined episodes start from; empty: this one
+  /// Makes a world in the place of apps/factory.h; null, or an answer that is null: the factory does.
+  std::function<std::unique_ptr<World>(const SuiteWorld& world)> make = {};
 };
 /// Runs what is missing. @returns the store, judged by the oracle where there is physics.
 /// @throws InternalError if it was interrupted.
 Store RunReplays(const ReplayRun& run, const std::vector<Replay>& replays);
+
+/// Seconds that a world model takes per chunk of K frames and scene, of as many scenes at once as the suite has lanes,
+/// its cache unused. @param scenes  whose first frames it starts from
+/// @returns undefined if no replay is a chunk long
+Number SecondsPerChunk(const SuiteWorld& model, const Suite& suite, const Store& scenes, std::vector<Replay> replays,
+                       int chunk);
+
+/// Writes episodes.csv, fidelity.json and index.html, and says the numbers.
+void FinishFidelity(const std::filesystem::path& out, FidelityInput input);
 
 }  // namespace evac

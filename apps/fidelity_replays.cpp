@@ -112,7 +112,8 @@ Store RunReplays(const ReplayRun& run, const std::vector<Replay>& replays) {
     JobQueue jobs(MissingJobs(JobsIn(world, replays), store));
     if (jobs.size() == 0) continue;
     display.Begin(run.name + " · " + world.name);
-    const std::unique_ptr<World> made = MakeWorld(world, run.suite, scenes ? &*scenes : &store);
+    std::unique_ptr<World> made = run.make ? run.make(world) : nullptr;
+    if (!made) made = MakeWorld(world, run.suite, scenes ? &*scenes : &store);
     RolloutOptions options;
     options.lanes = run.suite.lanes;
     options.lane = {.chunk_size = run.suite.chunk_size,

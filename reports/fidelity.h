@@ -79,7 +79,7 @@ OutcomeMatch MatchOf(const std::vector<FidelityRow>& rows, const std::string& ki
 
 struct Fidelity {
   FidelityInput input;
-  std::vector<FidelityCell> cells;
+  std::vector<FidelityCell> cells;       ///< empty where no policy acted: recordings were replayed, pictures are all there is
   WorldComparison model, again;  ///< of the closed loop, against reality
   Number mmrv = Undefined{"no task has two policies"}, mmrv_again = Undefined{"no task has two policies"};  ///< mean over tasks
   OutcomeMatch closed, closed_again, open;

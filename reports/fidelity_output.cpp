@@ -124,6 +124,15 @@ std::string CsvText(const std::string& text) {
 
 std::string Words(const Number& number) { return number ? fmt::format("{:.3f}", *number) : "–"; }
 
+/// Pictures alone: a row per chunk.
+std::string DriftText(const std::vector<ChunkDrift>& chunks) {
+  std::vector<std::vector<std::string>> rows = {{"chunk", "clips", "dB", "dB of what moves", "had it stood still", "gripper px"}};
+  for (std::size_t i = 0; i < chunks.size(); ++i)
+    rows.push_back({std::to_string(i + 1), std::to_string(chunks[i].clips), Words(chunks[i].psnr), Words(chunks[i].psnr_moving),
+                    Words(chunks[i].psnr_moving_copy), Words(chunks[i].gripper_px)});
+  return TextTable(rows);
+}
+
 }  // namespace
 
 std::string FidelityJson(const Fidelity& fidelity) {
@@ -163,6 +172,7 @@ std::string FidelityCsv(const std::vector<FidelityRow>& rows) {
 }
 
 std::string FidelityText(const Fidelity& fidelity) {
+  if (fidelity.cells.empty()) return DriftText(fidelity.input.open_loop.chunks);
   std::vector<std::vector<std::string>> rows = {{"task", "policy", "n", "real", "again", "model", "agreement"}};
   for (const FidelityCell& cell : fidelity.cells)
     rows.push_back({cell.task, PolicyLabel(cell.policy, cell.checkpoint), std::to_string(cell.n), Words(cell.real),

@@ -117,11 +117,12 @@ std::string DriftChart(const std::vector<ChunkDrift>& chunks) {
          "<p class=\"quiet\">dB. Blue: all pixels. Orange: pixels that move in reality. Dashed: those, had the first picture stood still.</p>";
 }
 
-std::string Clips(const Fidelity& fidelity, bool truth, bool said) {
+/// Pairs of one kind of which it is so known, or not known, how they ended.
+std::string Clips(const Fidelity& fidelity, const char* kind, std::optional<bool> truth, std::optional<bool> said) {
   std::string pairs;
   std::size_t shown = 0;
   for (const FidelityRow& row : fidelity.input.rows) {
-    if (row.kind != "closed_loop" || row.real != truth || row.model != said) continue;
+    if (row.kind != kind || row.real != truth || row.model != said) continue;
     if (row.real_video.empty() || row.model_video.empty() || ++shown > kShown) continue;
     pairs += fmt::format("<figure class=\"pair\"><video src=\"{}\" controls muted preload=\"metadata\"></video><video src=\"{}\" controls muted "
                          "preload=\"metadata\"></video><figcaption>{}, {}, state {}: real above, imagined below</figcaption></figure>",
@@ -142,19 +143,50 @@ std::string Headline(const Fidelity& fidelity) {
                      WithInterval(fidelity.input.judge.kappa, 1, 2, ""), Decimal(fidelity.input.judge.kappa_masked, 2));
 }
 
+/// Outcomes, and how pictures drift apart.
+std::string WholeBody(const Fidelity& fidelity) {
+  std::string page = "<h1>How true is the world model?</h1>" + Headline(fidelity);
+  page += "<h2>Outcomes</h2>" + MatchTable(fidelity) + "<h2>Rates</h2>" + Scatter(fidelity) + CellTable(fidelity);
+  if (!fidelity.input.open_loop.chunks.empty())
+    page += "<h2>Pictures, recorded actions replayed</h2>" + DriftChart(fidelity.input.open_loop.chunks);
+  if (!fidelity.input.horizon.empty()) page += "<h2>Pictures, long rollouts</h2>" + DriftChart(fidelity.input.horizon);
+  const auto clips = [&](bool truth, bool said) { return Clips(fidelity, "closed_loop", truth, said); };
+  return page + "<h2>Successes of both</h2>" + clips(true, true) + "<h2>Failures of both</h2>" + clips(false, false) +
+         "<h2>Hallucinated</h2>" + clips(false, true) + "<h2>Missed</h2>" + clips(true, false);
+}
+
+std::string ChunkTable(const std::vector<ChunkDrift>& chunks) {
+  std::string rows;
+  for (std::size_t i = 0; i < chunks.size(); ++i)
+    rows += fmt::format("<tr><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td></tr>", i + 1, chunks[i].clips,
+                        Decimal(chunks[i].psnr, 1), Decimal(chunks[i].psnr_moving, 1), Decimal(chunks[i].psnr_moving_copy, 1),
+                        Decimal(chunks[i].gripper_px, 1));
+  return "<div class=\"wide\"><table><thead><tr><th>chunk</th><th>clips</th><th>dB</th><th>dB of what moves</th><th>had it stood "
+         "still</th><th>gripper off by, pixels</th></tr></thead><tbody>" + rows + "</tbody></table></div>";
+}
+
+/// Pictures alone: recordings that nobody says the end of.
+std::string RecordedBody(const Fidelity& fidelity) {
+  const std::vector<ChunkDrift>& chunks = fidelity.input.open_loop.chunks;
+  const std::string usable = fidelity.usable_horizon_chunks
+                                 ? Counted(*fidelity.usable_horizon_chunks, "chunk")
+                                 : "not a single chunk";
+  return fmt::format("<h1>How true is the world model to recordings?</h1><p>{} replayed, their actions given to the model from "
+                     "the first picture on. What moves is at least 2 dB better than a picture that stands still for {}. {} s "
+                     "per chunk.</p><p class=\"quiet\">Nobody says how recordings end: pictures are compared, not outcomes.</p>",
+                     Counted(static_cast<std::int64_t>(fidelity.input.rows.size()), "recording"), usable,
+                     Decimal(fidelity.input.seconds_per_chunk, 2)) +
+         "<h2>Pictures</h2>" + DriftChart(chunks) + ChunkTable(chunks) + "<h2>Clips</h2>" +
+         Clips(fidelity, "open_loop", std::nullopt, std::nullopt);
+}
+
 }  // namespace
 
 std::string FidelityPage(const Fidelity& fidelity) {
   std::string page = "<!doctype html><html lang=\"en\"><head><meta charset=\"utf-8\"><meta name=\"viewport\" "
                      "content=\"width=device-width,initial-scale=1\"><title>Fidelity of the world model</title><style>";
   page += kStyle;
-  page += "</style></head><body><h1>How true is the world model?</h1>" + Headline(fidelity);
-  page += "<h2>Outcomes</h2>" + MatchTable(fidelity) + "<h2>Rates</h2>" + Scatter(fidelity) + CellTable(fidelity);
-  if (!fidelity.input.open_loop.chunks.empty())
-    page += "<h2>Pictures, recorded actions replayed</h2>" + DriftChart(fidelity.input.open_loop.chunks);
-  if (!fidelity.input.horizon.empty()) page += "<h2>Pictures, long rollouts</h2>" + DriftChart(fidelity.input.horizon);
-  page += "<h2>Successes of both</h2>" + Clips(fidelity, true, true) + "<h2>Failures of both</h2>" + Clips(fidelity, false, false);
-  page += "<h2>Hallucinated</h2>" + Clips(fidelity, false, true) + "<h2>Missed</h2>" + Clips(fidelity, true, false);
+  page += "</style></head><body>" + (fidelity.cells.empty() ? RecordedBody(fidelity) : WholeBody(fidelity));
   page += fmt::format("<h2>Made from</h2><p class=\"quiet\">suite {:.16}…, world model {:.16}…</p></body></html>\n",
                       fidelity.input.suite_hash, fidelity.input.model_hash);
   return page;

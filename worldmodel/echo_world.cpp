@@ -2,6 +2,9 @@
 
 #include <fmt/ranges.h>
 
+#include <algorithm>
+#include <set>
+
 #include "core/error.h"
 
 namespace evac {
@@ -43,12 +46,29 @@ Advanced Echo(RecordedFrames& frames, const ActionChunk& chunk) {
 }  // namespace
 
 EchoWorld::EchoWorld(Recording recording, std::string name)
-    : recording_(std::move(recording)), name_(std::move(name)) {}
+    : EchoWorld(std::vector<Recording>{std::move(recording)}, std::move(name)) {}
+
+EchoWorld::EchoWorld(std::vector<Recording> recordings, std::string name)
+    : recordings_(std::move(recordings)), name_(std::move(name)) {
+  std::set<std::string> ids;
+  for (const Recording& recording : recordings_) {
+    if (!ids.insert(recording.id).second)
+      throw InvalidInput("two recordings are called {}: wanted folders of different names", recording.id);
+  }
+}
+
+const Recording& EchoWorld::RecordingOf(const Task& task) const {
+  if (recordings_.size() == 1) return recordings_.front();
+  const auto found = std::ranges::find(recordings_, task.id, &Recording::id);
+  if (found == recordings_.end()) throw InvalidInput("task {}: no recording is called so", task.id);
+  return *found;
+}
 
 WorldStep EchoWorld::Reset(SceneId scene, const Task& task, const InitialState&, std::uint64_t) {
-  CheckMatches(task, recording_);
-  RecordedFrames& frames = scenes_.insert_or_assign(scene, RecordedFrames(recording_)).first->second;
-  return Step(frames, recording_.arms.front());
+  const Recording& recording = RecordingOf(task);
+  CheckMatches(task, recording);
+  RecordedFrames& frames = scenes_.insert_or_assign(scene, RecordedFrames(recording)).first->second;
+  return Step(frames, recording.arms.front());
 }
 
 std::vector<Advanced> EchoWorld::Advance(std::span<const SceneChunk> batch) {

@@ -19,10 +19,13 @@ namespace evac {
 class EchoWorld : public World {
  public:
   explicit EchoWorld(Recording recording, std::string name = "echo");
+  /// Several at once: a task's id says which is meant. @throws InvalidInput if two have one id
+  EchoWorld(std::vector<Recording> recordings, std::string name);
 
   std::string Name() const override { return name_; }
 
-  /// @param task  its arms and its cameras' names and sizes must be the recording's (TaskFromRecording). `initial` and
+  /// @param task  its id (where there are several recordings), its arms and its cameras' names and sizes must be the
+  /// recording's (TaskFromRecording). `initial` and
   /// `seed` change
   ///   nothing.
   /// @throws InvalidInput if they are not.
@@ -32,7 +35,9 @@ class EchoWorld : public World {
   std::vector<Advanced> Advance(std::span<const SceneChunk> batch) override;
 
  private:
-  Recording recording_;
+  const Recording& RecordingOf(const Task& task) const;
+
+  std::vector<Recording> recordings_;
   std::string name_;
   std::map<SceneId, RecordedFrames> scenes_;
 };

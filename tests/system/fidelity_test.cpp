@@ -3,12 +3,14 @@
 #include <signal.h>
 #include <sys/wait.h>
 
+#include <algorithm>
 #include <nlohmann/json.hpp>
 #include <sstream>
 #include <thread>
 
 #include "core/file.h"
 #include "tests/support/command.h"
+#include "tests/support/synthetic_recording.h"
 #include "tests/support/temp_folder.h"
 #include "tests/system/run_support.h"
 #include "worldmodel/evac_config.h"
@@ -85,6 +87,36 @@ TEST_F(FidelityRun, SaysWhichWorldTheSuiteLacks) {
   const CommandResult result = RunCommand(words);
   EXPECT_EQ(result.exit_code, 2) << result.err;
   EXPECT_THAT(result.err, HasSubstr("wanted another of type mujoco with the real world's profile"));
+}
+
+/// Three recordings of two tasks, one too short to be replayed.
+void WriteRecordings(const fs::path& root) {
+  for (const auto& [name, steps] : {std::pair{"one", 120}, {"two", 90}, {"short", 9}}) {
+    SyntheticClip clip(steps);
+    clip.cameras = {"head", "hand_right"};
+    std::ranges::fill(clip.grippers, 60.0F);  // half closed
+    fs::create_directories(root / name);
+    clip.Write(OneFolder(root / name));
+  }
+}
+
+TEST_F(FidelityRun, OfRecordingsComparesPicturesAndSaysWhatWasLeftOut) {
+  WriteRecordings(folder_ / "mine");
+  const fs::path out = folder_ / "out";
+  const CommandResult result = RunCommand(
+      {Binary("evac"), "fidelity", EVAC_SOURCE_DIR "/apps/configs/fidelity_recordings.yaml", "--out", out.string(), "--set",
+       "recording=" + (folder_ / "mine").string(), "--set", "worlds.1.weights=" + weights_.string(), "--set",
+       "worlds.1.config=" EVAC_SOURCE_DIR "/tests/system/evac_small.yaml", "--set",
+       "worlds.1.statistics=" EVAC_SOURCE_DIR "/apps/configs/robots/agibotworld.yaml"});
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_THAT(result.err, HasSubstr("1 recordings left out: 1 too_short"));
+  const nlohmann::json numbers = Numbers(out);
+  EXPECT_EQ(numbers["open_loop"]["psnr_by_chunk"].size(), 4u) << "120 steps at 30 Hz are 40 at 10 Hz: 4 chunks of 8";
+  EXPECT_TRUE(numbers["pearson"].is_null());
+  EXPECT_EQ(numbers["open_loop"]["n"], 0) << "nobody says how they ended";
+  const std::string page = ReadFile(out / "index.html");
+  EXPECT_THAT(page, HasSubstr("2 recordings replayed"));
+  EXPECT_THAT(page, HasSubstr("<video"));
 }
 
 }  // namespace
