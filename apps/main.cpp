@@ -2,6 +2,7 @@
 
 #include <cstdio>
 
+#include "apps/command_rate.h"
 #include "apps/commands.h"
 #include "core/tensor_file.h"
 #include "core/version.h"
@@ -37,6 +38,7 @@ int main(int argc, char** argv) {
     evac::AddEncode(app, exit_code);
     evac::AddCollect(app, exit_code);
     evac::AddPack(app, exit_code);
+    evac::AddRate(app, exit_code);
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
     return app.exit(error) == 0 ? 0 : static_cast<int>(evac::ExitCode::kInvalidInput);

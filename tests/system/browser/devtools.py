@@ -27,10 +27,21 @@ class Browser:
         self.process = subprocess.Popen(
             [shutil.which("chromium"), *FLAGS, f"--user-data-dir={self.profile}", "about:blank"],
             stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, start_new_session=True)
+        self._attach(self._page_address())
+
+    def _attach(self, address):
+        self.address = address
         self.requests, self.complaints, self.answers, self.last_id = [], [], {}, 0
-        self.socket = websocket.create_connection(self._page_address(), timeout=60, suppress_origin=True)
+        self.socket = websocket.create_connection(address, timeout=60, suppress_origin=True)
         for domain in ("Page", "Runtime", "Network", "Log"):
             self.call(f"{domain}.enable")
+
+    def tab(self):
+        """Another tab of the same browser, with the same cookies; it goes with the browser."""
+        target = self.call("Target.createTarget", url="about:blank")["targetId"]
+        other = object.__new__(Browser)
+        other._attach(self.address.rsplit("/", 1)[0] + "/" + target)
+        return other
 
     def _page_address(self):
         port_file = pathlib.Path(self.profile) / "DevToolsActivePort"
@@ -90,7 +101,7 @@ class Browser:
     def wait(self, expression, patience_s=30):
         """Until the expression is true."""
         end = time.time() + patience_s
-        while not self.js(expression):
+        while not self.js(f"Boolean({expression})"):
             if time.time() > end:
                 raise RuntimeError(f"never came true: {expression}")
             time.sleep(0.05)
@@ -109,6 +120,20 @@ class Browser:
         common = {"key": name, "code": name, "windowsVirtualKeyCode": codes[name]}
         self.call("Input.dispatchKeyEvent", type="keyDown", text=text, **common)
         self.call("Input.dispatchKeyEvent", type="keyUp", **common)
+
+    def press(self, name, shift=False):
+        """A key of a page that reads letters and digits."""
+        codes = {" ": ("Space", 32), "Home": ("Home", 36), "End": ("End", 35), "[": ("BracketLeft", 219),
+                 "]": ("BracketRight", 221), ",": ("Comma", 188), ".": ("Period", 190), "?": ("Slash", 191),
+                 "Escape": ("Escape", 27), "Enter": ("Enter", 13), "Tab": ("Tab", 9)}
+        code, number = codes.get(name) or (f"Digit{name}" if name.isdigit() else f"Key{name.upper()}", ord(name.upper()))
+        common = {"key": name, "code": code, "windowsVirtualKeyCode": number, "modifiers": 8 if shift else 0}
+        text = "\r" if name == "Enter" else name if len(name) == 1 else ""
+        self.call("Input.dispatchKeyEvent", type="keyDown", text=text, **common)
+        self.call("Input.dispatchKeyEvent", type="keyUp", **common)
+
+    def offline(self, is_off):
+        self.call("Network.emulateNetworkConditions", offline=is_off, latency=0, downloadThroughput=-1, uploadThroughput=-1)
 
     def click(self, x, y):
         for kind in ("mouseMoved", "mousePressed", "mouseReleased"):

@@ -1,0 +1,29 @@
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "core/store_study.h"
+
+namespace evac {
+
+struct ResolveOptions {
+  std::string judge = "human";  ///< the name under which the labels stand in the runs' stores
+  bool each_rater = false;      ///< every rater's vote as well, as "human:<study>:r3"
+  bool mix_rubrics = false;     ///< labels of one task by different rubrics are one judge's
+};
+
+struct Resolved {
+  std::int64_t written = 0;  ///< new verdicts in the runs' stores
+  std::int64_t decided = 0, undecided = 0;
+  std::vector<std::string> warnings;
+};
+
+/// The way back: labels by majority or by an adjudicator become verdicts of the runs they came from, where `evac judge
+/// calibrate --against human`, `evac report --judge human` and everything else finds them. Clips that are not decided
+/// are written as cannot_tell with the reason, never as failures. What is there already is not written again.
+/// @throws InvalidInput if a run has moved, or a task was rated by several rubrics and they were not to be mixed.
+Resolved ResolveStudy(const StudyStore& study, const ResolveOptions& options);
+
+}  // namespace evac

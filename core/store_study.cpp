@@ -1,0 +1,206 @@
+#include "core/store_study.h"
+
+#include <array>
+#include <utility>
+
+#include "core/error.h"
+#include "core/file.h"
+#include "core/hash.h"
+#include "core/store_study_database.h"
+
+namespace evac {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr std::int64_t kApplicationId = 0x65767374;  // "evst"
+constexpr const char* kFile = "study.sqlite";
+
+constexpr std::pair<RaterRole, const char*> kRoles[] = {
+    {RaterRole::kRater, "rater"}, {RaterRole::kAdjudicator, "adjudicator"}, {RaterRole::kLead, "lead"}};
+constexpr std::pair<Showing, const char*> kShowings[] = {
+    {Showing::kCounted, "counted"}, {Showing::kGold, "gold"},     {Showing::kPractice, "practice"},
+    {Showing::kExample, "example"}, {Showing::kRepeat, "repeat"}, {Showing::kAdjudication, "adjudication"},
+    {Showing::kImport, "import"}};
+
+std::int64_t Pragma(sqlite::Connection& connection, const char* sql) {
+  sqlite::Statement statement = connection.Query(sql);
+  return statement.Step() ? statement.Integer(0) : 0;
+}
+
+void Check(sqlite::Connection& connection, const fs::path& file) {
+  const std::int64_t version = Pragma(connection, "PRAGMA user_version");
+  if (Pragma(connection, "PRAGMA application_id") != kApplicationId || version != 1)
+    throw InvalidInput("{}: is no study that this evac knows (version {})", file.string(), version);
+}
+
+constexpr const char* kClipColumns =
+    "SELECT id, wave, run, episode, task, initial_state, policy, checkpoint, world, is_real, source_sha256, use, "
+    "reference, reference_reason, rubric_hash, views, file, video_sha256, frames FROM clips ";
+
+StudyClip ClipOf(const sqlite::Statement& row) {
+  StudyClip clip;
+  clip.id = row.Integer(0);
+  clip.wave = static_cast<int>(row.Integer(1));
+  clip.run = row.Text(2);
+  clip.episode = row.Text(3);
+  clip.task = row.Text(4);
+  clip.initial_state = row.Text(5);
+  clip.policy = row.Text(6);
+  clip.checkpoint = row.Text(7);
+  clip.world = row.Text(8);
+  clip.is_real = row.Integer(9) != 0;
+  clip.source_sha256 = row.Text(10);
+  clip.use = ShowingFromName(row.Text(11));
+  if (!row.IsNull(12)) clip.reference = LabelFromName(row.Text(12));
+  clip.reference_reason = row.Text(13);
+  clip.rubric_hash = row.Text(14);
+  clip.views = row.Text(15);
+  clip.file = row.Text(16);
+  clip.video_sha256 = row.Text(17);
+  clip.frames = static_cast<int>(row.Integer(18));
+  return clip;
+}
+
+std::string LineOf(const StudyClip& clip) {
+  return clip.run + "\n" + clip.episode + "\n" + clip.rubric_hash + "\n" + clip.video_sha256 + "\n" + Name(clip.use) +
+         "\n";
+}
+
+}  // namespace
+
+const char* Name(RaterRole role) {
+  for (const auto& [known, name] : kRoles) {
+    if (known == role) return name;
+  }
+  throw InternalError("a role without a name");
+}
+
+RaterRole RaterRoleFromName(const std::string& name) {
+  for (const auto& [role, known] : kRoles) {
+    if (known == name) return role;
+  }
+  throw InvalidInput("role: found '{}', wanted rater, adjudicator or lead", name);
+}
+
+const char* Name(Showing showing) {
+  for (const auto& [known, name] : kShowings) {
+    if (known == showing) return name;
+  }
+  throw InternalError("a showing without a name");
+}
+
+Showing ShowingFromName(const std::string& name) {
+  for (const auto& [showing, known] : kShowings) {
+    if (known == name) return showing;
+  }
+  throw InternalError("the study is damaged: '{}' is no way to show a clip", name);
+}
+
+StudyStore::StudyStore(std::unique_ptr<Database> database) : database_(std::move(database)) {}
+StudyStore::StudyStore(StudyStore&&) noexcept = default;
+StudyStore& StudyStore::operator=(StudyStore&&) noexcept = default;
+StudyStore::~StudyStore() = default;
+
+StudyStore StudyStore::Create(const fs::path& folder, const StudyInfo& info) {
+  const fs::path file = folder / kFile;
+  if (fs::exists(file)) throw InvalidInput("{}: there is a study already", folder.string());
+  MakeFolders(folder);
+  auto database = std::make_unique<Database>(Database{folder, sqlite::Connection::OpenReadWrite(file)});
+  sqlite::Connection& connection = database->connection;
+  sqlite::Transaction transaction(connection);
+  connection.RunScript(kStudySchema);
+  connection.RunScript(fmt::format("PRAGMA application_id = {}", kApplicationId));
+  connection.Run("INSERT INTO study VALUES (1, ?, ?, ?, ?, ?, ?, ?)", info.name, std::to_string(info.seed),
+                 info.raters_per_clip, info.width_px, info.height_px, info.period_s, info.evac_version);
+  transaction.Commit();
+  return StudyStore(std::move(database));
+}
+
+StudyStore StudyStore::Open(const fs::path& folder, Mode mode) {
+  const fs::path file = folder / kFile;
+  if (!fs::exists(file)) throw InvalidInput("{}: there is no study ({} is missing)", folder.string(), kFile);
+  auto database =
+      std::make_unique<Database>(Database{folder, mode == Mode::kReadOnly ? sqlite::Connection::OpenReadOnly(file)
+                                                                          : sqlite::Connection::OpenReadWrite(file)});
+  Check(database->connection, file);
+  return StudyStore(std::move(database));
+}
+
+const fs::path& StudyStore::folder() const { return database_->folder; }
+
+StudyInfo StudyStore::info() const {
+  sqlite::Statement row = database_->connection.Query(
+      "SELECT name, seed, raters_per_clip, width_px, height_px, period_s, evac_version FROM study");
+  if (!row.Step()) throw InternalError("the study is damaged: it has no name");
+  StudyInfo info;
+  info.name = row.Text(0);
+  info.seed = std::stoull(row.Text(1));
+  info.raters_per_clip = static_cast<int>(row.Integer(2));
+  info.width_px = static_cast<int>(row.Integer(3));
+  info.height_px = static_cast<int>(row.Integer(4));
+  info.period_s = row.Real(5);
+  info.evac_version = row.Text(6);
+  return info;
+}
+
+void StudyStore::Begin() { database_->connection.Run("BEGIN IMMEDIATE"); }
+void StudyStore::Commit() { database_->connection.Run("COMMIT"); }
+void StudyStore::Rollback() { database_->connection.Run("ROLLBACK"); }
+void StudyStore::Mark() { database_->connection.Run("SAVEPOINT one"); }
+void StudyStore::Release() { database_->connection.Run("RELEASE one"); }
+void StudyStore::Undo() { database_->connection.RunScript("ROLLBACK TO one; RELEASE one"); }
+
+std::string StudyStore::AddWave(std::span<const StudyClip> clips, std::span<const StudyRubric> rubrics) {
+  sqlite::Connection& connection = database_->connection;
+  const int wave = Waves() + 1;
+  std::string list;
+  for (const StudyClip& clip : clips) list += LineOf(clip);
+  const std::string hash = Sha256Hex(list);
+  sqlite::Transaction transaction(connection);
+  connection.Run("INSERT INTO waves VALUES (?, ?)", wave, hash);
+  for (const StudyRubric& rubric : rubrics)
+    connection.Run("INSERT OR IGNORE INTO rubrics VALUES (?, ?, ?)", rubric.hash, rubric.task, rubric.document);
+  for (const StudyClip& clip : clips) {
+    connection.Run(
+        "INSERT INTO clips (wave, run, episode, task, initial_state, policy, checkpoint, world, is_real, "
+        "source_sha256, "
+        "use, reference, reference_reason, rubric_hash, views, file, video_sha256, frames) VALUES (?, ?, ?, ?, ?, ?, "
+        "?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)",
+        wave, clip.run, clip.episode, clip.task, clip.initial_state, clip.policy, clip.checkpoint, clip.world,
+        clip.is_real ? 1 : 0, clip.source_sha256, Name(clip.use),
+        clip.reference ? std::optional<std::string>(Name(*clip.reference)) : std::nullopt, clip.reference_reason,
+        clip.rubric_hash, clip.views, clip.file, clip.video_sha256, clip.frames);
+  }
+  transaction.Commit();
+  return hash;
+}
+
+int StudyStore::Waves() const { return static_cast<int>(Pragma(database_->connection, "SELECT count(*) FROM waves")); }
+
+std::vector<StudyClip> StudyStore::Clips() const {
+  sqlite::Statement row = database_->connection.Query((std::string(kClipColumns) + "ORDER BY id").c_str());
+  std::vector<StudyClip> clips;
+  while (row.Step()) clips.push_back(ClipOf(row));
+  return clips;
+}
+
+StudyClip StudyStore::Clip(std::int64_t id) const {
+  sqlite::Statement row = database_->connection.Query((std::string(kClipColumns) + "WHERE id = ?").c_str(), id);
+  if (!row.Step()) throw InternalError("the study is damaged: there is no clip {}", id);
+  return ClipOf(row);
+}
+
+std::vector<StudyRubric> StudyStore::Rubrics() const {
+  sqlite::Statement row = database_->connection.Query("SELECT hash, task, document FROM rubrics ORDER BY task, hash");
+  std::vector<StudyRubric> rubrics;
+  while (row.Step()) rubrics.push_back({row.Text(0), row.Text(1), row.Text(2)});
+  return rubrics;
+}
+
+std::int64_t StudyStore::VotesOf(std::int64_t clip) const {
+  sqlite::Statement row = database_->connection.Query("SELECT count(*) FROM votes WHERE clip = ?", clip);
+  return row.Step() ? row.Integer(0) : 0;
+}
+
+}  // namespace evac

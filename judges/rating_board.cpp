@@ -1,0 +1,175 @@
+#include "judges/rating_board.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <map>
+
+#include "judges/rating_votes.h"
+
+namespace evac {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+Json ToJson(const Number& number) {
+  if (number) return {{"value", *number}};
+  return {{"value", nullptr}, {"reason", number.reason()}};
+}
+
+std::string PublicName(std::int64_t rater) { return fmt::format("r{}", rater); }
+
+Json ToJson(const LabelRates& rates) {
+  return {{"clips", rates.clips},
+          {"decided", rates.decided},
+          {"undecided", rates.undecided},
+          {"majority", ToJson(rates.majority)},
+          {"soft", ToJson(rates.soft)},
+          {"unanimous", ToJson(rates.unanimous)},
+          {"dawid_skene", ToJson(rates.dawid_skene)},
+          {"low", ToJson(rates.low)},
+          {"high", ToJson(rates.high)},
+          {"far_apart", rates.far_apart}};
+}
+
+Json AgreementJson(const std::vector<RatedClip>& clips, int raters_per_clip) {
+  const RatingAgreement agreement = RatersAgreement(clips, raters_per_clip);
+  Json json = {{"clips", agreement.clips},
+               {"alpha", ToJson(agreement.alpha)},
+               {"fleiss", ToJson(agreement.fleiss)},
+               {"agreement", ToJson(agreement.agreement)}};
+  if (agreement.interval)
+    json["alpha"]["low"] = agreement.interval->low, json["alpha"]["high"] = agreement.interval->high;
+  return json;
+}
+
+/// One row per clip: what the matrix shows.
+Json ClipsJson(const std::vector<RatedClip>& clips) {
+  Json rows = Json::array();
+  for (const RatedClip& rated : clips) {
+    Json votes = Json::object();
+    for (const auto& [rater, ballot] : rated.by_rater) votes[PublicName(rater)] = ballot.label;
+    rows.push_back({{"clip", rated.clip.id},
+                    {"episode", rated.clip.episode},
+                    {"task", rated.clip.task},
+                    {"world", rated.clip.world},
+                    {"use", Name(rated.clip.use)},
+                    {"votes", votes},
+                    {"label", rated.resolution.label ? Json(Name(*rated.resolution.label)) : Json(nullptr)},
+                    {"how", rated.resolution.how}});
+  }
+  return rows;
+}
+
+Json RatersJson(const StudyStore& store, const std::map<std::int64_t, StudyClip>& clips, double period_s) {
+  std::map<std::int64_t, std::vector<StudyStore::Ballot>> by_rater;
+  for (StudyStore::Ballot& ballot : store.Ballots()) by_rater[ballot.rater].push_back(ballot);
+  Json rows = Json::array();
+  for (const StudyRater& rater : store.Raters()) {
+    const RaterQuality quality = QualityOfRater(by_rater[rater.id], clips, period_s);
+    rows.push_back({{"rater", PublicName(rater.id)},
+                    {"name", rater.name},
+                    {"role", Name(rater.role)},
+                    {"status", rater.status},
+                    {"counts", rater.counts},
+                    {"verdicts", quality.verdicts},
+                    {"success_share", quality.success_share},
+                    {"median_rt_s", quality.median_rt_ms / 1000},
+                    {"gold_right", quality.gold_right},
+                    {"gold_seen", quality.gold_seen},
+                    {"repeats_same", quality.repeats_same},
+                    {"repeats_seen", quality.repeats_seen},
+                    {"concerns", quality.concerns}});
+  }
+  return rows;
+}
+
+/// Bang's index per kind of world: did raters see which clips are generated?
+Json BlindingJson(const StudyStore& store, const std::map<std::int64_t, StudyClip>& clips) {
+  std::map<bool, BlindingGuesses> guesses;
+  for (const StudyStore::Guess& guess : store.Guesses()) {
+    const bool is_real = clips.at(guess.clip).is_real;
+    BlindingGuesses& of_world = guesses[is_real];
+    if (guess.guess == "unsure")
+      ++of_world.unsure;
+    else if ((guess.guess == "real") == is_real)
+      ++of_world.correct;
+    else
+      ++of_world.incorrect;
+  }
+  Json json = Json::object();
+  for (const bool is_real : {true, false}) {
+    const BlindingGuesses& given = guesses[is_real];
+    const BlindingIndex index = BangBlindingIndex(given);
+    json[is_real ? "real" : "generated"] = {{"index", ToJson(index.index)},
+                                            {"se", ToJson(index.se)},
+                                            {"guesses", given.correct + given.incorrect + given.unsure},
+                                            {"is_seen_through", index.index && *index.index > 0.3}};
+  }
+  return json;
+}
+
+/// Clips, verdicts and what is left, with the time it takes if it goes on as in the last hour.
+Json ProgressJson(const StudyStore& store, const std::vector<RatedClip>& clips, std::int64_t now_ms) {
+  const std::int64_t wanted = store.info().raters_per_clip;
+  std::int64_t votes = 0, complete = 0, missing = 0;
+  for (const RatedClip& clip : clips) {
+    const auto given = static_cast<std::int64_t>(clip.by_rater.size());
+    votes += given;
+    if (given >= wanted) ++complete;
+    missing += std::max<std::int64_t>(0, wanted - given);
+  }
+  const std::int64_t last_hour = store.VerdictsSince(now_ms - 3'600'000);
+  Json json = {{"clips", clips.size()},
+               {"complete", complete},
+               {"votes", votes},
+               {"missing", missing},
+               {"last_hour", last_hour}};
+  json["hours_left"] =
+      last_hour > 0 ? Json(static_cast<double>(missing) / static_cast<double>(last_hour)) : Json(nullptr);
+  return json;
+}
+
+}  // namespace
+
+Json RatingBoard(const StudyStore& store, std::int64_t now_ms) {
+  const StudyInfo info = store.info();
+  std::map<std::int64_t, StudyClip> by_id;
+  for (StudyClip& clip : store.Clips()) by_id[clip.id] = std::move(clip);
+  const std::vector<RatedClip> clips = RatedClips(store);
+  Json rates = Json::array();
+  std::map<std::pair<std::string, std::string>, std::vector<RatedClip>> groups;
+  for (const RatedClip& clip : clips) groups[{clip.clip.task, clip.clip.world}].push_back(clip);
+  for (const auto& [group, of_group] : groups) {
+    rates.push_back(ToJson(RatesOf(of_group)));
+    rates.back()["task"] = group.first;
+    rates.back()["world"] = group.second;
+  }
+  const std::vector<std::int64_t> disputes = store.Disputes();
+  Json leases = Json::array(), unplayable = Json::array();
+  for (const Presentation& lease : store.Leases(now_ms))
+    leases.push_back(
+        {{"rater", PublicName(lease.rater)}, {"clip", lease.clip}, {"left_s", (lease.lease_until_ms - now_ms) / 1000}});
+  for (const StudyStore::Unplayable& one : store.UnplayableClips())
+    unplayable.push_back({{"rater", PublicName(one.rater)},
+                          {"clip", one.clip},
+                          {"episode", by_id.at(one.clip).episode},
+                          {"reason", one.reason}});
+  std::int64_t excluded = 0;
+  for (const StudyRater& rater : store.Raters()) excluded += rater.counts ? 0 : 1;
+  return {{"study", info.name},
+          {"raters_per_clip", info.raters_per_clip},
+          {"progress", ProgressJson(store, clips, now_ms)},
+          {"raters_excluded", excluded},
+          {"all", ToJson(RatesOf(clips))},
+          {"rates", rates},
+          {"agreement", AgreementJson(clips, info.raters_per_clip)},
+          {"blinding", BlindingJson(store, by_id)},
+          {"raters", RatersJson(store, by_id, info.period_s)},
+          {"disputes", disputes},
+          {"leases", leases},
+          {"unplayable", unplayable},
+          {"clips", ClipsJson(clips)}};
+}
+
+}  // namespace evac

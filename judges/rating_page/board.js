@@ -1,0 +1,66 @@
+// What the lead sees. Numbers never without what they rest on.
+const percent = number => number.value === null ? '–' : `${(100 * number.value).toFixed(1)} %`;
+const decimal = number => number.value === null ? '–' : number.value.toFixed(3);
+const range = number => number.low === undefined ? '' : `[${number.low.toFixed(2)}, ${number.high.toFixed(2)}]`;
+
+async function board() {
+  const data = await patiently(() => get('/api/board'));
+  const {progress} = data;
+  const screen = show(make('.board', {},
+    make('header', {}, make('h1', {}, data.study), make('p.quiet', {}, `${progress.complete} of ${plural(progress.clips, 'clip')} have ${plural(data.raters_per_clip, 'vote')}; ${progress.votes} votes, ${progress.missing} missing` +
+      (progress.hours_left === null ? '' : `; ${progress.hours_left.toFixed(1)} h left at the pace of the last hour`) + (data.raters_excluded ? `; ${plural(data.raters_excluded, 'rater')} excluded` : ''))),
+    ...notices(data),
+    make('section.figures', {}, figure('Success', percent(data.all.majority), `majority of ${data.all.decided} decided clips`),
+      figure('If undecided', `${percent(data.all.low)} … ${percent(data.all.high)}`, `${data.all.undecided} not decided`),
+      figure('Alpha', decimal(data.agreement.alpha), `${range(data.agreement.alpha)} ${data.agreement.clips} clips with two votes`),
+      figure('Raw agreement', percent(data.agreement.agreement), `Fleiss kappa ${decimal(data.agreement.fleiss)}`),
+      figure('Disputes', String(data.disputes.length), 'wait for an adjudicator')),
+    make('section', {}, make('h2', {}, 'Raters'), ratersTable(data)),
+    make('section', {}, make('h2', {}, 'Rates'), ratesTable(data)),
+    make('section', {}, make('h2', {}, 'Clips'), matrix(data)),
+    data.leases.length ? make('section', {}, make('h2', {}, 'Being rated now'), make('p', {}, data.leases.map(lease => `${lease.rater}: clip ${lease.clip}, ${Math.ceil(lease.left_s / 60)} min`).join(' · '))) : null));
+  screen.className = 'wide-screen';
+  clearTimeout(board.timer);
+  board.timer = setTimeout(() => { if (document.visibilityState === 'visible' && $('.board')) board().catch(() => {}); }, 15000);
+}
+
+const figure = (name, value, under) => make('.figure', {}, make('span.quiet', {}, name), make('b', {}, value), make('small.quiet', {}, under));
+
+function notices(data) {
+  const lines = [];
+  for (const rater of data.raters) for (const concern of rater.concerns) lines.push(`${rater.rater}${rater.name ? ` (${rater.name})` : ''}: ${concern}.`);
+  for (const [world, index] of Object.entries(data.blinding))
+    if (index.is_seen_through) lines.push(`Raters see which clips are ${world}: blinding index ${index.index.value.toFixed(2)} of ${plural(index.guesses, 'guess', 'guesses')}. Read comparisons of real and generated clips with care.`);
+  if (data.all.far_apart) lines.push('Majority, soft, unanimous and Dawid–Skene rates differ by more than 3 points.');
+  for (const one of data.unplayable) lines.push(`${one.rater} could not play ${one.episode}: ${one.reason}.`);
+  return lines.map(line => make('p.notice', {}, line));
+}
+
+function table(heads, rows, label) {
+  return make('.scroll', {tabindex: '0', role: 'region', 'aria-label': label}, make('table', {}, make('thead', {}, make('tr', {}, heads.map(head => make('th', {scope: 'col'}, head)))),
+    make('tbody', {}, rows.map(cells => make('tr', {}, cells.map((cell, k) => k === 0 ? make('th', {scope: 'row'}, cell) : make('td', {}, cell)))))));
+}
+
+function ratersTable(data) {
+  return table(['Rater', 'Role', 'Status', 'Verdicts', 'Says success', 'Median', 'Known right', 'Same again'], data.raters.map(rater => [
+    rater.rater + (rater.name ? ` ${rater.name}` : ''), rater.role, rater.status + (rater.counts ? '' : ', not counted'), String(rater.verdicts), rater.verdicts ? `${(100 * rater.success_share).toFixed(0)} %` : '–',
+    rater.verdicts ? `${rater.median_rt_s.toFixed(1)} s` : '–', rater.gold_seen ? `${rater.gold_right} of ${rater.gold_seen}` : '–', rater.repeats_seen ? `${rater.repeats_same} of ${rater.repeats_seen}` : '–']), 'Raters');
+}
+
+function ratesTable(data) {
+  return table(['Task, world', 'Clips', 'Decided', 'Majority', 'Soft', 'Unanimous', 'Dawid–Skene', 'Bounds'], data.rates.map(rate => [
+    `${rate.task}, ${rate.world}`, String(rate.clips), String(rate.decided), percent(rate.majority), percent(rate.soft), percent(rate.unanimous), percent(rate.dawid_skene), `${percent(rate.low)} … ${percent(rate.high)}`]), 'Rates');
+}
+
+/** Clips by raters, a letter each; disputes first. */
+function matrix(data) {
+  const raters = data.raters.filter(rater => rater.role === 'rater' && rater.verdicts > 0).map(rater => rater.rater);
+  const letters = {success: 'S', failure: 'F', cannot_tell: 'U'}, disputed = new Set(data.disputes);
+  const clips = [...data.clips].sort((a, b) => disputed.has(b.clip) - disputed.has(a.clip));
+  const most = 400;
+  const rows = clips.slice(0, most).map(clip => make('tr' + (disputed.has(clip.clip) ? '.disputed' : ''), {}, make('th', {scope: 'row'}, clip.episode, clip.use === 'gold' ? make('small.quiet', {}, ' known') : null),
+    raters.map(rater => make('td.vote', {'data-vote': clip.votes[rater] || null}, letters[clip.votes[rater]] || '')),
+    make('td', {}, clip.label ? words[clip.label] : '–'), make('td.quiet', {}, clip.how)));
+  return make('.scroll', {tabindex: '0', role: 'region', 'aria-label': 'Clips and votes'}, make('table.matrix', {}, make('thead', {}, make('tr', {}, make('th', {scope: 'col'}, 'Episode'), raters.map(rater => make('th', {scope: 'col'}, rater)), make('th', {scope: 'col'}, 'Label'), make('th', {scope: 'col'}, 'How'))), make('tbody', {}, rows)),
+    clips.length > most ? make('p.quiet', {}, `${clips.length - most} more: evac rate status --json`) : null);
+}

@@ -1,0 +1,80 @@
+// Every key has one meaning; none has any while somebody writes. Two maps: keys for the left and for the right hand.
+const keyHelp = [
+  ['Space', 'play, pause'], ['J  L', 'one second back, on'], [',  .', 'one frame back, on'], ['Home  End', 'first, last frame'],
+  ['[  ]', 'slower, faster'], ['R', 'again from the start'], ['A', 'loop the last two seconds'],
+  ['S  F  U', 'success, failure, cannot tell'], ['1 … 5', 'stage reached'], ['Shift+1 … 5  V', 'one view alone, all views'],
+  ['X, then 1 … 6', 'flags'], ['N', 'note (Esc leaves it)'], ['Z', 'undo the last verdict'], ['H', 'what you said'], ['?', 'this help, and the task'],
+];
+/** The same for the right hand alone: keys beside each other, none used twice. */
+const rightHand = {K: 'S', ';': 'F', I: 'U', O: 'R', P: 'A'};
+let areFlagsOpen = false;
+
+function openHelp() {
+  rating.player?.video.pause();
+  const isRight = localStorage.getItem('evac-keys') === 'right';
+  const hand = make('input', {type: 'checkbox', id: 'hand'});
+  hand.checked = isRight;
+  hand.addEventListener('change', () => localStorage.setItem('evac-keys', hand.checked ? 'right' : 'left'));
+  const clip = rating.clip;
+  ask('Keys', [make('dl.keys', {}, keyHelp.map(([key, meaning]) => make('div', {}, make('dt', {}, key.split('  ').map(one => make('kbd', {}, one))), make('dd', {}, meaning)))),
+    make('label.check', {for: 'hand'}, hand, 'Keys for the right hand too: K success, ; failure, I cannot tell, O again, P loop'),
+    clip ? rubricCard(clip.rubric) : null].filter(Boolean), [['Close', null, 'primary']]);
+}
+
+function openFlags() {
+  areFlagsOpen = !areFlagsOpen;
+  const box = document.querySelector('details.more');
+  if (box) box.open = areFlagsOpen;
+  speak(areFlagsOpen ? 'flags: 1 to 6' : 'flags closed');
+}
+
+function openNote() {
+  const box = $('.noted');
+  box.open = true;
+  $('textarea', box).focus();
+}
+
+const acts = {
+  ' ': player => player.toggle(), J: player => player.seek(player.time - 1), L: player => player.seek(player.time + 1),
+  ',': player => player.step(-1), '.': player => player.step(1), Home: player => player.seek(0), End: player => player.seek(player.duration),
+  '[': player => player.faster(-1), ']': player => player.faster(1), R: player => player.replay(), A: player => player.loopEnd(),
+  V: player => player.isolate(-1), X: openFlags, N: openNote, H: openHistory,
+  S: () => decide('success'), F: () => decide('failure'), U: () => decide('cannot_tell'),
+};
+
+document.addEventListener('keydown', event => {
+  if (event.ctrlKey || event.metaKey || event.altKey || event.isComposing || $('#dialog').open) return;
+  const target = event.target;
+  if (target.matches('textarea, input[type=text]')) {
+    if (event.key === 'Escape') { target.blur(); event.preventDefault(); }
+    return;
+  }
+  if (!$('.rate')) return;
+  if (!onRateScreen(event)) return;
+  event.preventDefault();
+});
+
+/** @returns whether the key was ours. */
+function onRateScreen(event) {
+  const player = rating.player;
+  if (!player) return false;
+  const isButton = event.target.matches('button, summary') && (event.key === ' ' || event.key === 'Enter');
+  if (isButton) return false;
+  const digit = /^Digit([1-9])$/.exec(event.code);
+  if (digit) return onDigit(Number(digit[1]) - 1, event.shiftKey, player), true;
+  if (event.key === '?') return openHelp(), true;
+  if (event.key === 'Z' || event.key === 'z') return undo(), true;
+  let key = event.key.length === 1 ? event.key.toUpperCase() : event.key;
+  if (localStorage.getItem('evac-keys') === 'right' && rightHand[key]) key = rightHand[key];
+  const act = acts[key];
+  if (!act || (event.repeat && 'SFUXNHRA'.includes(key))) return false;
+  if (session.isOther) return true;
+  act(player);
+  return true;
+}
+
+function onDigit(k, isShifted, player) {
+  if (isShifted) return k < player.clip.views.length ? player.isolate(k) : undefined;
+  if (areFlagsOpen) return session.me.flags[k] && toggleFlag(session.me.flags[k]);
+  if (k < 5) toggleStage(k);
+}

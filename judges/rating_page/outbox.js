@@ -1,0 +1,91 @@
+// Verdicts wait on disk (IndexedDB) until the server has said that they are on its disk; order is kept.
+const outbox = {waiting: [], isSending: false, database: null, listeners: []};
+
+function openOutbox() {
+  return new Promise(resolve => {
+    if (!('indexedDB' in window)) return resolve(null);
+    const asked = indexedDB.open('evac-rating', 1);
+    asked.onupgradeneeded = () => asked.result.createObjectStore('outbox', {keyPath: 'at', autoIncrement: true});
+    asked.onsuccess = () => resolve(asked.result);
+    asked.onerror = () => resolve(null);  // private windows: memory alone
+  });
+}
+
+function inOutbox(mode, act) {
+  if (!outbox.database) return Promise.resolve(null);
+  return new Promise(resolve => {
+    const transaction = outbox.database.transaction('outbox', mode);
+    const asked = act(transaction.objectStore('outbox'));
+    transaction.oncomplete = () => resolve(asked.result);
+    transaction.onerror = transaction.onabort = () => resolve(null);
+  });
+}
+
+async function loadOutbox(rater) {
+  outbox.rater = rater;
+  outbox.database = await openOutbox();
+  const all = await inOutbox('readonly', store => store.getAll()) || [];
+  outbox.waiting = all.filter(entry => entry.rater === rater);
+  sayUnsent();
+}
+
+/** @returns a promise of the server's answer; it may take as long as the line is down. */
+async function send(path, body) {
+  const entry = {path, body, rater: outbox.rater};
+  entry.answered = new Promise((resolve, reject) => { entry.resolve = resolve; entry.reject = reject; });
+  entry.answered.catch(() => {});
+  const {resolve, reject, answered, ...plain} = entry;
+  const at = await inOutbox('readwrite', store => store.add(plain));
+  if (at !== null) entry.at = at;
+  outbox.waiting.push(entry);
+  sayUnsent();
+  flush();
+  return {answered: entry.answered};
+}
+
+async function flush() {
+  if (outbox.isSending || session.isOther) return;
+  outbox.isSending = true;
+  try {
+    while (outbox.waiting.length && !session.isOther) await sendFirst(outbox.waiting[0]);
+  } finally {
+    outbox.isSending = false;
+    sayUnsent();
+  }
+}
+
+async function sendFirst(entry) {
+  let answer = null, refusal = null;
+  try {
+    answer = await patiently(() => post(entry.path, {...entry.body, tab_epoch: session.epoch}));
+  } catch (error) {
+    if (!(error instanceof Refusal)) throw error;
+    if (error.error === 'tab') { losePlace(); return; }  // it stays: whoever takes over sends it
+    refusal = error;
+  }
+  outbox.waiting.shift();
+  if (entry.at !== undefined) await inOutbox('readwrite', store => store.delete(entry.at));
+  sayUnsent();
+  if (answer) { entry.resolve?.(answer); return; }
+  entry.reject?.(refusal);
+  if (refusal.error === 'answered') await offerReplace(entry, refusal.body.verdict);
+  else if (refusal.status === 401 || refusal.error === 'withdrawn') location.reload();
+  else toast(`Not stored: ${refusal.message}`, null, 10);
+}
+
+/** This clip has another verdict of ours: keep that one, or replace it. */
+async function offerReplace(entry, stored) {
+  if (stored.label === entry.body.label) return;
+  const choice = await ask('You rated this clip before',
+    [make('p', {}, `Stored: ${words[stored.label]}. Now: ${words[entry.body.label]}.`)],
+    [['Keep the stored one', false], ['Replace it', true, 'primary']]);
+  if (choice) await send(entry.path, {...entry.body, client_uuid: secret(), supersedes: stored.id});
+}
+
+function sayUnsent() {
+  const count = outbox.waiting.length, badge = $('#unsent');
+  if (!badge) return;
+  badge.hidden = count === 0;
+  badge.textContent = `${count} unsent`;
+}
+window.addEventListener('online', flush);

@@ -1,0 +1,262 @@
+#include "judges/rating_study.h"
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <set>
+
+#include "core/error.h"
+#include "core/file.h"
+#include "core/hash.h"
+#include "core/secret.h"
+#include "core/seed.h"
+#include "core/store.h"
+#include "judges/rating_clip.h"
+
+namespace evac {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// A clip that will be in the study, and what it is made from.
+struct Candidate {
+  StudyClip clip;
+  fs::path video;
+  Task task;
+};
+
+void Check(const StudyOptions& options) {
+  if (options.runs.empty()) throw InvalidInput("--run: wanted the folder of a run");
+  if (options.raters_per_clip < 1 || options.raters_per_clip > 50)
+    throw InvalidInput("--raters: found {}, wanted 1 … 50", options.raters_per_clip);
+  if (options.height_px < 64 || options.height_px > 1080)
+    throw InvalidInput("--height: found {}, wanted 64 … 1080", options.height_px);
+  if (options.states < 0) throw InvalidInput("--states: found {}, wanted 0 (all) or more", options.states);
+}
+
+StudyClip ClipOf(const Episode& episode, const fs::path& run, bool is_real, const std::string& rubric_hash) {
+  const PairKey& pair = episode.key.pair;
+  StudyClip clip;
+  clip.run = run.string();
+  clip.episode = episode.key.Id();
+  clip.task = pair.task;
+  clip.initial_state = pair.initial_state;
+  clip.policy = pair.policy;
+  clip.checkpoint = pair.checkpoint;
+  clip.world = episode.key.world;
+  clip.is_real = is_real;
+  clip.source_sha256 = episode.video_sha256;
+  clip.rubric_hash = rubric_hash;
+  return clip;
+}
+
+/// The states of each task that are drawn; empty: all.
+std::map<std::string, std::set<std::string>> DrawnStates(const std::vector<Episode>& episodes,
+                                                         const StudyOptions& options) {
+  std::map<std::string, std::set<std::string>> drawn;
+  if (options.states == 0) return drawn;
+  for (const Episode& episode : episodes) drawn[episode.key.pair.task].insert(episode.key.pair.initial_state);
+  for (auto& [task, all] : drawn) {
+    std::vector<std::string> states(all.begin(), all.end());
+    SplitMix64 draws(SeedFor(SeedFor(options.seed, "states"), task));
+    for (std::size_t i = states.size(); i > 1; --i) std::swap(states[i - 1], states[draws.Below(i)]);
+    states.resize(std::min(states.size(), static_cast<std::size_t>(options.states)));
+    all = {states.begin(), states.end()};
+  }
+  return drawn;
+}
+
+/// Reads the runs: what can be rated, what is known of it, which rubrics there are.
+class Collector {
+ public:
+  explicit Collector(const StudyOptions& options) : options_(options) {}
+
+  void Read(const fs::path& run) {
+    const Store store = Store::Open(run, Store::Mode::kReadOnly);
+    std::map<std::string, Task> tasks;
+    for (const Task& task : store.Tasks()) tasks[task.id] = task;
+    for (const WorldInfo& world : store.Worlds()) is_real_[world.name] = world.is_real;
+    const std::vector<Episode> episodes = store.Episodes();
+    const auto drawn = DrawnStates(episodes, options_);
+    const auto verdicts = store.CurrentVerdicts();
+    int without_video = 0, failed = 0;
+    for (const Episode& episode : episodes) {
+      const PairKey& pair = episode.key.pair;
+      if (!drawn.empty() && !drawn.at(pair.task).contains(pair.initial_state)) continue;
+      if (IsFailure(episode.stop))
+        ++failed;
+      else if (episode.video.empty())
+        ++without_video;
+      else
+        Add(episode, run, tasks.at(pair.task), verdicts);
+    }
+    if (failed > 0)
+      left_out.push_back(fmt::format("{}: {} failed episodes: there is nothing to rate", run.string(), failed));
+    if (without_video > 0)
+      left_out.push_back(fmt::format("{}: {} episodes without a video", run.string(), without_video));
+  }
+
+  std::vector<Candidate> candidates;
+  std::map<std::string, StudyRubric> rubrics;
+  std::vector<std::string> left_out;
+
+ private:
+  void Add(const Episode& episode, const fs::path& run, const Task& task,
+           const std::map<std::string, std::map<std::string, Verdict>>& verdicts) {
+    const StudyRubric rubric = RubricOf(task);
+    rubrics[rubric.hash] = rubric;
+    Candidate candidate{ClipOf(episode, run, is_real_[episode.key.world], rubric.hash), run / episode.video, task};
+    const auto of_episode = verdicts.find(episode.key.Id());
+    if (!options_.gold_from.empty() && of_episode != verdicts.end()) {
+      const auto known = of_episode->second.find(options_.gold_from);
+      if (known != of_episode->second.end() &&
+          (known->second.label == Label::kSuccess || known->second.label == Label::kFailure)) {
+        candidate.clip.reference = known->second.label;
+        candidate.clip.reference_reason = known->second.reason;
+      }
+    }
+    candidates.push_back(std::move(candidate));
+  }
+
+  const StudyOptions& options_;
+  std::map<std::string, bool> is_real_;
+};
+
+/// How many clips are taken for what, in this order: never more than a quarter of all for one use.
+std::vector<std::pair<Showing, int>> KnownUses(std::size_t count, const StudyOptions& options) {
+  const int quarter = static_cast<int>(count) / 4;
+  const int gold =
+      std::max(options.min_gold, static_cast<int>(std::lround(options.gold_share * static_cast<double>(count))));
+  return {{Showing::kExample, std::min(options.examples, quarter)},
+          {Showing::kPractice, std::min(options.practice, quarter)},
+          {Showing::kGold, std::min(gold, quarter)}};
+}
+
+/// Takes clips whose label is known for examples, practice and gold, by turns a success and a failure.
+void ChooseKnown(std::vector<Candidate>& candidates, const StudyOptions& options) {
+  std::vector<std::size_t> order(candidates.size());
+  for (std::size_t i = 0; i < order.size(); ++i) order[i] = i;
+  SplitMix64 draws(SeedFor(options.seed, "gold"));
+  for (std::size_t i = order.size(); i > 1; --i) std::swap(order[i - 1], order[draws.Below(i)]);
+  const auto take = [&](Label wanted, Showing use) {
+    const auto next = std::ranges::find_if(order, [&](std::size_t i) {
+      return candidates[i].clip.use == Showing::kCounted && candidates[i].clip.reference == wanted;
+    });
+    if (next == order.end()) return false;
+    candidates[*next].clip.use = use;
+    return true;
+  };
+  for (const auto& [use, count] : KnownUses(candidates.size(), options)) {
+    for (int k = 0; k < count; ++k) {
+      const Label wanted = k % 2 == 0 ? Label::kSuccess : Label::kFailure;
+      const Label other = k % 2 == 0 ? Label::kFailure : Label::kSuccess;
+      if (!take(wanted, use)) take(other, use);
+    }
+  }
+  for (Candidate& candidate : candidates) {
+    if (candidate.clip.use != Showing::kCounted) continue;
+    candidate.clip.reference = std::nullopt;
+    candidate.clip.reference_reason.clear();
+  }
+}
+
+struct Encoded {
+  std::vector<StudyClip> clips;
+  std::uintmax_t longest = 0;
+};
+
+Encoded EncodeAll(std::vector<Candidate>& candidates, const StudyInfo& info, int height_px, const fs::path& folder,
+                  const std::function<void(std::size_t, std::size_t)>& progress) {
+  MakeFolders(folder / "clips");
+  Encoded encoded;
+  const ClipFormat format{info.width_px, info.height_px, info.period_s};
+  for (Candidate& candidate : candidates) {
+    const ClipLayout layout = LayoutOf(candidate.task.cameras, height_px);
+    StudyClip clip = candidate.clip;
+    clip.file = "clips/" + NewSecret() + ".mp4";
+    clip.views = ViewsJson(layout, info.width_px, info.height_px);
+    clip.frames = EncodeClip(candidate.video, candidate.task, layout, format, folder / clip.file);
+    encoded.longest = std::max(encoded.longest, fs::file_size(folder / clip.file));
+    encoded.clips.push_back(std::move(clip));
+    progress(encoded.clips.size(), candidates.size());
+  }
+  return encoded;
+}
+
+StudyInfo InfoFor(const std::vector<Candidate>& candidates, const StudyOptions& options, const fs::path& folder) {
+  StudyInfo info;
+  info.name = options.name.empty() ? fs::absolute(folder).lexically_normal().filename().string() : options.name;
+  if (info.name.empty()) info.name = "study";
+  info.seed = options.seed;
+  info.raters_per_clip = options.raters_per_clip;
+  info.evac_version = options.evac_version;
+  info.period_s = 1;
+  for (const Candidate& candidate : candidates) {
+    const ClipLayout layout = LayoutOf(candidate.task.cameras, options.height_px);
+    info.width_px = std::max(info.width_px, layout.width_px);
+    info.height_px = std::max(info.height_px, layout.height_px);
+    info.period_s = std::min(info.period_s, candidate.task.period_s);
+  }
+  return info;
+}
+
+void LeaveOutWhatIsThere(std::vector<Candidate>& candidates, const StudyStore& store) {
+  std::set<std::string> there;
+  for (const StudyClip& clip : store.Clips()) there.insert(clip.run + "\n" + clip.episode);
+  std::erase_if(candidates, [&](const Candidate& c) { return there.contains(c.clip.run + "\n" + c.clip.episode); });
+}
+
+}  // namespace
+
+StudyRubric RubricOf(const Task& task) {
+  nlohmann::ordered_json stages = nlohmann::ordered_json::array();
+  for (const Stage& stage : task.rubric.stages)
+    stages.push_back({{"name", stage.name}, {"description", stage.description}});
+  const nlohmann::ordered_json document = {{"instruction", task.instruction},
+                                           {"success", task.rubric.success},
+                                           {"version", task.rubric.version},
+                                           {"stages", stages}};
+  const std::string text = document.dump();
+  return {Sha256Hex(task.id + "\n" + text), task.id, text};
+}
+
+StudyMade MakeStudy(const fs::path& folder, const StudyOptions& options,
+                    const std::function<void(std::size_t, std::size_t)>& progress) {
+  Check(options);
+  Collector collector(options);
+  for (const fs::path& run : options.runs) collector.Read(fs::absolute(run).lexically_normal());
+  std::vector<Candidate>& candidates = collector.candidates;
+  if (candidates.empty()) throw InvalidInput("{}: no episode with a video to rate", options.runs.front().string());
+  if (!options.gold_from.empty()) ChooseKnown(candidates, options);
+
+  const bool is_new = !fs::exists(folder / "study.sqlite");
+  std::optional<StudyStore> store;
+  if (!is_new) {
+    store = StudyStore::Open(folder, StudyStore::Mode::kReadWrite);
+    LeaveOutWhatIsThere(candidates, *store);
+    if (candidates.empty()) throw InvalidInput("{}: every clip of these runs is in it already", folder.string());
+  }
+  const StudyInfo info = is_new ? InfoFor(candidates, options, folder) : store->info();
+  Encoded encoded = EncodeAll(candidates, info, std::min(options.height_px, info.height_px), folder, progress);
+  constexpr std::uintmax_t kRound = 1 << 16;  // of one wave all are of one length, of several nearly
+  const std::uintmax_t bytes = (encoded.longest + 8 + kRound - 1) / kRound * kRound;
+  StudyMade made;
+  for (StudyClip& clip : encoded.clips) {
+    PadClip(folder / clip.file, bytes);
+    clip.video_sha256 = Sha256HexOfFile(folder / clip.file);
+    ++(clip.use == Showing::kGold       ? made.gold
+       : clip.use == Showing::kPractice ? made.practice
+       : clip.use == Showing::kExample  ? made.examples
+                                        : made.clips);
+  }
+  std::vector<StudyRubric> rubrics;
+  for (const auto& [hash, rubric] : collector.rubrics) rubrics.push_back(rubric);
+  if (is_new) store = StudyStore::Create(folder, info);
+  made.list_hash = store->AddWave(encoded.clips, rubrics);
+  made.left_out = collector.left_out;
+  return made;
+}
+
+}  // namespace evac

@@ -1,0 +1,45 @@
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "core/store_study.h"
+
+namespace evac {
+
+struct StudyOptions {
+  std::vector<std::filesystem::path> runs = {};
+  std::string name = {};  ///< empty: the folder's
+  std::uint64_t seed = 1;
+  int raters_per_clip = 3;
+  int height_px = 512;  ///< of the first view, 64 … 1080
+  int states = 0;       ///< so many initial states per task, drawn by the seed, with all their clips; 0: all
+  std::string gold_from =
+      {};                    ///< a judge of the runs whose verdicts are known to be right; empty: no gold, no practice
+  int examples = 4;          ///< clips shown with their label before the session, if there is gold; rated by nobody
+  int practice = 8;          ///< clips with feedback, if there is gold; their answers count nowhere
+  double gold_share = 0.06;  ///< of the clips, at least `min_gold`, at most a quarter
+  int min_gold = 12;
+  std::string evac_version = {};
+};
+
+struct StudyMade {
+  int clips = 0, gold = 0, practice = 0, examples = 0;
+  std::string list_hash;
+  std::vector<std::string> left_out;  ///< why episodes are not in it, a sentence each
+};
+
+/// Freezes the episodes of runs that have a video into a study: encodes every clip anew (rating_clip.h), gives it a
+/// name that says nothing, and writes the list. A study that is there gets another wave with what it does not hold yet.
+/// @param progress  called after every clip with how many are done, of how many.
+/// @throws InvalidInput if a run is not there, no episode has a video, or an option is out of range.
+StudyMade MakeStudy(const std::filesystem::path& folder, const StudyOptions& options,
+                    const std::function<void(std::size_t, std::size_t)>& progress);
+
+/// What raters are told of a task, as it is stored and hashed.
+StudyRubric RubricOf(const Task& task);
+
+}  // namespace evac

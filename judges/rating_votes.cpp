@@ -1,0 +1,272 @@
+#include "judges/rating_votes.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <set>
+
+#include "core/seed.h"
+#include "core/statistics/bootstrap.h"
+#include "core/statistics/dawid_skene.h"
+#include "core/statistics/rater_agreement.h"
+
+namespace evac {
+namespace {
+
+Vote VoteOf(const std::string& label) {
+  return label == "success" ? Vote::kSuccess : label == "failure" ? Vote::kFailure : Vote::kUnsure;
+}
+
+std::vector<Vote> VotesOf(const RatedClip& clip) {
+  std::vector<Vote> votes;
+  for (const auto& [rater, ballot] : clip.by_rater) votes.push_back(VoteOf(ballot.label));
+  return votes;
+}
+
+double CategoryOf(const std::string& label) { return label == "success" ? 1 : label == "failure" ? 0 : 2; }
+
+using Ratings = std::vector<std::vector<std::optional<double>>>;
+
+Ratings RatingsOf(const std::vector<RatedClip>& clips) {
+  std::set<std::int64_t> raters;
+  for (const RatedClip& clip : clips) {
+    for (const auto& [rater, ballot] : clip.by_rater) raters.insert(rater);
+  }
+  Ratings ratings;
+  for (const std::int64_t rater : raters) {
+    auto& row = ratings.emplace_back(clips.size());
+    for (std::size_t i = 0; i < clips.size(); ++i) {
+      const auto ballot = clips[i].by_rater.find(rater);
+      if (ballot != clips[i].by_rater.end()) row[i] = CategoryOf(ballot->second.label);
+    }
+  }
+  return ratings;
+}
+
+Number DawidSkeneRate(const std::vector<RatedClip>& clips) {
+  const Ratings ratings = RatingsOf(clips);
+  if (ratings.empty()) return Undefined{"no votes"};
+  RaterCounts counts;
+  for (const auto& row : ratings) {
+    Eigen::MatrixXd of_rater = Eigen::MatrixXd::Zero(static_cast<Eigen::Index>(clips.size()), 2);
+    for (std::size_t i = 0; i < row.size(); ++i) {
+      if (row[i] && *row[i] < 2) of_rater(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(*row[i])) = 1;
+    }
+    counts.of_rater.push_back(std::move(of_rater));
+  }
+  const DawidSkene fit = FitDawidSkene(counts, {.smoothing = 0.5, .max_iterations = 200, .tolerance = 1e-8});
+  double rate = 0;
+  std::int64_t with_votes = 0;
+  for (std::size_t i = 0; i < clips.size(); ++i) {
+    if (clips[i].resolution.majority.valid == 0) continue;
+    rate += fit.posterior(static_cast<Eigen::Index>(i), 1);
+    ++with_votes;
+  }
+  return with_votes == 0 ? Number(Undefined{"no votes"}) : Number(rate / static_cast<double>(with_votes));
+}
+
+Number Share(std::int64_t part, std::int64_t whole, const char* reason) {
+  if (whole == 0) return Undefined{reason};
+  return static_cast<double>(part) / static_cast<double>(whole);
+}
+
+/// Alpha needs sums of pairs alone: counted by clip once, resampled quickly.
+struct Pairs {
+  std::array<double, 3> n{};        // ratings of each category, in clips with two or more
+  double different = 0, total = 0;  // weighted pairs that differ within clips; ratings
+};
+
+Pairs PairsOf(const RatedClip& clip) {
+  Pairs pairs;
+  for (const auto& [rater, ballot] : clip.by_rater) pairs.n[static_cast<std::size_t>(CategoryOf(ballot.label))] += 1;
+  const double m = pairs.n[0] + pairs.n[1] + pairs.n[2];
+  if (m < 2) return {};
+  pairs.total = m;
+  for (const double n : pairs.n) pairs.different += n * (m - n) / (m - 1);
+  return pairs;
+}
+
+std::optional<double> AlphaOf(const Pairs& sum) {
+  double expected = 0;
+  for (const double n : sum.n) expected += n * (sum.total - n);
+  if (sum.total < 2 || expected == 0) return std::nullopt;
+  return 1 - sum.different * (sum.total - 1) / expected;
+}
+
+Defined<Interval> AlphaInterval(const std::vector<RatedClip>& clips, double alpha, int replicates) {
+  std::vector<Pairs> pairs;
+  for (const RatedClip& clip : clips) {
+    if (clip.by_rater.size() > 1) pairs.push_back(PairsOf(clip));
+  }
+  if (pairs.size() < 2 || replicates == 0) return Undefined{"too few clips"};
+  SplitMix64 draws(0);
+  Resampled resampled{alpha, {}, {}};
+  for (int b = 0; b < replicates; ++b) {
+    Pairs sum;
+    for (std::size_t i = 0; i < pairs.size(); ++i) {
+      const Pairs& drawn = pairs[draws.Below(pairs.size())];
+      for (std::size_t c = 0; c < 3; ++c) sum.n[c] += drawn.n[c];
+      sum.different += drawn.different;
+      sum.total += drawn.total;
+    }
+    if (const auto drawn_alpha = AlphaOf(sum)) resampled.replicates.push_back(*drawn_alpha);
+  }
+  return IntervalsOf(resampled).percentile;
+}
+
+double Median(std::vector<double> values) {
+  if (values.empty()) return 0;
+  std::ranges::sort(values);
+  return Quantile(values, 0.5);
+}
+
+/// rating.md 1.5: a verdict that came before anybody could have seen the clip.
+bool IsTooFast(const StudyStore::Ballot& ballot, const StudyClip& clip, double period_s) {
+  if (ballot.showing == Showing::kImport) return false;
+  const double clip_ms = 1e3 * clip.frames * period_s / std::max(1.0, ballot.max_speed);
+  return ballot.rt_ms < std::max(1200.0, 0.25 * clip_ms);
+}
+
+}  // namespace
+
+Resolution Resolve(const std::vector<Vote>& votes, const std::optional<std::string>& adjudicated,
+                   std::int64_t wanted_valid) {
+  Resolution resolution;
+  resolution.majority = MajorityOf(votes);
+  if (adjudicated) {
+    resolution.how = "adjudicated";
+    if (*adjudicated == "success") resolution.label = Label::kSuccess;
+    if (*adjudicated == "failure") resolution.label = Label::kFailure;
+    return resolution;
+  }
+  if (votes.empty()) {
+    resolution.how = "not rated";
+  } else if (resolution.majority.valid < wanted_valid) {
+    resolution.how = "too few votes";
+  } else if (!resolution.majority.success) {
+    resolution.how = "tie";
+  } else {
+    resolution.how = "majority";
+    resolution.label = *resolution.majority.success ? Label::kSuccess : Label::kFailure;
+  }
+  return resolution;
+}
+
+std::vector<RatedClip> RatedClips(const StudyStore& store) {
+  const std::int64_t wanted_valid = std::min(2, store.info().raters_per_clip);
+  std::vector<RatedClip> clips;
+  std::map<std::int64_t, std::size_t> index;
+  for (StudyClip& clip : store.Clips()) {
+    if (clip.use == Showing::kPractice || clip.use == Showing::kExample) continue;
+    index[clip.id] = clips.size();
+    clips.push_back({.clip = std::move(clip)});
+  }
+  for (StudyStore::Ballot& ballot : store.Ballots()) {
+    const auto found = index.find(ballot.clip);
+    if (found == index.end() || ballot.showing == Showing::kRepeat || ballot.showing == Showing::kPractice) continue;
+    RatedClip& clip = clips[found->second];
+    if (ballot.showing != Showing::kAdjudication)
+      clip.by_rater[ballot.rater] = ballot;
+    else if (ballot.is_final)
+      clip.adjudicated = ballot.label;
+  }
+  for (RatedClip& clip : clips) clip.resolution = Resolve(VotesOf(clip), clip.adjudicated, wanted_valid);
+  return clips;
+}
+
+LabelRates RatesOf(const std::vector<RatedClip>& clips) {
+  LabelRates rates;
+  std::int64_t successes = 0, unanimous = 0, unanimous_successes = 0, with_votes = 0;
+  double soft = 0;
+  for (const RatedClip& clip : clips) {
+    const Majority& majority = clip.resolution.majority;
+    ++rates.clips;
+    if (clip.resolution.label) ++rates.decided;
+    if (clip.resolution.label == Label::kSuccess) ++successes;
+    if (majority.valid == 0) continue;
+    soft += *majority.soft;
+    ++with_votes;
+    if (majority.split || majority.unsure > 0) continue;
+    ++unanimous;
+    if (majority.successes > 0) ++unanimous_successes;
+  }
+  rates.undecided = rates.clips - rates.decided;
+  rates.majority = Share(successes, rates.decided, "no clip is decided");
+  rates.unanimous = Share(unanimous_successes, unanimous, "no clip is unanimous");
+  if (with_votes > 0) rates.soft = soft / static_cast<double>(with_votes);
+  rates.dawid_skene = DawidSkeneRate(clips);
+  rates.low = Share(successes, rates.clips, "no clips");
+  rates.high = Share(successes + rates.undecided, rates.clips, "no clips");
+  double least = 1, most = 0;
+  for (const Number& rate : {rates.majority, rates.soft, rates.unanimous, rates.dawid_skene}) {
+    if (rate) least = std::min(least, *rate), most = std::max(most, *rate);
+  }
+  rates.far_apart = most - least > 0.03;
+  return rates;
+}
+
+RatingAgreement RatersAgreement(const std::vector<RatedClip>& clips, int raters_per_clip, int replicates) {
+  RatingAgreement result;
+  std::vector<std::vector<std::int64_t>> counts;
+  double agreeing = 0, pairs = 0;
+  for (const RatedClip& clip : clips) {
+    if (clip.by_rater.size() < 2) continue;
+    ++result.clips;
+    std::vector<std::int64_t> of_clip(3);
+    for (const auto& [rater, ballot] : clip.by_rater) ++of_clip[static_cast<std::size_t>(CategoryOf(ballot.label))];
+    const auto m = static_cast<double>(clip.by_rater.size());
+    for (const std::int64_t n : of_clip) agreeing += static_cast<double>(n * (n - 1)) / 2;
+    pairs += m * (m - 1) / 2;
+    if (static_cast<int>(clip.by_rater.size()) == raters_per_clip) counts.push_back(std::move(of_clip));
+  }
+  if (result.clips == 0) return result;
+  result.alpha = KrippendorffAlpha(RatingsOf(clips), RatingMetric::kNominal);
+  if (result.alpha) result.interval = AlphaInterval(clips, *result.alpha, replicates);
+  result.agreement = agreeing / pairs;
+  if (!counts.empty()) result.fleiss = FleissKappaOf(counts).kappa;
+  return result;
+}
+
+RaterQuality QualityOfRater(const std::vector<StudyStore::Ballot>& ballots,
+                            const std::map<std::int64_t, StudyClip>& clips, double period_s) {
+  RaterQuality quality;
+  std::int64_t successes = 0, too_fast = 0;
+  std::set<std::string> labels;
+  std::map<std::int64_t, std::string> first;
+  std::vector<double> rt_ms;
+  for (const StudyStore::Ballot& ballot : ballots) {
+    const StudyClip& clip = clips.at(ballot.clip);
+    if (ballot.showing == Showing::kPractice) continue;
+    if (ballot.showing == Showing::kRepeat) {
+      ++quality.repeats_seen;
+      const auto before = first.find(ballot.clip);
+      if (before != first.end() && before->second == ballot.label) ++quality.repeats_same;
+    } else {
+      first[ballot.clip] = ballot.label;
+    }
+    if (ballot.showing == Showing::kGold && clip.reference) {
+      ++quality.gold_seen;
+      if (ballot.label == Name(*clip.reference)) ++quality.gold_right;
+    }
+    ++quality.verdicts;
+    labels.insert(ballot.label);
+    if (ballot.label == "success") ++successes;
+    if (IsTooFast(ballot, clip, period_s)) ++too_fast;
+    rt_ms.push_back(ballot.rt_ms);
+  }
+  if (quality.verdicts == 0) return quality;
+  quality.success_share = static_cast<double>(successes) / static_cast<double>(quality.verdicts);
+  quality.median_rt_ms = Median(std::move(rt_ms));
+  if (too_fast * 20 >= quality.verdicts)
+    quality.concerns.push_back(
+        fmt::format("{} of {} verdicts came too fast to have seen the clip", too_fast, quality.verdicts));
+  if (quality.verdicts >= 30 && labels.size() == 1)
+    quality.concerns.push_back(fmt::format("all {} verdicts are {}", quality.verdicts, *labels.begin()));
+  if (quality.gold_seen >= 12 && quality.gold_right * 12 < quality.gold_seen * 10)
+    quality.concerns.push_back(fmt::format("{} of {} known clips right", quality.gold_right, quality.gold_seen));
+  return quality;
+}
+
+}  // namespace evac

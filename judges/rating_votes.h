@@ -1,0 +1,71 @@
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "core/statistics/votes.h"
+#include "core/store_study.h"
+
+/// From votes to labels (rating.md 1.6).
+namespace evac {
+
+/// What became of one clip.
+struct Resolution {
+  std::optional<Label> label;  ///< success or failure; nothing: it is not decided
+  std::string how;             ///< adjudicated, majority; undecided: tie, too few votes, not rated
+  Majority majority{};
+};
+
+/// @param adjudicated  an adjudicator's final word: success, failure or cannot_tell ("it cannot be told": not decided).
+/// Otherwise the strict majority of successes and failures, of at least `wanted_valid` of them.
+Resolution Resolve(const std::vector<Vote>& votes, const std::optional<std::string>& adjudicated,
+                   std::int64_t wanted_valid);
+
+struct RatedClip {
+  StudyClip clip{};
+  std::map<std::int64_t, StudyStore::Ballot> by_rater{};  ///< votes that count
+  std::optional<std::string> adjudicated{};
+  Resolution resolution{};
+};
+
+/// Every clip of the study but practice, in its order, with its votes.
+std::vector<RatedClip> RatedClips(const StudyStore& store);
+
+/// The rates of some clips side by side; where they are far apart, a majority hides something.
+struct LabelRates {
+  std::int64_t clips = 0, decided = 0, undecided = 0;
+  Number majority = Undefined{"no clip is decided"};                 ///< of the decided ones
+  Number soft = Undefined{"no votes"};                               ///< mean share of success votes
+  Number unanimous = Undefined{"no clip is unanimous"};              ///< of those where all agree
+  Number dawid_skene = Undefined{"no votes"};                        ///< smoothing .5
+  Number low = Undefined{"no clips"}, high = Undefined{"no clips"};  ///< if all undecided were failures, successes
+  bool far_apart = false;                                            ///< the first four differ by more than 3 points
+};
+LabelRates RatesOf(const std::vector<RatedClip>& clips);
+
+struct RatingAgreement {
+  Number alpha = Undefined{"no votes"};                ///< Krippendorff's, nominal, of success, failure and cannot tell
+  Defined<Interval> interval = Undefined{"no votes"};  ///< of alpha, percentile bootstrap over clips
+  Number fleiss = Undefined{"no votes"};               ///< of the clips that all have `raters_per_clip` votes
+  Number agreement = Undefined{"no votes"};            ///< share of agreeing pairs of votes
+  std::int64_t clips = 0;                              ///< with two votes or more
+};
+/// @param replicates  of the bootstrap; 0: no interval.
+RatingAgreement RatersAgreement(const std::vector<RatedClip>& clips, int raters_per_clip, int replicates = 200);
+
+/// What the lead should look at; nothing is ever dropped by itself.
+struct RaterQuality {
+  std::int64_t verdicts = 0;
+  double success_share = 0, median_rt_ms = 0;
+  std::int64_t gold_right = 0, gold_seen = 0;
+  std::int64_t repeats_same = 0, repeats_seen = 0;
+  std::vector<std::string> concerns{};  ///< sentences
+};
+/// @param ballots  of one rater. @param period_s  of a frame.
+RaterQuality QualityOfRater(const std::vector<StudyStore::Ballot>& ballots,
+                            const std::map<std::int64_t, StudyClip>& clips, double period_s);
+
+}  // namespace evac

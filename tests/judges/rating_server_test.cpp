@@ -1,0 +1,279 @@
+#include "judges/rating_server.h"
+
+#include <arpa/inet.h>
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <netinet/in.h>
+#include <sys/socket.h>
+#include <unistd.h>
+
+#include <nlohmann/json.hpp>
+#include <thread>
+
+#include "core/error.h"
+#include "tests/judges/rating_support.h"
+
+namespace evac {
+namespace {
+
+using nlohmann::json;
+using testing::HasSubstr;
+using testing::Not;
+using testing::StartsWith;
+
+struct Heard {
+  int status = 0;
+  std::string head, body;
+  json Json() const { return json::parse(body); }
+};
+
+/// Exactly these bytes, and all that comes back until the other end closes.
+std::string Exchanged(int port, const std::string& bytes) {
+  const int socket = ::socket(AF_INET, SOCK_STREAM, 0);
+  sockaddr_in address{};
+  address.sin_family = AF_INET;
+  address.sin_port = htons(static_cast<std::uint16_t>(port));
+  inet_pton(AF_INET, "127.0.0.1", &address.sin_addr);
+  if (::connect(socket, reinterpret_cast<sockaddr*>(&address), sizeof address) != 0) return close(socket), "";
+  ::send(socket, bytes.data(), bytes.size(), MSG_NOSIGNAL);
+  std::string heard;
+  char piece[65536];
+  for (ssize_t count; (count = ::recv(socket, piece, sizeof piece, 0)) > 0;)
+    heard.append(piece, static_cast<std::size_t>(count));
+  close(socket);
+  return heard;
+}
+
+Heard Split(const std::string& answer) {
+  Heard heard;
+  const std::size_t end = answer.find("\r\n\r\n");
+  heard.head = answer.substr(0, end);
+  if (end != std::string::npos) heard.body = answer.substr(end + 4);
+  if (heard.head.size() > 12) heard.status = std::atoi(heard.head.c_str() + 9);
+  return heard;
+}
+
+/// A server at work over a small study, and what browsers and others say to it.
+class RatingServerTest : public testing::Test {
+ protected:
+  RatingServerTest() : server(OptionsFor(study.folder())), thread([this] { server.Serve(); }) {}
+  ~RatingServerTest() override {
+    server.Stop();
+    thread.join();
+  }
+  static RatingServerOptions OptionsFor(const std::filesystem::path& folder) {
+    RatingServerOptions options;
+    options.study = folder;
+    options.limits.request_s = 1;
+    return options;
+  }
+
+  Heard Raw(const std::string& bytes) const { return Split(Exchanged(server.port(), bytes)); }
+  Heard Get(const std::string& path, const std::string& headers = "") const {
+    return Raw("GET " + path + " HTTP/1.1\r\nHost: 127.0.0.1\r\nConnection: close\r\n" + headers + "\r\n");
+  }
+  Heard Post(const std::string& path, const std::string& body, const std::string& headers) const {
+    return Raw(
+        "POST " + path +
+        " HTTP/1.1\r\nHost: 127.0.0.1\r\nConnection: close\r\nContent-Type: application/json\r\nContent-Length: " +
+        std::to_string(body.size()) + "\r\n" + headers + "\r\n" + body);
+  }
+
+  /// Comes in by a link. @returns the headers of every later request.
+  std::string Join(RaterRole role = RaterRole::kRater) {
+    const std::string link = NewSecret();
+    StudyStore store = study.Open();
+    store.AddInvite(link, role, 1);
+    const Heard heard =
+        Post("/api/join", json{{"invite", link}, {"uuid", NewSecret()}, {"name", "<b>Ann</b>"}}.dump(), "");
+    EXPECT_EQ(heard.status, 200) << heard.body;
+    const std::size_t at = heard.head.find("evac_rating=");
+    const std::string session = heard.head.substr(at + 12, 32);
+    cookies.push_back(heard.head.substr(heard.head.find("Set-Cookie")));
+    return "Cookie: evac_rating=" + session + "\r\nX-Evac-Csrf: " + CsrfOf(session) + "\r\n";
+  }
+  std::int64_t Epoch(const std::string& who) { return Post("/api/tab", "{}", who).Json().at("tab_epoch"); }
+  json Next(const std::string& who, std::int64_t epoch) {
+    return Post("/api/next", json{{"tab_epoch", epoch}}.dump(), who).Json();
+  }
+  static json Verdict(const std::string& clip, std::int64_t epoch) {
+    return {{"client_uuid", NewSecret()}, {"presentation", clip}, {"tab_epoch", epoch},
+            {"label", "success"},         {"coverage", 1},        {"rt_ms", 5000}};
+  }
+
+  SmallStudy study{6};
+  RatingServer server;
+  std::thread thread;
+  std::vector<std::string> cookies;
+};
+
+TEST_F(RatingServerTest, AVerdictThatIsAnswered200IsInTheFile) {
+  const std::string ann = Join();
+  const std::int64_t epoch = Epoch(ann);
+  const std::string clip = Next(ann, epoch).at("presentation");
+  const Heard said = Post("/api/verdict", Verdict(clip, epoch).dump(), ann);
+  ASSERT_EQ(said.status, 200) << said.body;
+  const StudyStore beside = StudyStore::Open(study.folder(), StudyStore::Mode::kReadOnly);
+  EXPECT_EQ(beside.CurrentVerdict(clip)->label, "success");
+}
+
+TEST_F(RatingServerTest, ManyAtOnceLoseNothingAndDoubleNothing) {
+  constexpr int kRaters = 12, kEach = 8;
+  std::vector<std::string> who;
+  for (int i = 0; i < kRaters; ++i) who.push_back(Join());
+  std::vector<std::thread> raters;
+  std::atomic<int> stored = 0;
+  for (const std::string& one : who) {
+    raters.emplace_back([&, one] {
+      const std::int64_t epoch = Epoch(one);
+      for (int k = 0; k < kEach; ++k) {
+        const json next = Next(one, epoch);
+        if (next.contains("done")) break;
+        const std::string body = Verdict(next.at("presentation"), epoch).dump();
+        const Heard first = Post("/api/verdict", body, one), second = Post("/api/verdict", body, one);
+        EXPECT_EQ(first.status, 200);
+        EXPECT_EQ(first.Json().at("verdict"), second.Json().at("verdict"));
+        ++stored;
+      }
+    });
+  }
+  for (std::thread& rater : raters) rater.join();
+  EXPECT_EQ(static_cast<int>(study.Open().VerdictTable().rows.size()), stored.load());
+  EXPECT_GE(stored, 36) << "twelve clips, three votes each";
+}
+
+TEST_F(RatingServerTest, WithoutAnInvitationThereIsAPageAndNothingElse) {
+  EXPECT_EQ(Get("/").status, 200);
+  EXPECT_EQ(Get("/r/" + NewSecret()).status, 200) << "the page; what the link is worth says only joining";
+  EXPECT_EQ(Get("/rating.js").status, 200);
+  for (const char* path : {"/api/me", "/api/mine", "/api/history", "/api/board", "/api/examples", "/api/guesses"})
+    EXPECT_EQ(Get(path).status, 401) << path;
+  EXPECT_EQ(Post("/api/next", "{}", "").status, 401);
+  EXPECT_EQ(Post("/api/join", json{{"invite", NewSecret()}, {"uuid", NewSecret()}}.dump(), "").status, 404);
+  const std::string ann = Join();
+  EXPECT_THAT(cookies.back(), HasSubstr("HttpOnly; SameSite=Lax"));
+  EXPECT_EQ(Get("/api/board", ann).status, 403) << "a rater sees no board";
+  const std::string lead = Join(RaterRole::kLead);
+  EXPECT_EQ(Get("/api/board", lead).status, 200);
+  EXPECT_EQ(Post("/api/next", "{\"tab_epoch\":0}", lead).status, 403);
+}
+
+TEST_F(RatingServerTest, ClipsAreForWhomTheyWereShownTo) {
+  const std::string ann = Join(), bob = Join();
+  const std::string clip = Next(ann, Epoch(ann)).at("presentation");
+  const Heard whole = Get("/clip/" + clip, ann);
+  EXPECT_EQ(whole.status, 200);
+  EXPECT_EQ(whole.body.substr(4, 4), "ftyp");
+  EXPECT_EQ(Get("/clip/" + clip, bob).status, 404);
+  EXPECT_EQ(Get("/clip/" + clip).status, 401);
+  const Heard part = Get("/clip/" + clip, ann + "Range: bytes=4-7\r\n");
+  EXPECT_EQ(part.status, 206);
+  EXPECT_EQ(part.body, "ftyp");
+  EXPECT_EQ(Get("/clip/" + clip, ann + "Range: bytes=99999999-\r\n").status, 416);
+  EXPECT_THAT(whole.head, Not(HasSubstr("ETag")));
+  EXPECT_THAT(whole.head, Not(HasSubstr("Last-Modified")));
+  for (const StudyClip& other : study.Open().Clips())
+    EXPECT_EQ(std::filesystem::file_size(study.folder() / other.file), whole.body.size()) << "all are of one length";
+}
+
+TEST_F(RatingServerTest, NoPathLeadsToAFile) {
+  const std::string ann = Join();
+  const std::string file = study.Open().Clips()[0].file;
+  for (const std::string path :
+       {"/study.sqlite", "/clips/", "/clip/", "/clip/../study.sqlite", "/clip/..%2fstudy.sqlite", "/../../etc/passwd",
+        "//etc/passwd", "/clip/%2e%2e/%2e%2e/etc/passwd", "/clip/....//study.sqlite", "/r/../study.sqlite",
+        "/rating.js/..", "/api/", "/api/verdict", "/clip/00000000000000000000000000000000"})
+    EXPECT_EQ(Get(path, ann).status, 404) << path;
+  EXPECT_EQ(Get("/" + file, ann).status, 404);
+  EXPECT_EQ(Get("/clip/" + file.substr(6, 32), ann).status, 404) << "the file's own name is nobody's";
+}
+
+TEST_F(RatingServerTest, OtherSitesChangeNothing) {
+  const std::string ann = Join();
+  const std::string cookie = ann.substr(0, ann.find("\r\n") + 2);
+  EXPECT_EQ(Post("/api/tab", "{}", cookie).status, 403) << "no token";
+  EXPECT_EQ(Post("/api/tab", "{}", cookie + "X-Evac-Csrf: " + std::string(32, 'a') + "\r\n").status, 403);
+  EXPECT_EQ(Post("/api/tab", "{}", ann + "Origin: http://evil.example\r\n").status, 403);
+  EXPECT_EQ(Post("/api/tab", "{}", ann + "Origin: null\r\n").status, 403);
+  EXPECT_EQ(Post("/api/tab", "{}", ann + "Sec-Fetch-Site: cross-site\r\n").status, 403);
+  EXPECT_EQ(Post("/api/tab", "{}", ann + "Origin: http://127.0.0.1\r\nSec-Fetch-Site: same-origin\r\n").status, 200);
+  EXPECT_EQ(Raw("GET /api/me HTTP/1.1\r\nHost: evil.example\r\nConnection: close\r\n" + ann + "\r\n").status, 403)
+      << "a name that was made to point here";
+  EXPECT_EQ(Raw("POST /api/tab HTTP/1.1\r\nHost: 127.0.0.1\r\nConnection: close\r\nContent-Type: "
+                "text/plain\r\nContent-Length: 2\r\n" +
+                ann + "\r\n{}")
+                .status,
+            415)
+      << "what a form can send is not taken";
+  const Heard page = Get("/");
+  EXPECT_THAT(page.head, HasSubstr("default-src 'none'; script-src 'self'"));
+  EXPECT_THAT(page.head, HasSubstr("frame-ancestors 'none'"));
+  EXPECT_THAT(page.head, HasSubstr("nosniff"));
+  EXPECT_THAT(page.body, Not(HasSubstr("<script>"))) << "no script in the page: the policy forbids it";
+}
+
+TEST_F(RatingServerTest, WhatIsMalformedTooLargeOrAmbiguousIsRefusedAndTheServerGoesOn) {
+  const std::string ann = Join();
+  const std::string start = "POST /api/tab HTTP/1.1\r\nHost: 127.0.0.1\r\nContent-Type: application/json\r\n" + ann;
+  EXPECT_EQ(Raw(start + "Content-Length: 2\r\nTransfer-Encoding: chunked\r\n\r\n0\r\n\r\n").status, 400)
+      << "two lengths";
+  EXPECT_EQ(Raw(start + "Content-Length: 2\r\nContent-Length: 3\r\n\r\n{} ").status, 400);
+  EXPECT_EQ(Raw(start + "Transfer-Encoding: chunked\r\n\r\n2\r\n{}\r\n0\r\n\r\n").status, 400);
+  EXPECT_EQ(Raw(start + "Content-Length: 10000000\r\n\r\n{}").status, 413);
+  EXPECT_EQ(Raw(start + "X: " + std::string(20000, 'x') + "\r\n\r\n").status, 431);
+  EXPECT_EQ(Raw("GET / HTTP/1.1\r\nHost: 127.0.0.1\r\nHost: evil\r\n\r\n").status, 400);
+  EXPECT_EQ(Raw("GET / HTTP/1.1\r\n\r\n").status, 400) << "no host";
+  EXPECT_EQ(Raw("nonsense\r\n\r\n").status, 400);
+  EXPECT_EQ(Raw("DELETE / HTTP/1.1\r\nHost: 127.0.0.1\r\nConnection: close\r\n\r\n").status, 405);
+  EXPECT_EQ(Raw("GET / HTTP/1.1\r\nHost: 127.0.0.1\r\n").status, 0) << "half a request: closed after a second";
+  EXPECT_EQ(Post("/api/verdict", std::string(60000, '['), ann).status, 422);
+  EXPECT_EQ(Post("/api/verdict", "\xff\xfe", ann).status, 422);
+  EXPECT_EQ(Get("/api/me", ann).status, 200);
+}
+
+TEST_F(RatingServerTest, TextsAreKeptAsTheyAreAndDoNothing) {
+  const std::string ann = Join();
+  const std::int64_t epoch = Epoch(ann);
+  const std::string nasty = "'); DROP TABLE verdicts; -- <script>alert(1)</script> \u202e ${7*7} \"quoted\"";
+  json verdict = Verdict(Next(ann, epoch).at("presentation"), epoch);
+  verdict["note"] = nasty;
+  ASSERT_EQ(Post("/api/verdict", verdict.dump(), ann).status, 200);
+  EXPECT_EQ(study.Open().VerdictByUuid(verdict.at("client_uuid"))->note, nasty);
+  EXPECT_EQ(Get("/api/me", ann).Json().at("name"), "<b>Ann</b>");
+  EXPECT_THAT(Get("/api/mine", ann).head, HasSubstr("Content-Type: application/json"));
+}
+
+TEST_F(RatingServerTest, WhoGuessesIsSlowedDown) {
+  int refused = 0;
+  for (int i = 0; i < 60; ++i)
+    refused += Get("/api/me", "Cookie: evac_rating=" + NewSecret() + "\r\n").status == 429 ? 1 : 0;
+  EXPECT_GT(refused, 20);
+}
+
+TEST_F(RatingServerTest, SlowClientsHinderNobody) {
+  std::vector<int> slow;
+  for (int i = 0; i < 200; ++i) {
+    const int socket = ::socket(AF_INET, SOCK_STREAM, 0);
+    sockaddr_in address{};
+    address.sin_family = AF_INET;
+    address.sin_port = htons(static_cast<std::uint16_t>(server.port()));
+    inet_pton(AF_INET, "127.0.0.1", &address.sin_addr);
+    ASSERT_EQ(::connect(socket, reinterpret_cast<sockaddr*>(&address), sizeof address), 0);
+    ::send(socket, "GET / HT", 8, MSG_NOSIGNAL);
+    slow.push_back(socket);
+  }
+  EXPECT_EQ(Get("/api/me", Join()).status, 200);
+  for (const int socket : slow) {  // every one of them is cut off
+    char byte = 0;
+    EXPECT_LE(::recv(socket, &byte, 1, 0), 0);
+    close(socket);
+  }
+}
+
+TEST_F(RatingServerTest, AStudyHasOneServer) {
+  EXPECT_THROW(RatingServer another(OptionsFor(study.folder())), Error);
+  EXPECT_THAT(server.url(), StartsWith("http://127.0.0.1:"));
+}
+
+}  // namespace
+}  // namespace evac

@@ -1,0 +1,103 @@
+#include "judges/rating_votes.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+namespace evac {
+namespace {
+
+using testing::ElementsAre;
+using testing::HasSubstr;
+using testing::IsEmpty;
+
+constexpr Vote S = Vote::kSuccess, F = Vote::kFailure, U = Vote::kUnsure;
+
+TEST(Resolve, AStrictMajorityOfThoseWhoCouldTell) {
+  EXPECT_EQ(Resolve({S, S, F}, std::nullopt, 2).label, Label::kSuccess);
+  EXPECT_EQ(Resolve({S, F, F}, std::nullopt, 2).label, Label::kFailure);
+  EXPECT_EQ(Resolve({S, S, U}, std::nullopt, 2).label, Label::kSuccess);
+  EXPECT_EQ(Resolve({S, F, U}, std::nullopt, 2).how, "tie");
+  EXPECT_EQ(Resolve({S, U, U}, std::nullopt, 2).how, "too few votes");
+  EXPECT_EQ(Resolve({}, std::nullopt, 2).how, "not rated");
+  EXPECT_FALSE(Resolve({S, F}, std::nullopt, 2).label);
+  EXPECT_EQ(Resolve({S}, std::nullopt, 1).label, Label::kSuccess);
+}
+
+TEST(Resolve, TheAdjudicatorsWordIsTheLast) {
+  EXPECT_EQ(Resolve({S, S, S}, "failure", 2).label, Label::kFailure);
+  EXPECT_EQ(Resolve({S, F}, "success", 2).how, "adjudicated");
+  EXPECT_FALSE(Resolve({S, S, S}, "cannot_tell", 2).label) << "never a failure by default";
+}
+
+RatedClip Rated(const std::vector<std::string>& labels) {
+  RatedClip clip;
+  std::vector<Vote> votes;
+  for (std::size_t i = 0; i < labels.size(); ++i) {
+    clip.by_rater[static_cast<std::int64_t>(i)].label = labels[i];
+    votes.push_back(labels[i] == "success" ? S : labels[i] == "failure" ? F : U);
+  }
+  clip.resolution = Resolve(votes, std::nullopt, 2);
+  return clip;
+}
+
+TEST(Rates, UndecidedClipsAreBoundsNotFailures) {
+  const LabelRates rates =
+      RatesOf({Rated({"success", "success", "success"}), Rated({"failure", "failure", "failure"}),
+               Rated({"success", "failure", "cannot_tell"}), Rated({"success", "success", "failure"})});
+  EXPECT_EQ(rates.decided, 3);
+  EXPECT_EQ(rates.undecided, 1);
+  EXPECT_NEAR(*rates.majority, 2.0 / 3, 1e-12);
+  EXPECT_NEAR(*rates.low, 0.5, 1e-12);
+  EXPECT_NEAR(*rates.high, 0.75, 1e-12);
+  EXPECT_NEAR(*rates.unanimous, 0.5, 1e-12);
+  EXPECT_NEAR(*rates.soft, (1 + 0 + 0.5 + 2.0 / 3) / 4, 1e-12);
+  EXPECT_TRUE(rates.far_apart);
+}
+
+TEST(Agreement, RawAgreementStaysHighWhereKappaFalls) {
+  std::vector<RatedClip> clips(19, Rated({"success", "success", "success"}));
+  clips.push_back(Rated({"success", "success", "failure"}));
+  const RatingAgreement agreement = RatersAgreement(clips, 3);
+  EXPECT_NEAR(*agreement.agreement, 58.0 / 60, 1e-12);
+  EXPECT_NEAR(*agreement.fleiss, -0.017, 5e-4);
+  ASSERT_TRUE(agreement.interval);
+  EXPECT_LE(agreement.interval->low, *agreement.alpha);
+  EXPECT_GE(agreement.interval->high, *agreement.alpha);
+}
+
+TEST(Quality, FastHandsAndOneAnswerAreSaidAloud) {
+  StudyClip clip;
+  clip.id = 1;
+  clip.frames = 100;
+  std::map<std::int64_t, StudyClip> clips = {{1, clip}};
+  std::vector<StudyStore::Ballot> ballots(30,
+                                          {.rater = 1, .clip = 1, .label = "success", .rt_ms = 9000, .max_speed = 1});
+  EXPECT_THAT(QualityOfRater(ballots, clips, 0.1).concerns, ElementsAre(HasSubstr("all 30 verdicts are success")));
+  ballots[0].label = "failure";
+  EXPECT_THAT(QualityOfRater(ballots, clips, 0.1).concerns, IsEmpty());
+  ballots[1].rt_ms = 2400;
+  EXPECT_THAT(QualityOfRater(ballots, clips, 0.1).concerns, IsEmpty()) << "one of thirty is below 5 %";
+  ballots[2].rt_ms = 2400;
+  EXPECT_THAT(QualityOfRater(ballots, clips, 0.1).concerns, ElementsAre(HasSubstr("2 of 30 verdicts came too fast")));
+  ballots[1].max_speed = ballots[2].max_speed = 2;
+  EXPECT_THAT(QualityOfRater(ballots, clips, 0.1).concerns, IsEmpty()) << "at twice the speed half the time is enough";
+}
+
+TEST(Quality, KnownClipsAndRepeatsAreCounted) {
+  StudyClip clip;
+  clip.id = 1;
+  clip.frames = 10;
+  clip.reference = Label::kFailure;
+  const std::map<std::int64_t, StudyClip> clips = {{1, clip}};
+  const RaterQuality quality =
+      QualityOfRater({{.rater = 1, .clip = 1, .label = "failure", .showing = Showing::kGold, .rt_ms = 5000},
+                      {.rater = 1, .clip = 1, .label = "success", .showing = Showing::kRepeat, .rt_ms = 5000}},
+                     clips, 0.1);
+  EXPECT_EQ(quality.gold_seen, 1);
+  EXPECT_EQ(quality.gold_right, 1);
+  EXPECT_EQ(quality.repeats_seen, 1);
+  EXPECT_EQ(quality.repeats_same, 0);
+}
+
+}  // namespace
+}  // namespace evac

@@ -1,0 +1,377 @@
+#!/usr/bin/env python3
+"""A rating session as people have it, in real browsers: rating_page.py EVAC STUDY [FOLDER_FOR_SCREENSHOTS].
+
+Three raters, an adjudicator and a lead; two tabs, a reload in a clip, a line that goes away, a server that is killed, undo, a clip that does
+not play, somebody who leaves. Prints "ok: …" and "failed: …"; exit code 1 if anything failed, 77 without a browser.
+"""
+import json
+import pathlib
+import shutil
+import signal
+import subprocess
+import sys
+import time
+
+try:
+    import websocket  # noqa: F401
+except ImportError:
+    print("skipped: python3-websocket is not installed")
+    sys.exit(77)
+if shutil.which("chromium") is None:
+    print("skipped: chromium is not installed")
+    sys.exit(77)
+
+from devtools import Browser
+
+SIZES = [(360, 740), (1280, 800), (2560, 1440)]
+EVAC, STUDY = sys.argv[1], sys.argv[2]
+FOLDER = pathlib.Path(sys.argv[3]) if len(sys.argv) > 3 else None
+failures = []
+
+
+def check(holds, sentence, found=""):
+    print(f"{'ok' if holds else 'failed'}: {sentence}{'' if holds else f' (found {found})'}", flush=True)
+    if not holds:
+        failures.append(sentence)
+
+
+class Server:
+    """`evac rate serve`, at one port for all its lives."""
+
+    def __init__(self):
+        self.port = 0
+        self.start()
+
+    def start(self):
+        self.process = subprocess.Popen([EVAC, "rate", "serve", STUDY, "--port", str(self.port)], stdout=subprocess.PIPE, text=True)
+        self.url = self.process.stdout.readline().strip()
+        self.port = int(self.url.rstrip("/").rsplit(":", 1)[1])
+
+    def kill(self):
+        self.process.send_signal(signal.SIGKILL)
+        self.process.wait()
+
+
+def evac(*words):
+    return subprocess.run([EVAC, "rate", *words], capture_output=True, text=True, check=True).stdout
+
+
+def links(role, count, url):
+    return evac("invite", STUDY, "--role", role, "--count", str(count), "--url", url).split()
+
+
+def look(browser, name):
+    """Screenshots at three widths, light and dark, and no page is wider than its window."""
+    for width, height in SIZES:
+        browser.look(width, height, "dark" if width == 2560 else "light")
+        time.sleep(0.4)
+        wide = browser.js("document.scrollingElement.scrollWidth")
+        check(wide <= width, f"{name} at {width} px: nothing is wider than the window", wide)
+        if FOLDER:
+            browser.screenshot(FOLDER / f"{name}-{width}.png")
+    browser.look(1280, 800, "light")
+    time.sleep(0.2)
+
+
+def text(browser, selector):
+    return browser.js(f"document.querySelector({selector!r})?.textContent || ''")
+
+
+class Rater:
+    """One person with a browser of their own, who uses keys alone."""
+
+    def __init__(self, link, name):
+        self.browser, self.name, self.said = Browser(), name, {}
+        self.browser.look(1280, 800, "light")
+        self.browser.open(link)
+        self.browser.wait("document.querySelector('#consent')")
+
+    def join(self):
+        self.browser.js(f"document.querySelector('#name').value = {self.name!r}; document.querySelector('#consent').click()")
+        self.browser.js("document.querySelector('button.primary').click()")
+        self.browser.wait("document.querySelector('.rubric') || document.querySelector('.rate') || document.querySelector('.done') || document.querySelector('.board')")
+
+    def clip(self):
+        return self.browser.js("rating.clip?.presentation || ''")
+
+    def ready(self):
+        """Until a clip was watched to its end and the verdict is open."""
+        self.browser.wait("document.querySelector('.verdict:not(:disabled)') && !document.querySelector('.feedback')", 60)
+
+    def say(self, key, label):
+        self.ready()
+        clip = self.clip()
+        self.browser.press(key)
+        self.said[clip] = label
+        self.browser.wait(f"!rating.clip || rating.clip.presentation !== {clip!r} || document.querySelector('.feedback') || !document.querySelector('.rate')")
+
+    def fast(self):
+        for _ in range(4):
+            self.browser.press("]")
+
+    def at_end(self):
+        return self.browser.js("Boolean(document.querySelector('.done') || document.querySelector('[data-guess]'))")
+
+    def rate_all(self, label_of):
+        while not self.at_end():
+            if self.browser.js("Boolean(document.querySelector('.sheet'))"):
+                self.browser.press("Enter")  # a break: its button has the focus
+                self.browser.wait("document.querySelector('.rate') || document.querySelector('.done') || document.querySelector('[data-guess]')")
+                continue
+            self.browser.wait("document.querySelector('.verdict:not(:disabled)') || document.querySelector('.sheet')", 60)
+            if self.browser.js("Boolean(document.querySelector('.sheet'))"):
+                continue
+            label = label_of(len(self.said))
+            self.say({"success": "s", "failure": "f", "cannot_tell": "u"}[label], label)
+
+    def practise(self):
+        while self.browser.js("rating.clip?.kind === 'practice' || !rating.clip"):
+            self.browser.wait("rating.clip")
+            if self.browser.js("rating.clip.kind !== 'practice'"):
+                break
+            self.ready()
+            self.browser.press("s")
+            self.browser.wait("document.querySelector('.feedback')")
+            self.browser.press("Enter")
+            self.browser.wait("!document.querySelector('.feedback')")
+
+    def guess(self):
+        while self.browser.js("Boolean(document.querySelector('[data-guess]'))"):
+            left = text(self.browser, ".sheet")
+            self.browser.js("document.querySelector('[data-guess=unsure]').click()")
+            self.browser.wait(f"document.querySelector('.done') || document.querySelector('.sheet').textContent !== {left!r}")
+
+
+def rows():
+    return [json.loads(line) for line in evac("export", STUDY, "--jsonl", "-").splitlines()]
+
+
+def current(name=None):
+    return {row["presentation"]: row for row in rows() if row["is_current"] and row["label"] != "retracted"}
+
+
+def first_rater(server, ann):
+    browser = ann.browser
+    look(browser, "join")
+    ann.join()
+    look(browser, "brief")
+    browser.press("Enter")
+    browser.wait("document.querySelector('.rate')")
+    check("Practice" in text(browser, "h1"), "practice comes first", text(browser, "h1"))
+    check(browser.js("[...document.querySelectorAll('.verdict')].every(b => b.disabled)"), "no verdict before the clip was seen")
+    look(browser, "practice")
+    ann.fast()
+    ann.practise()
+    undo(ann)
+    reload_in_a_clip(ann)
+    keys(ann)
+    second_tab(ann)
+    line_goes_away(ann, server)
+    ann.rate_all(lambda k: "failure" if k % 4 == 3 else "success")
+    if browser.js("Boolean(document.querySelector('[data-guess]'))"):
+        look(browser, "guess")
+    ann.guess()
+    look(browser, "done")
+
+
+def reload(browser):
+    browser.js("window.isOld = true")
+    browser.call("Page.reload")
+    browser.wait("!window.isOld && document.readyState === 'complete' && typeof rating === 'object'")
+
+
+def undo(ann):
+    browser = ann.browser
+    ann.ready()
+    look(browser, "rate")
+    before = ann.clip()
+    ann.say("s", "success")
+    browser.press("z")
+    browser.wait(f"rating.clip?.presentation === {before!r}")
+    check(before not in current(), "undo takes the verdict back")
+    check(any(row["label"] == "retracted" and row["presentation"] == before for row in rows()), "undo is a row of its own")
+    ann.said.pop(before)
+    ann.say("u", "cannot_tell")
+
+
+def reload_in_a_clip(ann):
+    browser = ann.browser
+    browser.wait("document.querySelector('video')?.currentTime > 0.2")
+    before = ann.clip()
+    reload(browser)
+    browser.wait("rating.clip")
+    check(ann.clip() == before, "a reload goes on with the same clip", (before, ann.clip()))
+    ann.say("s", "success")
+    check(current()[before]["interrupted"] == 1, "the verdict knows of the reload")
+
+
+def keys(ann):
+    browser = ann.browser
+    ann.ready()
+    browser.press("Home")
+    browser.wait("document.querySelector('video').currentTime < 0.15")
+    browser.press(".")
+    browser.wait("Math.abs(document.querySelector('video').currentTime - 0.15) < 0.06")
+    check(True, "Home and . go to the first frame and the next")
+    browser.press("1")
+    browser.press("x")
+    browser.press("4")
+    browser.press("x")
+    check(browser.js("rating.stages === 1 && rating.flags.has('blur_hides')"), "digits are stages, after X flags")
+    browser.press("n")
+    for letter in "sfu":
+        browser.press(letter)
+    check(browser.js("document.querySelector('textarea').value === 'sfu' && !rating.isBusy"), "keys are letters in the note")
+    browser.press("Escape")
+    browser.press("?")
+    browser.wait("document.querySelector('#dialog').open")
+    look(browser, "help")
+    browser.js("document.querySelector('#dialog button.primary').click()")
+    clip = ann.clip()
+    ann.say("f", "failure")
+    row = current()[clip]
+    check((row["stages"], row["flags"], row["note"]) == (1, "blur_hides", "sfu"), "stages, flags and note are stored", row)
+    browser.press("h")
+    browser.wait("document.querySelector('.history')")
+    look(browser, "history")
+    browser.js("document.querySelector('#dialog button.primary').click()")
+
+
+def second_tab(ann):
+    other = ann.browser.tab()
+    other.open(ann.browser.js("location.origin") + "/")
+    other.wait("document.querySelector('#dialog').open")
+    check("another tab" in text(other, "#dialog"), "a second tab says that there is a first one")
+    other.js("document.querySelector('#dialog button.primary').click()")
+    other.wait("rating.clip")
+    ann.browser.wait("session.isOther", 70)
+    check(ann.browser.js("document.querySelector('video')?.paused !== false"), "the first tab stops playing")
+    check("another tab" in text(ann.browser, "#banner"), "and says why", text(ann.browser, "#banner"))
+    if FOLDER:
+        ann.browser.screenshot(FOLDER / "other-tab-1280.png")
+    other.call("Page.close")
+    ann.browser.call("Page.bringToFront")
+    reload(ann.browser)
+    ann.browser.wait("rating.clip || document.querySelector('#dialog').open")
+    if ann.browser.js("document.querySelector('#dialog').open"):
+        ann.browser.js("document.querySelector('#dialog button.primary').click()")
+        ann.browser.wait("rating.clip")
+
+
+def line_goes_away(ann, server):
+    browser = ann.browser
+    ann.ready()
+    time.sleep(1)  # the next clip is fetched ahead
+    browser.offline(True)
+    ann.say("s", "success")
+    browser.wait("!document.querySelector('#unsent').hidden")
+    check("1 unsent" in text(browser, "#unsent"), "what is not sent is counted", text(browser, "#unsent"))
+    ann.ready()
+    look(browser, "offline")
+    clip = ann.clip()
+    browser.press("s")
+    ann.said[clip] = "success"
+    browser.wait("outbox.waiting.length === 2")
+    server.kill()
+    browser.offline(False)
+    time.sleep(1)
+    server.start()
+    browser.wait("outbox.waiting.length === 0", 60)
+    check(clip in current(), "verdicts arrive when line and server are back")
+    browser.wait("rating.clip && !rating.isBusy")
+
+
+def compare(ann, name):
+    stored = current()
+    wrong = {clip: (label, stored.get(clip, {}).get("label")) for clip, label in ann.said.items() if stored.get(clip, {}).get("label") != label}
+    check(not wrong, f"the store has what {name} said, row by row ({len(ann.said)} clips)", wrong)
+
+
+def leave(rater):
+    browser = rater.browser
+    browser.js("leave()")
+    browser.wait("document.querySelector('#erase')")
+    look(browser, "leave")
+    browser.js("document.querySelector('#dialog button.bad').click()")
+    browser.wait("document.querySelector('h1')?.textContent.includes('left')")
+    browser.open(browser.js("location.origin") + "/")
+    browser.wait("document.querySelector('h1')?.textContent.includes('invitation')")
+    check(True, "who left is out")
+    if FOLDER:
+        browser.screenshot(FOLDER / "no-invitation-1280.png")
+
+
+def adjudicate(judge):
+    browser = judge.browser
+    judge.join()
+    decided = 0
+    browser.wait("document.querySelector('.rate') || document.querySelector('.done')")
+    judge.fast()
+    while browser.js("Boolean(document.querySelector('.rate'))") and decided < 60:
+        judge.ready()
+        clip = judge.clip()
+        if decided == 0:
+            look(browser, "adjudicate-blind")
+        check(decided > 0 or not browser.js("Boolean(document.querySelector('.others'))"), "nothing of the others before one's own word")
+        browser.press("s")
+        browser.wait("document.querySelector('.others')")
+        if decided == 0:
+            look(browser, "adjudicate")
+        browser.press("Enter")
+        browser.wait(f"rating.clip?.presentation !== {clip!r} && (rating.player || document.querySelector('.done'))")
+        browser.wait("document.querySelector('.done') || (document.querySelector('.rate') && !document.querySelector('.others'))")
+        decided += 1
+    check(decided > 0, "there was something to decide", decided)
+    check(json.loads(evac("status", STUDY, "--json"))["disputes"] == [], "no dispute is left")
+
+
+def main():
+    if FOLDER:
+        FOLDER.mkdir(parents=True, exist_ok=True)
+    server, people = Server(), []
+    try:
+        for link, name in zip(links("rater", 4, server.url), ["Ann", "Bob", "Cleo", "Dan"]):
+            people.append(Rater(link, name))
+        ann, bob, cleo, dan = people
+        first_rater(server, ann)
+        for rater, label_of in ((bob, lambda k: "failure" if k % 3 == 0 else "success"), (cleo, lambda k: "success")):
+            rater.join()
+            rater.browser.press("Enter")
+            rater.browser.wait("document.querySelector('.rate')")
+            rater.fast()
+            rater.practise()
+            rater.rate_all(label_of)
+            rater.guess()
+        for rater in (ann, bob, cleo):
+            compare(rater, rater.name)
+            check(len(rater.said) >= 24, f"{rater.name} rated 24 clips or more", len(rater.said))
+        dan.join()
+        leave(dan)
+        judge = Rater(links("adjudicator", 1, server.url)[0], "Eve")
+        people.append(judge)
+        adjudicate(judge)
+        lead = Rater(links("lead", 1, server.url)[0], "Fay")
+        people.append(lead)
+        lead.join()
+        look(lead.browser, "board")
+        told = json.loads(evac("status", STUDY, "--json"))
+        check(f"{told['progress']['votes']} votes" in text(lead.browser, ".board"), "the board shows the store's numbers", text(lead.browser, "header"))
+        check(len(told["unplayable"]) >= 3 and "could not play" in text(lead.browser, ".board"), "the lead hears what did not play", told["unplayable"])
+        doubled = [row for row in rows() if row["label"] != "retracted" and row["is_current"]]
+        check(len(doubled) == len({row["presentation"] for row in doubled}), "nothing is doubled")
+        for rater in people:
+            away = [u for u in rater.browser.requests if not u.startswith((server.url, "about:", "data:", "blob:"))]
+            check(not away, f"{rater.name}'s page asks nobody else", away[:3])
+            bad = [c for c in rater.browser.complaints if "ERR_INTERNET_DISCONNECTED" not in c and "ERR_CONNECTION" not in c and "401" not in c]
+            print(f"   console of {rater.name}: {bad[:4]}")
+            check(not [c for c in bad if "Error:" in c or "Content Security" in c], f"no script of {rater.name}'s page failed", bad[:4])
+    finally:
+        for rater in people:
+            rater.browser.close()
+        server.kill()
+    print(f"{len(failures)} failed")
+    return 1 if failures else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,101 @@
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <nlohmann/json.hpp>
+
+#include "core/store_study.h"
+#include "tests/reports/stored_run.h"
+#include "tests/support/command.h"
+
+/// `evac rate` as a lab runs it, and the page in real browsers: tests/system/browser/rating_page.py says what is tried.
+namespace evac::system_test {
+namespace {
+
+using testing::HasSubstr;
+
+constexpr int kSkipped = 77;
+
+CommandResult Rate(std::vector<std::string> words) {
+  words.insert(words.begin(), {Binary("evac"), "rate"});
+  return RunCommand(words);
+}
+
+TEST(RatingSession, PeopleRateInRealBrowsersAndNothingIsLost) {
+  const StoredRun run("session", "sfsfsfsfsfsfsfsfsfsf", "sffssffssffssffssffs", 16);
+  const std::string study = (run.folder().parent_path() / "study").string();
+  const CommandResult made =
+      Rate({"new", study, "--run", run.folder().string(), "--gold-from", "oracle", "--height", "96"});
+  ASSERT_EQ(made.exit_code, 0) << made.err;
+  const StudyStore store = StudyStore::Open(study, StudyStore::Mode::kReadOnly);
+  for (const StudyClip& clip : store.Clips()) {  // one that no browser plays
+    if (clip.use != Showing::kCounted) continue;
+    const std::filesystem::path file = std::filesystem::path(study) / clip.file;
+    const auto size = std::filesystem::file_size(file);
+    std::ofstream(file, std::ios::binary) << std::string(size, 'x');
+    break;
+  }
+  std::vector<std::string> words = {"/usr/bin/python3", "-B", EVAC_SOURCE_DIR "/tests/system/browser/rating_page.py",
+                                    Binary("evac"), study};
+  if (const char* screenshots = std::getenv("EVAC_SCREENSHOTS")) words.push_back(screenshots);
+  const CommandResult rated = RunCommand(words);
+  if (rated.exit_code == kSkipped) GTEST_SKIP() << rated.out;
+  EXPECT_EQ(rated.exit_code, 0) << rated.out << rated.err;
+  EXPECT_THAT(rated.out, HasSubstr("0 failed")) << rated.err;
+}
+
+TEST(RatingSession, ASheetComesInAndLabelsGoBackIntoTheRun) {
+  const StoredRun run("sheet", "sffs", "ssff");
+  const std::string study = (run.folder().parent_path() / "study").string();
+  ASSERT_EQ(Rate({"new", study, "--run", run.folder().string(), "--raters", "3", "--height", "64"}).exit_code, 0);
+  const std::string good = (run.folder().parent_path() / "good.csv").string(), bad = good + ".bad";
+  std::ofstream(good)
+      << "episode,rater,label,note\n"
+         "real/take/pick@1/41-0000-s1,ann,success,\"clean, quick\"\nreal/take/pick@1/41-0000-s1,bob,S,\n"
+         "real/take/pick@1/41-0001-s1,ann,F,\nreal/take/pick@1/41-0001-s1,bob,success,\nreal/take/pick@1/"
+         "41-0001-s1,cleo,0,\n"
+         "sim/take/pick@1/41-0002-s1,ann,success,\nsim/take/pick@1/41-0002-s1,bob,failure,\n";
+  std::ofstream(bad) << "episode,rater,label\nreal/take/pick@1/41-0000-s1,ann,maybe\nreal/take/none,ann,success\nreal/"
+                        "take/pick@1/41-0001-s1,,success\n";
+  const CommandResult refused = Rate({"import", study, bad});
+  EXPECT_EQ(refused.exit_code, 2);
+  EXPECT_THAT(refused.err, HasSubstr(".bad:2: label: found"));
+  EXPECT_THAT(refused.err, HasSubstr(".bad:3: episode:"));
+  EXPECT_THAT(refused.err, HasSubstr(".bad:4: rater:"));
+  const CommandResult imported = Rate({"import", study, good});
+  ASSERT_EQ(imported.exit_code, 0) << imported.err;
+  EXPECT_THAT(imported.out, HasSubstr("7 verdicts, 7 new"));
+  EXPECT_THAT(Rate({"import", study, good}).out, HasSubstr("7 verdicts, 0 new"));
+  const CommandResult resolved = Rate({"resolve", study});
+  EXPECT_EQ(resolved.exit_code, 0) << resolved.err;
+  EXPECT_THAT(resolved.out, HasSubstr("human: 2 clips decided, 1 not; 3 new verdicts"));
+  EXPECT_THAT(Rate({"resolve", study}).out, HasSubstr("0 new verdicts"));
+  const CommandResult listed = RunCommand({Binary("evac"), "ls", run.folder().string()});
+  EXPECT_THAT(listed.out, HasSubstr("human=success oracle=success"));
+  EXPECT_THAT(listed.out, HasSubstr("human=cannot_tell"));
+  const CommandResult calibrated = RunCommand(
+      {Binary("evac"), "judge", "calibrate", run.folder().string(), "--judge", "oracle", "--against", "human"});
+  EXPECT_EQ(calibrated.exit_code, 3) << calibrated.err << "two clips are too few to say";
+  const auto lines = Rate({"export", study, "--jsonl", "-"}).out;
+  EXPECT_EQ(nlohmann::json::parse(lines.substr(0, lines.find('\n'))).at("note"), "clean, quick");
+}
+
+TEST(RatingSession, WrongWordsAreRefusedWithWhatWasWanted) {
+  const StoredRun run("refused", "s", "f");
+  const std::string study = (run.folder().parent_path() / "study").string();
+  EXPECT_EQ(Rate({"serve", study}).exit_code, 2);
+  EXPECT_THAT(Rate({"status", study}).err, HasSubstr("there is no study"));
+  EXPECT_EQ(Rate({"new", study, "--run", study}).exit_code, 2);
+  ASSERT_EQ(Rate({"new", study, "--run", run.folder().string(), "--height", "64"}).exit_code, 0);
+  EXPECT_THAT(Rate({"new", study, "--run", run.folder().string()}).err,
+              HasSubstr("every clip of these runs is in it already"));
+  EXPECT_THAT(Rate({"invite", study, "--role", "king"}).err, HasSubstr("wanted rater, adjudicator or lead"));
+  EXPECT_THAT(Rate({"export", study}).err, HasSubstr("--csv"));
+  EXPECT_THAT(Rate({"invite", study, "--count", "2", "--url", "https://rate.lab.org"}).out,
+              testing::MatchesRegex("(https://rate.lab.org/r/[0-9a-f]+\n)+"));
+}
+
+}  // namespace
+}  // namespace evac::system_test
