@@ -5,24 +5,17 @@
 
 #include "reports/fidelity.h"
 #include "reports/html.h"
+#include "reports/page_parts.h"
 #include "reports/wording.h"
 
 namespace evac {
 namespace {
 
 constexpr const char* kStyle = R"css(
-:root{color-scheme:light dark;--ground:#fff;--ink:#1a1e23;--quiet:#59626d;--rule:#dcdfe4;--real:#0072b2;--model:#c44e00}
-@media(prefers-color-scheme:dark){:root{--ground:#14171b;--ink:#e7e9ec;--quiet:#9aa4af;--rule:#333942;--real:#56b4e9;--model:#f08a4b}}
-*{box-sizing:border-box}body{margin:0 auto;max-width:64rem;padding:2rem 1.2rem 4rem;background:var(--ground);color:var(--ink);
-font:15px/1.5 system-ui,-apple-system,"Segoe UI",Roboto,Arial,sans-serif;font-variant-numeric:tabular-nums}
-h1{font-size:1.6rem;margin:0}h2{font-size:1.15rem;margin:2.2rem 0 .5rem}p{margin:.4rem 0}.quiet{color:var(--quiet)}
-.wide{overflow-x:auto}table{border-collapse:collapse;width:100%}th,td{padding:.25rem .6rem;text-align:right;border-bottom:1px solid var(--rule)}
-th:first-child,td:first-child,td.name,th.name{text-align:left}th{font-weight:600;color:var(--quiet)}
-svg{max-width:100%;height:auto;display:block}svg text{fill:var(--ink);font-size:11px}.axis{stroke:var(--rule);fill:none}
-.real{stroke:var(--real);fill:none;stroke-width:2}.model{stroke:var(--model);fill:none;stroke-width:2}.model.dash{stroke-dasharray:5 4}
-.dot{fill:var(--model);fill-opacity:.75}.pair{display:grid;grid-template-columns:1fr;gap:.2rem;margin:0 0 1rem}
-.clips{display:grid;grid-template-columns:repeat(auto-fill,minmax(20rem,1fr));gap:1rem}video{width:100%;background:#000;display:block}
-figure{margin:0}figcaption{color:var(--quiet);font-size:.9em}
+.drift{max-width:44rem;width:100%;height:auto;display:block}.drift text{font-size:12px;fill:var(--ink)}.drift .axis{stroke:var(--rule);fill:none}
+.drift .all{stroke:var(--c0);fill:none;stroke-width:2}.drift .moving{stroke:var(--c1);fill:none;stroke-width:2}.drift .still{stroke:var(--c1);fill:none;stroke-width:2;stroke-dasharray:5 4}
+.pairs{display:grid;grid-template-columns:repeat(auto-fill,minmax(20rem,1fr));gap:1rem;margin-top:.6rem}.pairs figure{margin:0;min-width:0}.pairs video{width:100%;background:#000;display:block;margin-bottom:2px}
+.pairs figcaption{color:var(--quiet);font-size:.87rem}.stats td,.stats th{white-space:nowrap}
 )css";
 
 constexpr std::size_t kShown = 6;  ///< pairs of clips of each sort
@@ -44,8 +37,21 @@ std::string WithInterval(const Estimate& estimate, double factor, int digits, co
   return text;
 }
 
+std::string Section(const char* id, const char* title) {
+  return fmt::format("\n<section id=\"{}\"><h2>{}</h2>", id, title);
+}
+
+/// The names of the columns, numbers to the right of the first.
+std::string TableHead(const std::vector<std::string>& columns) {
+  std::string html = "<div class=\"wide\"><table class=\"stats\"><thead><tr>";
+  for (std::size_t i = 0; i < columns.size(); ++i)
+    html += fmt::format("<th scope=\"col\"{}>{}</th>", i == 0 ? "" : " class=\"num\"", columns[i]);
+  return html + "</tr></thead><tbody>";
+}
+
 std::string MatchRow(const std::string& name, const OutcomeMatch& match) {
-  return fmt::format("<tr><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td></tr>", Escaped(name), match.n,
+  return fmt::format("<tr><th scope=\"row\">{}</th><td class=\"num\">{}</td><td class=\"num\">{}</td><td class=\"num\">{}</td>"
+                     "<td class=\"num\">{}</td><td class=\"num\">{}</td></tr>", Escaped(name), match.n,
                      WithInterval(match.agreement, 100, 0, " %"), WithInterval(match.hallucinated, 100, 0, " %"),
                      WithInterval(match.missed, 100, 0, " %"), WithInterval(match.kappa, 1, 2, ""));
 }
@@ -55,8 +61,7 @@ std::string MatchTable(const Fidelity& fidelity) {
                      MatchRow("reality against reality, other noise", fidelity.closed_again);
   if (fidelity.open.n > 0) rows += MatchRow("open loop: recorded actions replayed", fidelity.open);
   for (const Fidelity::Counterfactual& one : fidelity.counterfactuals) rows += MatchRow(one.kind, one.match);
-  return "<div class=\"wide\"><table><thead><tr><th>what was asked</th><th>pairs</th><th>agreement</th><th>hallucinated</th>"
-         "<th>missed</th><th>kappa</th></tr></thead><tbody>" + rows + "</tbody></table></div>"
+  return TableHead({"what was asked", "pairs", "agreement", "hallucinated", "missed", "kappa"}) + rows + "</tbody></table></div>"
          "<p class=\"quiet\">Hallucinated: imagined success of what truly failed. Missed: imagined failure of what truly "
          "succeeded. Intervals: Wilson, 95 %.</p>";
 }
@@ -64,31 +69,35 @@ std::string MatchTable(const Fidelity& fidelity) {
 std::string CellTable(const Fidelity& fidelity) {
   std::string rows;
   for (const FidelityCell& cell : fidelity.cells)
-    rows += fmt::format("<tr><td>{}</td><td class=\"name\">{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td></tr>",
-                        Escaped(cell.task), Escaped(PolicyLabel(cell.policy, cell.checkpoint)), cell.n, Percent(cell.real),
+    rows += fmt::format("<tr><th scope=\"row\">{} <span class=\"quiet\">{}</span></th><td class=\"num\">{}</td><td class=\"num\">{}</td>"
+                        "<td class=\"num\">{}</td><td class=\"num\">{}</td><td class=\"num\">{}</td></tr>",
+                        Breakable(PolicyLabel(cell.policy, cell.checkpoint)), Breakable(cell.task), cell.n, Percent(cell.real),
                         Percent(cell.again), Percent(cell.model), Percent(cell.agreement));
-  return "<div class=\"wide\"><table><thead><tr><th>task</th><th class=\"name\">policy</th><th>pairs</th><th>real</th><th>real "
-         "again</th><th>imagined</th><th>agreement</th></tr></thead><tbody>" + rows + "</tbody></table></div>";
+  return TableHead({"policy, task", "pairs", "real", "real again", "imagined", "agreement"}) + rows + "</tbody></table></div>";
 }
 
-std::string Scatter(const Fidelity& fidelity) {
-  const auto at = [](double rate) { return 40 + 260 * rate; };
-  std::string dots;
-  for (const FidelityCell& cell : fidelity.cells) {
-    if (!cell.real || !cell.model) continue;
-    dots += fmt::format("<circle class=\"dot\" cx=\"{:.1f}\" cy=\"{:.1f}\" r=\"5\"><title>{} {}: real {:.0f} %, imagined {:.0f} %</title></circle>",
-                        at(*cell.real), 340 - at(*cell.model), Escaped(cell.task),
-                        Escaped(PolicyLabel(cell.policy, cell.checkpoint)), 100 * *cell.real, 100 * *cell.model);
-  }
-  if (dots.empty()) return "<p class=\"quiet\">No cell has a rate in both worlds.</p>";
-  return "<svg viewBox=\"0 0 340 340\" width=\"340\" role=\"img\" aria-label=\"Imagined success rate against the real one\">"
-         "<rect class=\"axis\" x=\"40\" y=\"40\" width=\"260\" height=\"260\"/><line class=\"axis\" x1=\"40\" y1=\"300\" x2=\"300\" y2=\"40\"/>" +
-         dots + "<text x=\"170\" y=\"330\" text-anchor=\"middle\">real success rate, 0 to 100 %</text>"
-         "<text x=\"20\" y=\"170\" text-anchor=\"middle\" transform=\"rotate(-90 20 170)\">imagined</text></svg>";
+/// The same policy looks the same on every task.
+std::vector<PointStyle> StylesOf(const WorldComparison& comparison) {
+  std::vector<std::string> policies, tasks;
+  const auto place = [](std::vector<std::string>& names, const std::string& name) {
+    const auto index = static_cast<std::size_t>(std::ranges::find(names, name) - names.begin());
+    if (index == names.size()) names.push_back(name);
+    return index;
+  };
+  std::vector<PointStyle> styles;
+  for (const ComparedPoint& point : comparison.points) styles.push_back({place(policies, point.policy), place(tasks, point.task)});
+  return styles;
+}
+
+std::string Rates(const Fidelity& fidelity) {
+  const std::string title = Section("rates", "Rates");
+  if (fidelity.model.points.empty()) return title + "<p>No cell has a rate in both worlds.</p>" + CellTable(fidelity) + "</section>";
+  return title + ComparisonPart(fidelity.model, StylesOf(fidelity.model)) + "<h3>Against reality asked again</h3>" +
+         CellTable(fidelity) + "</section>";
 }
 
 /// One line of a chart: broken where the number is undefined.
-std::string Line(const std::vector<ChunkDrift>& chunks, Number ChunkDrift::*what, double top, const char* classes) {
+std::string DriftLine(const std::vector<ChunkDrift>& chunks, Number ChunkDrift::*what, double top, const char* classes) {
   std::string path;
   bool pen = false;
   for (std::size_t i = 0; i < chunks.size(); ++i) {
@@ -110,9 +119,9 @@ std::string DriftChart(const std::vector<ChunkDrift>& chunks) {
     marks += fmt::format("<line class=\"axis\" x1=\"40\" x2=\"560\" y1=\"{0}\" y2=\"{0}\"/><text x=\"34\" y=\"{1}\" text-anchor=\"end\">{2}</text>",
                          y, y + 4, level_db);
   }
-  return "<svg viewBox=\"0 0 600 210\" width=\"600\" role=\"img\" aria-label=\"Decibels by chunk\">" + marks +
-         Line(chunks, &ChunkDrift::psnr, kTop_db, "real") + Line(chunks, &ChunkDrift::psnr_moving, kTop_db, "model") +
-         Line(chunks, &ChunkDrift::psnr_moving_copy, kTop_db, "model dash") +
+  return "<svg class=\"drift\" viewBox=\"0 0 600 210\" role=\"img\" aria-label=\"Decibels by chunk\">" + marks +
+         DriftLine(chunks, &ChunkDrift::psnr, kTop_db, "all") + DriftLine(chunks, &ChunkDrift::psnr_moving, kTop_db, "moving") +
+         DriftLine(chunks, &ChunkDrift::psnr_moving_copy, kTop_db, "still") +
          "<text x=\"300\" y=\"202\" text-anchor=\"middle\">chunks from the first to the last</text></svg>"
          "<p class=\"quiet\">dB. Blue: all pixels. Orange: pixels that move in reality. Dashed: those, had the first picture stood still.</p>";
 }
@@ -124,12 +133,12 @@ std::string Clips(const Fidelity& fidelity, const char* kind, std::optional<bool
   for (const FidelityRow& row : fidelity.input.rows) {
     if (row.kind != kind || row.real != truth || row.model != said) continue;
     if (row.real_video.empty() || row.model_video.empty() || ++shown > kShown) continue;
-    pairs += fmt::format("<figure class=\"pair\"><video src=\"{}\" controls muted preload=\"metadata\"></video><video src=\"{}\" controls muted "
+    pairs += fmt::format("<figure><video src=\"{}\" controls muted preload=\"metadata\"></video><video src=\"{}\" controls muted "
                          "preload=\"metadata\"></video><figcaption>{}, {}, state {}: real above, imagined below</figcaption></figure>",
                          Link(row.real_video), Link(row.model_video), Escaped(row.pair.task),
                          Escaped(PolicyLabel(row.pair.policy, row.pair.checkpoint)), Escaped(row.pair.initial_state));
   }
-  return pairs.empty() ? "<p class=\"quiet\">None.</p>" : "<div class=\"clips\">" + pairs + "</div>";
+  return pairs.empty() ? "<p class=\"quiet\">None.</p>" : "<div class=\"pairs\">" + pairs + "</div>";
 }
 
 std::string Headline(const Fidelity& fidelity) {
@@ -145,51 +154,57 @@ std::string Headline(const Fidelity& fidelity) {
 
 /// Outcomes, and how pictures drift apart.
 std::string WholeBody(const Fidelity& fidelity) {
-  std::string page = "<h1>How true is the world model?</h1>" + Headline(fidelity);
-  page += "<h2>Outcomes</h2>" + MatchTable(fidelity) + "<h2>Rates</h2>" + Scatter(fidelity) + CellTable(fidelity);
+  std::string page = Section("outcomes", "Outcomes") + MatchTable(fidelity) + "</section>" + Rates(fidelity);
   if (!fidelity.input.open_loop.chunks.empty())
-    page += "<h2>Pictures, recorded actions replayed</h2>" + DriftChart(fidelity.input.open_loop.chunks);
-  if (!fidelity.input.horizon.empty()) page += "<h2>Pictures, long rollouts</h2>" + DriftChart(fidelity.input.horizon);
-  const auto clips = [&](bool truth, bool said) { return Clips(fidelity, "closed_loop", truth, said); };
-  return page + "<h2>Successes of both</h2>" + clips(true, true) + "<h2>Failures of both</h2>" + clips(false, false) +
-         "<h2>Hallucinated</h2>" + clips(false, true) + "<h2>Missed</h2>" + clips(true, false);
+    page += Section("pictures", "Pictures, recorded actions replayed") + DriftChart(fidelity.input.open_loop.chunks) + "</section>";
+  if (!fidelity.input.horizon.empty())
+    page += Section("horizon", "Pictures, long rollouts") + DriftChart(fidelity.input.horizon) + "</section>";
+  const auto clips = [&](const char* title, bool truth, bool said) {
+    return "<h3>" + std::string(title) + "</h3>" + Clips(fidelity, "closed_loop", truth, said);
+  };
+  return page + Section("clips", "Clips") + clips("Hallucinated", false, true) + clips("Missed", true, false) +
+         clips("Successes of both", true, true) + clips("Failures of both", false, false) + "</section>";
 }
 
 std::string ChunkTable(const std::vector<ChunkDrift>& chunks) {
   std::string rows;
-  for (std::size_t i = 0; i < chunks.size(); ++i)
-    rows += fmt::format("<tr><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td></tr>", i + 1, chunks[i].clips,
-                        Decimal(chunks[i].psnr, 1), Decimal(chunks[i].psnr_moving, 1), Decimal(chunks[i].psnr_moving_copy, 1),
-                        Decimal(chunks[i].gripper_px, 1));
-  return "<div class=\"wide\"><table><thead><tr><th>chunk</th><th>clips</th><th>dB</th><th>dB of what moves</th><th>had it stood "
-         "still</th><th>gripper off by, pixels</th></tr></thead><tbody>" + rows + "</tbody></table></div>";
+  for (std::size_t i = 0; i < chunks.size(); ++i) {
+    rows += fmt::format("<tr><th scope=\"row\">{}</th><td class=\"num\">{}</td>", i + 1, chunks[i].clips);
+    for (const Number& number : {chunks[i].psnr, chunks[i].psnr_moving, chunks[i].psnr_moving_copy, chunks[i].gripper_px})
+      rows += "<td class=\"num\">" + Decimal(number, 1) + "</td>";
+    rows += "</tr>";
+  }
+  return TableHead({"chunk", "clips", "dB", "dB of what moves", "had it stood still", "gripper off by, pixels"}) + rows +
+         "</tbody></table></div>";
 }
 
 /// Pictures alone: recordings that nobody says the end of.
 std::string RecordedBody(const Fidelity& fidelity) {
   const std::vector<ChunkDrift>& chunks = fidelity.input.open_loop.chunks;
-  const std::string usable = fidelity.usable_horizon_chunks
+  return Section("pictures", "Pictures") + DriftChart(chunks) + ChunkTable(chunks) + "</section>" + Section("clips", "Clips") +
+         Clips(fidelity, "open_loop", std::nullopt, std::nullopt) + "</section>";
+}
+
+std::string RecordedHeadline(const Fidelity& fidelity) {
+  const std::string usable = fidelity.usable_horizon_chunks && *fidelity.usable_horizon_chunks > 0
                                  ? Counted(*fidelity.usable_horizon_chunks, "chunk")
                                  : "not a single chunk";
-  return fmt::format("<h1>How true is the world model to recordings?</h1><p>{} replayed, their actions given to the model from "
-                     "the first picture on. What moves is at least 2 dB better than a picture that stands still for {}. {} s "
-                     "per chunk.</p><p class=\"quiet\">Nobody says how recordings end: pictures are compared, not outcomes.</p>",
+  return fmt::format("<p>{} replayed, their actions given to the model from the first picture on. What moves is at least 2 dB "
+                     "better than a picture that stands still for {}. {} s per chunk.</p><p class=\"quiet\">Nobody says how "
+                     "recordings end: pictures are compared, not outcomes.</p>",
                      Counted(static_cast<std::int64_t>(fidelity.input.rows.size()), "recording"), usable,
-                     Decimal(fidelity.input.seconds_per_chunk, 2)) +
-         "<h2>Pictures</h2>" + DriftChart(chunks) + ChunkTable(chunks) + "<h2>Clips</h2>" +
-         Clips(fidelity, "open_loop", std::nullopt, std::nullopt);
+                     Decimal(fidelity.input.seconds_per_chunk, 2));
 }
 
 }  // namespace
 
 std::string FidelityPage(const Fidelity& fidelity) {
-  std::string page = "<!doctype html><html lang=\"en\"><head><meta charset=\"utf-8\"><meta name=\"viewport\" "
-                     "content=\"width=device-width,initial-scale=1\"><title>Fidelity of the world model</title><style>";
-  page += kStyle;
-  page += "</style></head><body>" + (fidelity.cells.empty() ? RecordedBody(fidelity) : WholeBody(fidelity));
-  page += fmt::format("<h2>Made from</h2><p class=\"quiet\">suite {:.16}…, world model {:.16}…</p></body></html>\n",
-                      fidelity.input.suite_hash, fidelity.input.model_hash);
-  return page;
+  const bool has_outcomes = !fidelity.cells.empty();
+  return PageHead("Fidelity of the world model", PageScripts::kNone, kStyle) + "<body><header><h1>How true is the world model?</h1></header>\n<main>" +
+         (has_outcomes ? Headline(fidelity) + WholeBody(fidelity) : RecordedHeadline(fidelity) + RecordedBody(fidelity)) +
+         fmt::format("<section id=\"provenance\"><h2>Made from</h2><p class=\"quiet\">suite {:.16}…, world model "
+                     "{:.16}…</p></section></main></body></html>\n",
+                     fidelity.input.suite_hash, fidelity.input.model_hash);
 }
 
 }  // namespace evac

@@ -117,7 +117,7 @@ std::string PageScript(PageScripts scripts) {
   return "";
 }
 
-std::string PageHead(const std::string& title, PageScripts scripts) {
+std::string PageHead(const std::string& title, PageScripts scripts, const std::string& more) {
   const bool is_live = scripts == PageScripts::kLive || scripts == PageScripts::kLiveReport;
   const std::string script = scripts == PageScripts::kNone ? "none" : HashOf(PageScript(scripts));
   const std::string served = is_live ? "connect-src 'self'; " : "";  // a page on a disk has nobody to connect to
@@ -128,7 +128,7 @@ std::string PageHead(const std::string& title, PageScripts scripts) {
          "<meta http-equiv=\"Content-Security-Policy\" content=\"default-src 'none'; img-src 'self' file: data:; "
          "media-src 'self' file:; style-src 'unsafe-inline'; " +
          served + "script-src '" + script + "'\">" + icon + "<title>" + Escaped(title) +
-         "</title>\n<style>" + ColoursCss() + ChartsCss() + PageCss() + "</style></head>\n";
+         "</title>\n<style>" + ColoursCss() + ChartsCss() + PageCss() + more + "</style></head>\n";
 }
 
 std::string Tag(const std::string& word) {

@@ -37,7 +37,8 @@ enum class PageScripts {
 };
 std::string PageScript(PageScripts scripts);
 /// From the doctype to </head>: styles, and a policy that forbids every script but these.
-std::string PageHead(const std::string& title, PageScripts scripts);
+/// @param more  styles of this page alone
+std::string PageHead(const std::string& title, PageScripts scripts, const std::string& more = "");
 
 /// "✓ success", with a class that colours it.
 std::string OutcomeBadge(Outcome outcome);

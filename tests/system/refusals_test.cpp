@@ -2,7 +2,6 @@
 #include <gtest/gtest.h>
 
 #include <filesystem>
-#include <fstream>
 
 #include "tests/support/command.h"
 #include "tests/support/temp_folder.h"
@@ -17,8 +16,8 @@ const std::string kSuite = EVAC_SOURCE_DIR "/tests/system/small.yaml";
 
 class Refusals : public ::testing::Test {
  protected:
-  CommandResult Run(const std::vector<std::string>& assignments) {
-    std::vector<std::string> words = {Binary("evac"), "run", kSuite, "--out", (folder_ / "run").string()};
+  CommandResult Run(const std::vector<std::string>& assignments, const std::string& suite = kSuite) {
+    std::vector<std::string> words = {Binary("evac"), "run", suite, "--out", (folder_ / "run").string()};
     for (const std::string& assignment : assignments) words.insert(words.end(), {"--set", assignment});
     return RunCommand(words);
   }
@@ -54,11 +53,9 @@ TEST_F(Refusals, AProgramThatIsNoPolicyIsRefusedAfterItsTimeToStart) {
 }
 
 TEST_F(Refusals, APolicyThatHangsFailsItsEpisodesAndTheBudgetEndsTheRunSayingSo) {
-  std::ofstream(folder_ / "freeze") << "#!/bin/sh\n"
-                                    << Binary("evac-policy") << " hold &\nsleep 3; kill -STOP $!; sleep 600\n";
-  std::filesystem::permissions(folder_ / "freeze", std::filesystem::perms::owner_all);
-  const CommandResult result = Run({"policies.0.command=[" + (folder_ / "freeze").string() + "]", "transport={deadline_s: 1, repeat_after_s: 0.3}",
-                                    "error_budget=0", "initial_states.count=40", "lanes=2"});
+  const CommandResult result = Run({"policies.0.command=[faulty-policy, --fault, hang]", "error_budget=0",
+                                    "transport={deadline_s: 1, repeat_after_s: 0.3}", "initial_states.count=40", "lanes=2"},
+                                   EVAC_SOURCE_DIR "/tests/system/faults.yaml");
   EXPECT_EQ(result.exit_code, 4);
   EXPECT_THAT(result.err, AllOf(HasSubstr("error budget"), HasSubstr("evac resume")));
 }
