@@ -8,6 +8,7 @@
 #include "worldmodel/evac_config.h"
 #include "worldmodel/nn/threads.h"
 #include "worldmodel/train/encode_shards.h"
+#include "worldmodel/train/trainable_weights.h"
 #include "worldmodel/train/weight_files.h"
 
 namespace evac {
@@ -16,11 +17,13 @@ namespace {
 struct EncodeArguments {
   std::string shards, config, codec;
   int threads = 0;
+  bool bf16 = false;
 };
 
 ExitCode Encode(const EncodeArguments& arguments) {
   const nn::ModelConfig config = ReadEvacConfig(arguments.config);
-  train::CheckpointWeights weights(arguments.codec);
+  train::CheckpointWeights file(arguments.codec);
+  train::TrainableWeights weights(file, arguments.bf16 ? at::kBFloat16 : at::kFloat);
   const nn::Vae vae(nn::Scope(weights, train::kCodecPrefix), config.vae);
   const nn::LibraryThreads threads(arguments.threads > 0
                                        ? arguments.threads
@@ -29,7 +32,7 @@ ExitCode Encode(const EncodeArguments& arguments) {
   const std::vector<std::filesystem::path> shards = train::ShardPaths(arguments.shards);
   std::size_t encoded = 0;
   for (const std::filesystem::path& shard : shards) {
-    const train::EncodeOptions options{codec, Sha256HexOfFile(shard)};
+    const train::EncodeOptions options{codec, Sha256HexOfFile(shard), arguments.bf16 ? "bfloat16" : "float32"};
     if (train::IsEncoded(shard, options)) continue;
     train::EncodeShard(vae, shard, options);
     fmt::print(stderr, "{}: encoded\n", train::LatentsPath(shard).string());
@@ -50,6 +53,8 @@ void AddEncode(CLI::App& app, ExitCode& exit_code) {
       ->required()
       ->check(CLI::ExistingFile);
   command->add_option("--threads", arguments->threads, "default: one per core")->check(CLI::Range(1, 1024));
+  command->add_flag("--bf16", arguments->bf16,
+                    "products in bf16: about twice as fast, latents less than a hundredth of their deviation off");
   command->footer(
       "Example:\n"
       "  evac encode out/shards --config apps/configs/desk_model.yaml --codec out/codec/codec.safetensors\n"

@@ -86,6 +86,7 @@ TEST(EncodeShard, WritesTheLatentsOfEveryPictureAndMap) {
   for (const auto& path : paths) EncodeShard(vae, path, options);
   EXPECT_TRUE(IsEncoded(paths[0], options));
   EXPECT_FALSE(IsEncoded(paths[0], {"another codec", "the shard's hash"}));
+  EXPECT_FALSE(IsEncoded(paths[0], {"the codec's hash", "the shard's hash", "bfloat16"}));
   ShardSet shards(folder.path(), Split::kHoldout);
   shards.OpenLatents(8, config.Stride());
   const Shard& shard = shards.shards().front();

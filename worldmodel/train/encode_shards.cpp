@@ -30,7 +30,8 @@ void EncodeShard(const nn::Vae& vae, const std::filesystem::path& shard, const E
                   {{"format", "evac-latents"},
                    {"version", "1"},
                    {"codec", options.codec},
-                   {"shard_sha256", options.shard_sha256}});
+                   {"shard_sha256", options.shard_sha256},
+                   {"products", options.products}});
 }
 
 bool IsEncoded(const std::filesystem::path& shard, const EncodeOptions& options) {
@@ -40,7 +41,8 @@ bool IsEncoded(const std::filesystem::path& shard, const EncodeOptions& options)
     const auto found = file.metadata().find(key);
     return found != file.metadata().end() && found->second == wanted;
   };
-  return says("codec", options.codec) && says("shard_sha256", options.shard_sha256);
+  return says("codec", options.codec) && says("shard_sha256", options.shard_sha256) &&
+         says("products", options.products);
 }
 
 }  // namespace evac::train
