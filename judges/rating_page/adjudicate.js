@@ -11,8 +11,7 @@ function unfold(answer, given) {
       make(`button.decision.${label}`, {type: 'button', 'data-decision': label, onclick: () => settle(label, answer.verdict.id, given)},
         words[label] + (label === given.label ? ' (keep)' : '')))));
   $('.answer').prepend(box);
-  document.querySelectorAll('.verdict').forEach(button => { button.hidden = true; });
-  $('.why').textContent = '';
+  $('.final').hidden = true;
   rating.isBusy = true;
   $(`[data-decision="${given.label}"]`, box).focus();
 }

@@ -1,5 +1,5 @@
 // What the lead sees. Numbers never without what they rest on.
-const percent = number => number.value === null ? '–' : `${(100 * number.value).toFixed(1)} %`;
+const percent = number => number.value === null ? '–' : `${(100 * number.value).toFixed(1)}\u00a0%`;
 const decimal = number => number.value === null ? '–' : number.value.toFixed(3);
 const range = number => number.low === undefined ? '' : `[${number.low.toFixed(2)}, ${number.high.toFixed(2)}]`;
 
@@ -8,7 +8,7 @@ async function board() {
   const {progress} = data;
   const screen = show(make('.board', {},
     make('header', {}, make('h1', {}, data.study), make('p.quiet', {}, `${progress.complete} of ${plural(progress.clips, 'clip')} have ${plural(data.raters_per_clip, 'vote')}; ${progress.votes} votes, ${progress.missing} missing` +
-      (progress.hours_left === null ? '' : `; ${progress.hours_left.toFixed(1)} h left at the pace of the last hour`) + (data.raters_excluded ? `; ${plural(data.raters_excluded, 'rater')} excluded` : ''))),
+      (progress.hours_left === null ? '' : `; ${progress.hours_left < 1 ? plural(Math.ceil(60 * progress.hours_left), 'minute') : progress.hours_left.toFixed(1) + ' h'} left at the pace of the last hour`) + (data.raters_excluded ? `; ${plural(data.raters_excluded, 'rater')} excluded` : ''))),
     ...notices(data),
     make('section.figures', {}, figure('Success', percent(data.all.majority), `majority of ${data.all.decided} decided clips`),
       figure('If undecided', `${percent(data.all.low)} … ${percent(data.all.high)}`, `${data.all.undecided} not decided`),
@@ -32,7 +32,8 @@ function notices(data) {
   for (const [world, index] of Object.entries(data.blinding))
     if (index.is_seen_through) lines.push(`Raters see which clips are ${world}: blinding index ${index.index.value.toFixed(2)} of ${plural(index.guesses, 'guess', 'guesses')}. Read comparisons of real and generated clips with care.`);
   if (data.all.far_apart) lines.push('Majority, soft, unanimous and Dawid–Skene rates differ by more than 3 points.');
-  for (const one of data.unplayable) lines.push(`${one.rater} could not play ${one.episode}: ${one.reason}.`);
+  const byEpisode = Map.groupBy ? Map.groupBy(data.unplayable, one => one.episode) : new Map(data.unplayable.map(one => [one.episode, [one]]));
+  for (const [episode, all] of byEpisode) lines.push(`${all.map(one => one.rater).join(', ')} could not play ${episode}: ${all[0].reason}.`);
   return lines.map(line => make('p.notice', {}, line));
 }
 

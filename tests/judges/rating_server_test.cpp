@@ -1,17 +1,15 @@
 #include "judges/rating_server.h"
 
-#include <arpa/inet.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-#include <netinet/in.h>
-#include <sys/socket.h>
-#include <unistd.h>
 
+#include <atomic>
 #include <nlohmann/json.hpp>
 #include <thread>
 
 #include "core/error.h"
 #include "tests/judges/rating_support.h"
+#include "tests/support/raw_http.h"
 
 namespace evac {
 namespace {
@@ -21,37 +19,9 @@ using testing::HasSubstr;
 using testing::Not;
 using testing::StartsWith;
 
-struct Heard {
-  int status = 0;
-  std::string head, body;
+struct Heard : RawAnswer {
   json Json() const { return json::parse(body); }
 };
-
-/// Exactly these bytes, and all that comes back until the other end closes.
-std::string Exchanged(int port, const std::string& bytes) {
-  const int socket = ::socket(AF_INET, SOCK_STREAM, 0);
-  sockaddr_in address{};
-  address.sin_family = AF_INET;
-  address.sin_port = htons(static_cast<std::uint16_t>(port));
-  inet_pton(AF_INET, "127.0.0.1", &address.sin_addr);
-  if (::connect(socket, reinterpret_cast<sockaddr*>(&address), sizeof address) != 0) return close(socket), "";
-  ::send(socket, bytes.data(), bytes.size(), MSG_NOSIGNAL);
-  std::string heard;
-  char piece[65536];
-  for (ssize_t count; (count = ::recv(socket, piece, sizeof piece, 0)) > 0;)
-    heard.append(piece, static_cast<std::size_t>(count));
-  close(socket);
-  return heard;
-}
-
-Heard Split(const std::string& answer) {
-  Heard heard;
-  const std::size_t end = answer.find("\r\n\r\n");
-  heard.head = answer.substr(0, end);
-  if (end != std::string::npos) heard.body = answer.substr(end + 4);
-  if (heard.head.size() > 12) heard.status = std::atoi(heard.head.c_str() + 9);
-  return heard;
-}
 
 /// A server at work over a small study, and what browsers and others say to it.
 class RatingServerTest : public testing::Test {
@@ -68,15 +38,12 @@ class RatingServerTest : public testing::Test {
     return options;
   }
 
-  Heard Raw(const std::string& bytes) const { return Split(Exchanged(server.port(), bytes)); }
+  Heard Raw(const std::string& bytes) const { return {RawExchange(server.port(), bytes)}; }
   Heard Get(const std::string& path, const std::string& headers = "") const {
     return Raw("GET " + path + " HTTP/1.1\r\nHost: 127.0.0.1\r\nConnection: close\r\n" + headers + "\r\n");
   }
   Heard Post(const std::string& path, const std::string& body, const std::string& headers) const {
-    return Raw(
-        "POST " + path +
-        " HTTP/1.1\r\nHost: 127.0.0.1\r\nConnection: close\r\nContent-Type: application/json\r\nContent-Length: " +
-        std::to_string(body.size()) + "\r\n" + headers + "\r\n" + body);
+    return {PostJson(server.port(), path, body, headers)};
   }
 
   /// Comes in by a link. @returns the headers of every later request.
@@ -253,12 +220,8 @@ TEST_F(RatingServerTest, WhoGuessesIsSlowedDown) {
 TEST_F(RatingServerTest, SlowClientsHinderNobody) {
   std::vector<int> slow;
   for (int i = 0; i < 200; ++i) {
-    const int socket = ::socket(AF_INET, SOCK_STREAM, 0);
-    sockaddr_in address{};
-    address.sin_family = AF_INET;
-    address.sin_port = htons(static_cast<std::uint16_t>(server.port()));
-    inet_pton(AF_INET, "127.0.0.1", &address.sin_addr);
-    ASSERT_EQ(::connect(socket, reinterpret_cast<sockaddr*>(&address), sizeof address), 0);
+    const int socket = ConnectTo(server.port());
+    ASSERT_GE(socket, 0);
     ::send(socket, "GET / HT", 8, MSG_NOSIGNAL);
     slow.push_back(socket);
   }

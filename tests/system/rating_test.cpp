@@ -47,7 +47,8 @@ TEST(RatingSession, PeopleRateInRealBrowsersAndNothingIsLost) {
 }
 
 TEST(RatingSession, ASheetComesInAndLabelsGoBackIntoTheRun) {
-  const StoredRun run("sheet", "sffs", "ssff");
+  StoredRun run("sheet", "sffs", "ssff");
+  { const Store closed = std::move(run.store()); }  // `evac rate resolve` writes into the run
   const std::string study = (run.folder().parent_path() / "study").string();
   ASSERT_EQ(Rate({"new", study, "--run", run.folder().string(), "--raters", "3", "--height", "64"}).exit_code, 0);
   const std::string good = (run.folder().parent_path() / "good.csv").string(), bad = good + ".bad";

@@ -289,7 +289,7 @@ def compare(ann, name):
 
 def leave(rater):
     browser = rater.browser
-    browser.js("leave()")
+    browser.js("void leave()")
     browser.wait("document.querySelector('#erase')")
     look(browser, "leave")
     browser.js("document.querySelector('#dialog button.bad').click()")
@@ -318,8 +318,7 @@ def adjudicate(judge):
         if decided == 0:
             look(browser, "adjudicate")
         browser.press("Enter")
-        browser.wait(f"rating.clip?.presentation !== {clip!r} && (rating.player || document.querySelector('.done'))")
-        browser.wait("document.querySelector('.done') || (document.querySelector('.rate') && !document.querySelector('.others'))")
+        browser.wait(f"document.querySelector('.done') || (rating.clip?.presentation !== {clip!r} && document.querySelector('.rate') && !document.querySelector('.others'))")
         decided += 1
     check(decided > 0, "there was something to decide", decided)
     check(json.loads(evac("status", STUDY, "--json"))["disputes"] == [], "no dispute is left")
