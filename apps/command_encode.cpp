@@ -54,7 +54,7 @@ void AddEncode(CLI::App& app, ExitCode& exit_code) {
       ->check(CLI::ExistingFile);
   command->add_option("--threads", arguments->threads, "default: one per core")->check(CLI::Range(1, 1024));
   command->add_flag("--bf16", arguments->bf16,
-                    "products in bf16: about twice as fast, latents less than a hundredth of their deviation off");
+                    "products in bf16: faster, two to three digits");
   command->footer(
       "Example:\n"
       "  evac encode out/shards --config apps/configs/desk_model.yaml --codec out/codec/codec.safetensors\n"

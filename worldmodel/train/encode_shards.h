@@ -12,7 +12,7 @@ namespace evac::train {
 struct EncodeOptions {
   std::string codec;         ///< SHA-256 of its weights, kept in the file
   std::string shard_sha256;  ///< of the shard's file, kept likewise
-  std::string products = "float32";  ///< what the codec computes with, kept likewise: "bfloat16" is twice as fast
+  std::string products = "float32";  ///< what the codec computes with, kept likewise; or "bfloat16"
 };
 
 /// Writes a shard's latents beside it (docs/formats/shards.md): the posterior's mean of every picture and map, scaled.
