@@ -34,7 +34,11 @@ bool IsLoopback(const std::string& host) { return host == "localhost" || host ==
 
 /// "127.0.0.1:8766" → "127.0.0.1", "[::1]:80" → "::1".
 std::string HostName(const std::string& header) {
-  if (header.starts_with('[')) return header.substr(1, header.find(']') - 1);
+  if (header.starts_with('[')) {
+    const std::size_t end = header.find(']');
+    const bool is_whole = end != std::string::npos && (end + 1 == header.size() || header[end + 1] == ':');
+    return is_whole ? header.substr(1, end - 1) : "";
+  }
   return header.substr(0, header.find(':'));
 }
 
@@ -92,7 +96,7 @@ struct RatingServer::Impl {
     if (asked.method != "GET" && asked.method != "HEAD" && asked.method != "POST")
       return Refused(405, "method", "GET, HEAD and POST alone");
     const bool is_named = !options.public_url.empty() && asked.host == PublicHost();
-    if (IsLoopback(options.host) && !is_named && !IsLoopback(HostName(asked.host)))
+    if (IsLoopback(options.host) && !is_named && !IsThisMachine(HostName(asked.host)))
       return Refused(403, "host", "another site's name points here");
     if (asked.method != "POST") return std::nullopt;
     if (!asked.origin.empty() && asked.origin != "http://" + asked.host && asked.origin != "https://" + asked.host)
@@ -102,6 +106,11 @@ struct RatingServer::Impl {
     if (!asked.content_type.starts_with("application/json"))
       return Refused(415, "type", "Content-Type: wanted application/json");
     return std::nullopt;
+  }
+
+  /// Exactly: "127.0.0.1.evil.example" is somebody else's.
+  bool IsThisMachine(const std::string& name) const {
+    return name == "localhost" || name == "127.0.0.1" || name == "::1" || name == options.host;
   }
 
   std::string PublicHost() const {

@@ -164,6 +164,10 @@ TEST_F(RatingServerTest, OtherSitesChangeNothing) {
   EXPECT_EQ(Post("/api/tab", "{}", ann + "Origin: null\r\n").status, 403);
   EXPECT_EQ(Post("/api/tab", "{}", ann + "Sec-Fetch-Site: cross-site\r\n").status, 403);
   EXPECT_EQ(Post("/api/tab", "{}", ann + "Origin: http://127.0.0.1\r\nSec-Fetch-Site: same-origin\r\n").status, 200);
+  for (const std::string host :
+       {"127.0.0.1.evil.example", "127.evil.example", "localhost.evil.example", "[::1].evil", ""})
+    EXPECT_EQ(Raw("GET /api/me HTTP/1.1\r\nHost: " + host + "\r\nConnection: close\r\n" + ann + "\r\n").status, 403)
+        << host;
   EXPECT_EQ(Raw("GET /api/me HTTP/1.1\r\nHost: evil.example\r\nConnection: close\r\n" + ann + "\r\n").status, 403)
       << "a name that was made to point here";
   EXPECT_EQ(Raw("POST /api/tab HTTP/1.1\r\nHost: 127.0.0.1\r\nConnection: close\r\nContent-Type: "
