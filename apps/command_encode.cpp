@@ -1,7 +1,11 @@
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <atomic>
+#include <future>
 #include <memory>
 #include <thread>
+#include <vector>
 
 #include "apps/commands.h"
 #include "core/hash.h"
@@ -20,25 +24,36 @@ struct EncodeArguments {
   bool bf16 = false;
 };
 
+int ThreadsOf(const EncodeArguments& arguments) {
+  const auto cores = static_cast<int>(std::thread::hardware_concurrency());
+  return arguments.threads > 0 ? arguments.threads : std::max(1, cores);
+}
+
 ExitCode Encode(const EncodeArguments& arguments) {
   const nn::ModelConfig config = ReadEvacConfig(arguments.config);
   train::CheckpointWeights file(arguments.codec);
   train::TrainableWeights weights(file, arguments.bf16 ? at::kBFloat16 : at::kFloat);
   const nn::Vae vae(nn::Scope(weights, train::kCodecPrefix), config.vae);
-  const nn::LibraryThreads threads(arguments.threads > 0
-                                       ? arguments.threads
-                                       : std::max(1, static_cast<int>(std::thread::hardware_concurrency())));
   const std::string codec = Sha256HexOfFile(arguments.codec);
   const std::vector<std::filesystem::path> shards = train::ShardPaths(arguments.shards);
-  std::size_t encoded = 0;
-  for (const std::filesystem::path& shard : shards) {
-    const train::EncodeOptions options{codec, Sha256HexOfFile(shard), arguments.bf16 ? "bfloat16" : "float32"};
-    if (train::IsEncoded(shard, options)) continue;
-    train::EncodeShard(vae, shard, options);
-    fmt::print(stderr, "{}: encoded\n", train::LatentsPath(shard).string());
-    ++encoded;
-  }
-  fmt::print("{}: latents of {} shards, {} of them new\n", arguments.shards, shards.size(), encoded);
+  const nn::LibraryThreads one_each(1);
+  std::atomic<std::size_t> next = 0, encoded = 0;
+  // Each thread takes a shard of its own: threads that share a picture's layers wait for each other after each of them.
+  const auto work = [&] {
+    nn::UseLibraryThreadsHere(1);
+    for (std::size_t i = next++; i < shards.size(); i = next++) {
+      const train::EncodeOptions options{codec, Sha256HexOfFile(shards[i]), arguments.bf16 ? "bfloat16" : "float32"};
+      if (train::IsEncoded(shards[i], options)) continue;
+      train::EncodeShard(vae, shards[i], options);
+      fmt::print(stderr, "{}: encoded, {} of {}\n", train::LatentsPath(shards[i]).string(), ++encoded, shards.size());
+    }
+  };
+  std::vector<std::future<void>> others;
+  for (int thread = 1; thread < ThreadsOf(arguments); ++thread)
+    others.push_back(std::async(std::launch::async, work));
+  work();
+  for (std::future<void>& other : others) other.get();
+  fmt::print("{}: latents of {} shards, {} of them new\n", arguments.shards, shards.size(), encoded.load());
   return ExitCode::kOk;
 }
 
