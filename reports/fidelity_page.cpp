@@ -76,19 +76,6 @@ std::string CellTable(const Fidelity& fidelity) {
   return TableHead({"policy, task", "pairs", "real", "real again", "imagined", "agreement"}) + rows + "</tbody></table></div>";
 }
 
-/// The same policy looks the same on every task.
-std::vector<PointStyle> StylesOf(const WorldComparison& comparison) {
-  std::vector<std::string> policies, tasks;
-  const auto place = [](std::vector<std::string>& names, const std::string& name) {
-    const auto index = static_cast<std::size_t>(std::ranges::find(names, name) - names.begin());
-    if (index == names.size()) names.push_back(name);
-    return index;
-  };
-  std::vector<PointStyle> styles;
-  for (const ComparedPoint& point : comparison.points) styles.push_back({place(policies, point.policy), place(tasks, point.task)});
-  return styles;
-}
-
 std::string Rates(const Fidelity& fidelity) {
   const std::string title = Section("rates", "Rates");
   if (fidelity.model.points.empty()) return title + "<p>No cell has a rate in both worlds.</p>" + CellTable(fidelity) + "</section>";

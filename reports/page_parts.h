@@ -14,6 +14,8 @@ std::string FindingsPart(const RunSummary& summary);                          //
 std::string RatesPart(const ReportData& report);
 std::string TrustPart(const ReportData& report);
 std::string ScatterPart(const RunSummary& summary);
+/// One per point: the same policy looks the same on every task, in the order in which they come.
+std::vector<PointStyle> StylesOf(const WorldComparison& comparison);
 /// The scatter of one comparison, its statistics and its points.
 std::string ComparisonPart(const WorldComparison& comparison, const std::vector<PointStyle>& styles);
 std::string StatesPart(const RunSummary& summary, const PageOptions& options);

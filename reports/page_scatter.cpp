@@ -157,6 +157,19 @@ std::string ComparisonPart(const WorldComparison& comparison, const std::vector<
          ByTaskTable(comparison) + "</div></div>" + PointsTable(comparison, styles) + LeftOut(comparison);
 }
 
+std::vector<PointStyle> StylesOf(const WorldComparison& comparison) {
+  std::vector<std::string> policies, tasks;
+  const auto place = [](std::vector<std::string>& names, const std::string& name) {
+    const auto index = static_cast<std::size_t>(std::ranges::find(names, name) - names.begin());
+    if (index == names.size()) names.push_back(name);
+    return index;
+  };
+  std::vector<PointStyle> styles;
+  for (const ComparedPoint& point : comparison.points)
+    styles.push_back({place(policies, point.policy), place(tasks, point.task)});
+  return styles;
+}
+
 std::vector<PointStyle> StylesOf(const RunSummary& summary, const WorldComparison& comparison) {
   std::vector<PointStyle> styles;
   for (const ComparedPoint& point : comparison.points) {

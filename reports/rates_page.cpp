@@ -40,20 +40,6 @@ std::string Overview(const std::vector<CorrelationGroup>& groups) {
                 "MMRV. They take the points as drawn at random.</p></section>\n";
 }
 
-std::vector<PointStyle> StylesOf(const CorrelationGroup& group) {
-  std::vector<std::string> policies, tasks;
-  const auto place = [](std::vector<std::string>& names, const std::string& name) {
-    const auto found = std::find(names.begin(), names.end(), name);
-    const auto index = static_cast<std::size_t>(found - names.begin());
-    if (found == names.end()) names.push_back(name);
-    return index;
-  };
-  std::vector<PointStyle> styles;
-  for (const CorrelationPoint& point : group.points)
-    styles.push_back({place(policies, point.policy), place(tasks, point.task)});
-  return styles;
-}
-
 bool FitsIntoChart(const CorrelationGroup& group) {
   return std::ranges::all_of(group.points, [](const CorrelationPoint& point) {
     return point.real_sr >= 0 && point.real_sr <= 1 && point.sim_sr >= 0 && point.sim_sr <= 1;
@@ -72,8 +58,9 @@ std::string RatesPage(const std::vector<CorrelationGroup>& groups, const std::st
       Counted(static_cast<std::int64_t>(groups.size()), "group"), Counted(static_cast<std::int64_t>(points), "point"));
   html += Overview(groups);
   for (const CorrelationGroup& group : groups) {
+    const WorldComparison comparison = AsComparison(group);
     html += fmt::format("<section id=\"{}\"><h2>{}</h2>", Id(group), Breakable(group.group)) +
-            ComparisonPart(AsComparison(group), StylesOf(group)) + "</section>\n";
+            ComparisonPart(comparison, StylesOf(comparison)) + "</section>\n";
   }
   return html + fmt::format("<p class=\"quiet\">{}</p></main></body></html>\n", Escaped(program));
 }
@@ -81,8 +68,9 @@ std::string RatesPage(const std::vector<CorrelationGroup>& groups, const std::st
 std::vector<ChartFile> ChartFilesOf(const std::vector<CorrelationGroup>& groups) {
   std::vector<NamedDrawing> drawings;
   for (const CorrelationGroup& group : groups) {
-    if (FitsIntoChart(group))
-      drawings.push_back({group.group, group.group, ScatterDrawing(AsComparison(group), StylesOf(group))});
+    if (!FitsIntoChart(group)) continue;
+    const WorldComparison comparison = AsComparison(group);
+    drawings.push_back({group.group, group.group, ScatterDrawing(comparison, StylesOf(comparison))});
   }
   return AsFiles(drawings);
 }
