@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <map>
 #include <set>
+#include <tuple>
 
 #include "core/config.h"
 #include "core/error.h"
@@ -62,16 +63,24 @@ std::vector<std::string> TasksOf(const RunData& data) {
   return ids;
 }
 
-void CountEpisodes(const std::vector<JudgedEpisode>& episodes, double confidence, RateCell& cell) {
-  std::vector<const JudgedEpisode*> members;
-  std::set<std::string> states;
+using Members = std::vector<const JudgedEpisode*>;
+using CellPlace = std::tuple<std::string, std::string, std::string>;  // task, policy, world
+
+/// Every episode once, by its cell.
+std::map<CellPlace, Members> MembersOf(const std::vector<JudgedEpisode>& episodes) {
+  std::map<CellPlace, Members> cells;
   for (const JudgedEpisode& judged : episodes) {
     const EpisodeKey& key = judged.episode.key;
-    if (key.pair.task != cell.task || key.world != cell.world) continue;
-    if (PolicyLabel(key.pair.policy, key.pair.checkpoint) != cell.policy) continue;
-    ++cell.counts[static_cast<std::size_t>(judged.outcome)];
-    members.push_back(&judged);
-    if (judged.Counts()) states.insert(key.pair.initial_state);
+    cells[{key.pair.task, PolicyLabel(key.pair.policy, key.pair.checkpoint), key.world}].push_back(&judged);
+  }
+  return cells;
+}
+
+void CountEpisodes(const Members& members, double confidence, RateCell& cell) {
+  std::set<std::string> states;
+  for (const JudgedEpisode* judged : members) {
+    ++cell.counts[static_cast<std::size_t>(judged->outcome)];
+    if (judged->Counts()) states.insert(judged->episode.key.pair.initial_state);
   }
   cell.states = static_cast<std::int64_t>(states.size());
   if (!members.empty()) cell.rate = RateOf(members, confidence);
@@ -79,6 +88,7 @@ void CountEpisodes(const std::vector<JudgedEpisode>& episodes, double confidence
 
 std::vector<RateCell> AllCells(const RunSummary& summary) {
   std::vector<RateCell> rates;
+  std::map<CellPlace, Members> members = MembersOf(summary.episodes);
   for (const Task& task : summary.data.tasks) {
     for (const std::string& policy : summary.policies) {
       for (const WorldInfo& world : summary.data.worlds) {
@@ -86,7 +96,7 @@ std::vector<RateCell> AllCells(const RunSummary& summary) {
         cell.task = task.id;
         cell.policy = policy;
         cell.world = world.name;
-        CountEpisodes(summary.episodes, summary.options.confidence, cell);
+        CountEpisodes(members[{task.id, policy, world.name}], summary.options.confidence, cell);
         if (cell.Apart() + cell.Of(Outcome::kSuccess) + cell.Of(Outcome::kFailure) > 0)
           rates.push_back(std::move(cell));
       }
