@@ -24,7 +24,7 @@ CommandResult Rate(std::vector<std::string> words) {
 }
 
 TEST(RatingSession, PeopleRateInRealBrowsersAndNothingIsLost) {
-  const StoredRun run("session", "sfsfsfsfsfsfsfsfsfsf", "sffssffssffssffssffs", 16);
+  const StoredRun run("session", "sfsfsfsfsfsfsfsfsfsf", "sffssffssffssffssffs", 10);
   const std::string study = (run.folder().parent_path() / "study").string();
   const CommandResult made =
       Rate({"new", study, "--run", run.folder().string(), "--gold-from", "oracle", "--height", "96"});

@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """A rating session as people have it, in real browsers: rating_page.py EVAC STUDY [FOLDER_FOR_SCREENSHOTS].
 
-Three raters, an adjudicator and a lead; two tabs, a reload in a clip, a line that goes away, a server that is killed, undo, a clip that does
+Three raters at once, an adjudicator and a lead; two tabs, a reload in a clip, a line that goes away, a server that is killed, undo, a clip that does
 not play, somebody who leaves. Prints "ok: …" and "failed: …"; exit code 1 if anything failed, 77 without a browser.
 """
 import json
@@ -11,6 +11,7 @@ import signal
 import subprocess
 import sys
 import time
+from concurrent.futures import ThreadPoolExecutor
 
 try:
     import websocket  # noqa: F401
@@ -174,6 +175,16 @@ def first_rater(server, ann):
     look(browser, "done")
 
 
+def other_rater(rater, label_of):
+    rater.join()
+    rater.browser.press("Enter")
+    rater.browser.wait("document.querySelector('.rate')")
+    rater.fast()
+    rater.practise()
+    rater.rate_all(label_of)
+    rater.guess()
+
+
 def reload(browser):
     browser.js("window.isOld = true")
     browser.call("Page.reload")
@@ -332,15 +343,11 @@ def main():
         for link, name in zip(links("rater", 4, server.url), ["Ann", "Bob", "Cleo", "Dan"]):
             people.append(Rater(link, name))
         ann, bob, cleo, dan = people
-        first_rater(server, ann)
-        for rater, label_of in ((bob, lambda k: "failure" if k % 3 == 0 else "success"), (cleo, lambda k: "success")):
-            rater.join()
-            rater.browser.press("Enter")
-            rater.browser.wait("document.querySelector('.rate')")
-            rater.fast()
-            rater.practise()
-            rater.rate_all(label_of)
-            rater.guess()
+        at_once = [(first_rater, server, ann), (other_rater, bob, lambda k: "failure" if k % 3 == 0 else "success"),
+                   (other_rater, cleo, lambda k: "success")]
+        with ThreadPoolExecutor(len(at_once)) as threads:
+            for rated in [threads.submit(*work) for work in at_once]:
+                rated.result()
         for rater in (ann, bob, cleo):
             compare(rater, rater.name)
             check(len(rater.said) >= 24, f"{rater.name} rated 24 clips or more", len(rater.said))
