@@ -220,7 +220,10 @@ std::vector<Verdict> Store::Verdicts() const { return database_->Read(rows::Sele
 
 std::map<std::string, std::map<std::string, Verdict>> Store::CurrentVerdicts() const {
   std::map<std::string, std::map<std::string, Verdict>> current;
-  for (Verdict& verdict : Verdicts()) current[verdict.episode_id].insert_or_assign(verdict.judge, verdict);
+  for (Verdict& verdict : Verdicts()) {
+    Verdict& place = current[verdict.episode_id][verdict.judge];
+    place = std::move(verdict);
+  }
   return current;
 }
 

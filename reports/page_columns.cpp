@@ -31,10 +31,17 @@ std::string ClauseOf(const std::string& words) {
   return clause;
 }
 
+/// Digits per row; of one value alone every row is known.
+std::size_t WidthOf(const Column& column) {
+  std::size_t width = 0;
+  for (std::size_t room = 1; room < column.values().size(); room *= kDigits.size()) ++width;
+  return width;
+}
+
 std::size_t Size(const Column& column) {
   std::size_t bytes = 0;
   for (const std::string& value : column.values()) bytes += value.size() + 3;
-  return bytes + column.rows().size() * 2;
+  return bytes + column.rows().size() * WidthOf(column);
 }
 
 }  // namespace
@@ -46,12 +53,11 @@ void Column::Add(const std::string& value) {
 }
 
 nlohmann::ordered_json Column::Json() const {
-  int width = 1;
-  for (std::size_t room = kDigits.size(); room < values_.size(); room *= kDigits.size()) ++width;
+  const std::size_t width = WidthOf(*this);
   std::string digits;
-  digits.reserve(rows_.size() * static_cast<std::size_t>(width));
+  digits.reserve(rows_.size() * width);
   for (const std::uint32_t row : rows_) {
-    for (int place = width - 1; place >= 0; --place) digits += kDigits[(row >> (6 * place)) & 63];
+    for (std::size_t place = width; place > 0; --place) digits += kDigits[(row >> (6 * (place - 1))) & 63];
   }
   return {{"v", values_}, {"w", width}, {"s", digits}};
 }
@@ -82,7 +88,7 @@ nlohmann::ordered_json TextColumn::Json(std::size_t most_bytes) const {
   if (Size(words_) <= most_bytes) return {{"column", words_.Json()}, {"numbers", nullptr}, {"cut", "numbers"}};
   if (Size(clauses_) <= most_bytes) return {{"column", clauses_.Json()}, {"numbers", nullptr}, {"cut", "clauses"}};
   Column none;
-  for (std::size_t i = 0; i < words_.rows().size(); ++i) none.Add("");
+  none.Add("");
   return {{"column", none.Json()}, {"numbers", nullptr}, {"cut", "all"}};
 }
 

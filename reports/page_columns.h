@@ -12,7 +12,7 @@
 namespace evac {
 
 /// One value per row, of few different ones. `Json` gives {"v": [values, in order of first appearance], "w": digits per
-/// row, "s": the rows' digits}.
+/// row, "s": the rows' digits}; of one value alone the rows need none: "w" is 0 and "s" empty.
 class Column {
  public:
   void Add(const std::string& value);

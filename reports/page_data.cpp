@@ -13,6 +13,9 @@ using Json = nlohmann::ordered_json;
 /// Of all sentences of a page together: what a page of 5 MB has room for beside the rest.
 constexpr std::size_t kMostTextBytes = 2'400'000;
 
+/// Stands for a file that lies where nearly all do: videos/ID.mp4, thumbs/ID.jpg. No path of a run is this.
+constexpr const char* kWhereItsIdSays = "=";
+
 /// "11100": which stages were reached, in the rubric's order; "" where the verdict does not tell.
 std::string StagesOf(const JudgedEpisode& judged, const Task* task) {
   std::string reached;
@@ -43,9 +46,9 @@ class EpisodeColumns {
     const std::size_t share = kMostTextBytes / (2 + others_.size());
     json["reason"] = reason_.Json(share);
     json["end"] = end_.Json(share);
-    json["other_videos"] = videos_;
-    json["other_thumbnails"] = thumbnails_;
-    json["embedded"] = embedded_;
+    json["video"] = video_.Json();
+    json["thumbnail"] = thumbnail_.Json();
+    json["embedded"] = {{"at", embedded_at_}, {"jpeg", embedded_}};
     json["judges"] = Json::array();
     for (const Other& other : others_)
       json["judges"].push_back(
@@ -79,14 +82,15 @@ class EpisodeColumns {
     AddOthers(episode);
   }
 
-  /// Nearly all lie where their id says; the others are named.
   void AddFiles(const Episode& episode, std::size_t index) {
     const std::string id = episode.key.Id();
-    if (episode.video != "videos/" + id + ".mp4") videos_[std::to_string(index)] = episode.video;
-    if (episode.thumbnail != "thumbs/" + id + ".jpg") thumbnails_[std::to_string(index)] = episode.thumbnail;
+    video_.Add(episode.video == "videos/" + id + ".mp4" ? kWhereItsIdSays : episode.video);
+    thumbnail_.Add(episode.thumbnail == "thumbs/" + id + ".jpg" ? kWhereItsIdSays : episode.thumbnail);
     if (!options_.embedded || episode.thumbnail.empty()) return;
     const std::string bytes = options_.embedded(episode.thumbnail);
-    if (!bytes.empty()) embedded_[std::to_string(index)] = Base64(bytes);
+    if (bytes.empty()) return;
+    embedded_at_.push_back(index);
+    embedded_.push_back(Base64(bytes));
   }
 
   void AddOthers(const Episode& episode) {
@@ -106,10 +110,11 @@ class EpisodeColumns {
   const RunSummary& summary_;
   const PageOptions& options_;
   std::map<std::string, const Task*> tasks_by_id_;
-  Column task_, state_, policy_, file_, seed_, world_, outcome_, stop_, stages_;
+  Column task_, state_, policy_, file_, seed_, world_, outcome_, stop_, stages_, video_, thumbnail_;
   TextColumn reason_, end_;
   std::vector<Other> others_;
-  Json videos_ = Json::object(), thumbnails_ = Json::object(), embedded_ = Json::object();  // by the episode's number
+  std::vector<std::size_t> embedded_at_;  ///< the numbers of the episodes whose pictures are in `embedded_`
+  std::vector<std::string> embedded_;     ///< base64 of JPEGs
 };
 
 Json TasksJson(const RunSummary& summary) {

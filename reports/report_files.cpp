@@ -13,10 +13,6 @@
 
 namespace evac {
 
-std::vector<ReportFile> ReportFiles(const RunSummary& summary, const PageOptions& options) {
-  return ReportFiles(ReportDataOf(summary), options);
-}
-
 std::vector<ReportFile> ReportFiles(const ReportData& report, const PageOptions& options) {
   const RunSummary& summary = report.summary;
   std::vector<ShownGate> gates;

@@ -18,7 +18,6 @@ struct ReportFile {
 /// badge.svg, rates.csv, verdicts.csv (docs/formats has a page for each). A pure function of the run: the same store,
 /// the same bytes.
 std::vector<ReportFile> ReportFiles(const ReportData& report, const PageOptions& options);
-std::vector<ReportFile> ReportFiles(const RunSummary& summary, const PageOptions& options);
 
 /// What `evac gate --out` writes: gate.json, junit.xml, summary.md, badge.svg, of this decision alone.
 std::vector<ReportFile> GateFiles(const RunSummary& summary, const GateDecision& decision);

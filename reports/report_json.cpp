@@ -104,26 +104,37 @@ Json GatesJson(const RunSummary& summary) {
   return json;
 }
 
-Json EpisodesJson(const RunSummary& summary) {
-  Json json = Json::array();
+Json EpisodeJson(const JudgedEpisode& judged) {
+  const Episode& episode = judged.episode;
+  return {{"id", episode.key.Id()},
+          {"task", episode.key.pair.task},
+          {"initial_state", episode.key.pair.initial_state},
+          {"policy", episode.key.pair.policy},
+          {"checkpoint", episode.key.pair.checkpoint},
+          {"world", episode.key.world},
+          {"seed", episode.key.pair.seed},
+          {"outcome", Name(judged.outcome)},
+          {"verdict_reason", judged.verdict ? Json(judged.verdict->reason) : Json(nullptr)},
+          {"stop", Name(episode.stop)},
+          {"stop_reason", episode.stop_reason},
+          {"failure", episode.failure},
+          {"video", episode.video},
+          {"video_sha256", episode.video_sha256}};
+}
+
+std::string Dumped(const Json& json, int indent) {
+  return json.dump(indent, ' ', false, Json::error_handler_t::replace);
+}
+
+/// A line each: as one document in memory, those of a large run would need ten times the file's size.
+void AppendEpisodes(const RunSummary& summary, std::string& text) {
+  text += "\"episodes\": [";
+  const char* lead = "\n  ";
   for (const JudgedEpisode& judged : summary.episodes) {
-    const Episode& episode = judged.episode;
-    json.push_back({{"id", episode.key.Id()},
-                    {"task", episode.key.pair.task},
-                    {"initial_state", episode.key.pair.initial_state},
-                    {"policy", episode.key.pair.policy},
-                    {"checkpoint", episode.key.pair.checkpoint},
-                    {"world", episode.key.world},
-                    {"seed", episode.key.pair.seed},
-                    {"outcome", Name(judged.outcome)},
-                    {"verdict_reason", judged.verdict ? Json(judged.verdict->reason) : Json(nullptr)},
-                    {"stop", Name(episode.stop)},
-                    {"stop_reason", episode.stop_reason},
-                    {"failure", episode.failure},
-                    {"video", episode.video},
-                    {"video_sha256", episode.video_sha256}});
+    text += lead + Dumped(EpisodeJson(judged), -1);
+    lead = ",\n  ";
   }
-  return json;
+  text += "\n ]";
 }
 
 Json ProvenanceJson(const RunSummary& summary, const std::string& program) {
@@ -160,10 +171,13 @@ std::string ReportJson(const RunSummary& summary, const std::string& program) {
   Json json = {{"schema", kReportJsonSchema}, {"findings", FindingsJson(summary)}, {"rates", RatesJson(summary)}};
   json["comparisons"] = ComparisonsJson(summary);
   json["gates"] = GatesJson(summary);
-  json["episodes"] = EpisodesJson(summary);
   json["counters"] = summary.data.counters;
   json["provenance"] = ProvenanceJson(summary, program);
-  return json.dump(1, ' ', false, Json::error_handler_t::replace) + "\n";
+  std::string text = Dumped(json, 1);
+  text.resize(text.rfind("\n}"));
+  text += ",\n ";
+  AppendEpisodes(summary, text);
+  return text + "\n}\n";
 }
 
 }  // namespace evac

@@ -21,8 +21,8 @@ const run = (() => {
   [..."ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789-_"].forEach((c, i) => { digits[c.charCodeAt(0)] = i; });
 
   const column = ({v, w, s}) => {
-    const rows = new Uint32Array(s.length / w);
-    for (let i = 0, at = 0; i < rows.length; ++i) {
+    const rows = new Uint32Array(data.n);
+    for (let i = 0, at = 0; w > 0 && i < rows.length; ++i) {
       let row = 0;
       for (let place = 0; place < w; ++place) row = row << 6 | digits[s.charCodeAt(at++)];
       rows[i] = row;
@@ -45,7 +45,7 @@ const run = (() => {
   };
 
   const e = data.episodes, columns = {};
-  for (const name of ["task", "state", "policy", "seed", "world", "file", "stages", "outcome", "stop"]) columns[name] = column(e[name]);
+  for (const name of ["task", "state", "policy", "seed", "world", "file", "stages", "outcome", "stop", "video", "thumbnail"]) columns[name] = column(e[name]);
   const judges = e.judges.map(judge => ({name: judge.name, label: column(judge.label), reason: sentences(judge.reason)}));
   const count = data.n;
 
@@ -56,13 +56,15 @@ const run = (() => {
 
   const idOf = i => `${columns.world.of(i)}/${columns.task.of(i)}/${columns.file.of(i)}/${columns.state.of(i)}-s${columns.seed.of(i)}`;
   const linkOf = path => path && data.run + path.split("/").map(encodeURIComponent).join("/");
+  const fileOf = (column, i, usual) => linkOf(column.of(i) === "=" ? usual() : column.of(i));
+  const embedded = new Map(e.embedded.at.map((at, k) => [at, "data:image/jpeg;base64," + e.embedded.jpeg[k]]));
   let indexById = null;
   return {
     ...columns, count, judges, data,
     reason: sentences(e.reason), end: sentences(e.end),
     id: idOf,
-    video: i => linkOf(e.other_videos[i] ?? `videos/${idOf(i)}.mp4`),
-    thumbnail: i => e.embedded[i] ? "data:image/jpeg;base64," + e.embedded[i] : linkOf(e.other_thumbnails[i] ?? `thumbs/${idOf(i)}.jpg`),
+    video: i => fileOf(columns.video, i, () => `videos/${idOf(i)}.mp4`),
+    thumbnail: i => embedded.get(i) ?? fileOf(columns.thumbnail, i, () => `thumbs/${idOf(i)}.jpg`),
     taskOf: i => data.tasks[columns.task.of(i)] ?? {ratio: "", period_s: 0.1, stages: []},
     // All worlds' episodes of i's initial state, policy and seed: the real one first.
     together: i => {

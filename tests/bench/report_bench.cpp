@@ -83,8 +83,9 @@ void ReportOfARun(benchmark::State& state) {
   Write(folder / "run", {static_cast<int>(state.range(0)), 5, 3});
   std::size_t page = 0;
   for (auto _ : state) {
-    const RunSummary summary = Summarise(ReadRun(Store::Open(folder / "run", Store::Mode::kReadOnly)), {});
-    for (const ReportFile& file : ReportFiles(summary, {"..", "evac bench"})) {
+    const ReportData report =
+        ReportDataOf(Summarise(ReadRun(Store::Open(folder / "run", Store::Mode::kReadOnly)), {}));
+    for (const ReportFile& file : ReportFiles(report, {"..", "evac bench"})) {
       if (file.name == "index.html") page = file.bytes.size();
       benchmark::DoNotOptimize(file.bytes.data());
     }

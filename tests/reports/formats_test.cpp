@@ -26,7 +26,7 @@ const std::string kHostileTask = "take, \"the\" <bottle>\t&";
 
 std::map<std::string, std::string> FilesOf(const RunSummary& summary) {
   std::map<std::string, std::string> files;
-  for (const ReportFile& file : ReportFiles(summary, {"..", "evac test"})) files[file.name] = file.bytes;
+  for (const ReportFile& file : ReportFiles(ReportDataOf(summary), {"..", "evac test"})) files[file.name] = file.bytes;
   return files;
 }
 
