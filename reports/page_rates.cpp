@@ -63,7 +63,7 @@ std::vector<std::string> ByRealRate(const RunSummary& summary) {
   return policies;
 }
 
-std::string TaskTable(const RunSummary& summary, const Task& task) {
+std::string TaskTable(const RunSummary& summary, const std::vector<RateCell>& rates, const Task& task) {
   std::string html = fmt::format(
       "<div class=\"task\"><h3>{}</h3><p class=\"quiet\">“{}”</p><table class=\"rates\"><thead><tr><th "
       "scope=\"col\">world</th>"
@@ -75,7 +75,7 @@ std::string TaskTable(const RunSummary& summary, const Task& task) {
       Escaped(task.id), Escaped(task.instruction), RateScale(), 100 * summary.options.confidence);
   for (const std::string& policy : ByRealRate(summary)) {
     std::string rows;
-    for (const RateCell& cell : summary.rates) {
+    for (const RateCell& cell : rates) {
       if (cell.task == task.id && cell.policy == policy) rows += Row(summary, cell);
     }
     if (!rows.empty())
@@ -83,6 +83,40 @@ std::string TaskTable(const RunSummary& summary, const Task& task) {
                           Escaped(policy), rows);
   }
   return html + "</table></div>";
+}
+
+std::string TaskTables(const RunSummary& summary, const std::vector<RateCell>& rates) {
+  std::string html = "<div class=\"tasks\">";
+  for (const Task& task : summary.data.tasks) html += TaskTable(summary, rates, task);
+  return html + "</div>";
+}
+
+/// One judge's tables behind a button of its own; that of the judge whose verdicts this page counts is pressed. Works
+/// without script.
+std::string JudgeTab(std::size_t index, const std::string& judge, const std::string& tables) {
+  return fmt::format(
+      "<input type=\"radio\" class=\"sr\" name=\"rates-judge\" id=\"rates-judge-{0}\"{1}><label "
+      "for=\"rates-judge-{0}\">{2}</label><div class=\"panel\">{3}</div>",
+      index, index == 0 ? " checked" : "", Escaped(judge), tables);
+}
+
+std::string TablesByJudge(const ReportData& report) {
+  const RunSummary& summary = report.summary;
+  const std::string own = TaskTables(summary, summary.rates);
+  if (report.by_judge.empty()) return own;
+  std::string html = "<div class=\"tabs\" role=\"group\" aria-label=\"Whose verdicts are counted\"><span "
+                     "class=\"quiet\">Verdicts of</span>" +
+                     JudgeTab(0, summary.options.judge, own);
+  for (std::size_t i = 0; i < report.by_judge.size(); ++i) {
+    const auto& [judge, rates] = report.by_judge[i];
+    html += JudgeTab(i + 1, judge,
+                     fmt::format("<p class=\"quiet\">As <b>{}</b> sees the same episodes. All else on this page counts "
+                                 "the verdicts of <b>{}</b>; how far the two agree stands under <a "
+                                 "href=\"#judges\">Judges</a>.</p>",
+                                 Escaped(judge), Escaped(summary.options.judge)) +
+                         TaskTables(summary, rates));
+  }
+  return html + "</div>";
 }
 
 }  // namespace
@@ -102,9 +136,7 @@ std::string RatesPart(const ReportData& report) {
   }
   html += "</p>";
   if (summary.rates.empty()) return html + "<p>The run holds no episodes yet.</p></section>";
-  html += "<div class=\"tasks\">";
-  for (const Task& task : summary.data.tasks) html += TaskTable(summary, task);
-  return html + "</div></section>";
+  return html + TablesByJudge(report) + "</section>";
 }
 
 }  // namespace evac

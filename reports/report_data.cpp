@@ -84,6 +84,7 @@ ReportData ReportDataOf(RunSummary summary, const ReportOptions& options) {
   report.letters =
       GiveLetters(report.summary.episodes, 1 - report.summary.options.confidence, report.summary.rates);
   const RunSummary& run = report.summary;
+  report.by_judge = RatesOfOtherJudges(run);
   report.baseline = BaselineOf(run, options.baseline);
   report.world = !run.reference.empty() || run.data.worlds.empty() ? run.reference : run.data.worlds.front().name;
   if (!report.baseline.empty()) report.candidates = CandidatesOf(run, report.baseline, report.world);

@@ -32,6 +32,7 @@ struct ReportData {
   std::string world;                  ///< where candidates are compared: the real one, else the first
   std::vector<Candidate> candidates;  ///< in the order declared
   LetterTests letters;                ///< what the letters of `summary.rates` rest on
+  std::vector<JudgeRates> by_judge;   ///< the rates as each other judge counts them
   std::vector<TrustReport>
       trust;                     ///< one per world beside the real one; empty where there is nothing to hold it against
   std::string no_trust;          ///< why `trust` is empty, else empty

@@ -7,6 +7,7 @@
 
 #include "core/config.h"
 #include "core/error.h"
+#include "reports/letters.h"
 
 namespace evac {
 namespace {
@@ -86,9 +87,10 @@ void CountEpisodes(const Members& members, double confidence, RateCell& cell) {
   if (!members.empty()) cell.rate = RateOf(members, confidence);
 }
 
-std::vector<RateCell> AllCells(const RunSummary& summary) {
+/// In the orders that the summary has, of these episodes.
+std::vector<RateCell> AllCells(const RunSummary& summary, const std::vector<JudgedEpisode>& episodes) {
   std::vector<RateCell> rates;
-  std::map<CellPlace, Members> members = MembersOf(summary.episodes);
+  std::map<CellPlace, Members> members = MembersOf(episodes);
   for (const Task& task : summary.data.tasks) {
     for (const std::string& policy : summary.policies) {
       for (const WorldInfo& world : summary.data.worlds) {
@@ -150,9 +152,20 @@ RunSummary Summarise(RunData data, const SummaryOptions& options) {
     if (world.is_real && summary.reference.empty()) summary.reference = world.name;
   }
   summary.data = std::move(data);
-  summary.rates = AllCells(summary);
+  summary.rates = AllCells(summary, summary.episodes);
   summary.comparisons = ComparisonsOf(summary);
   return summary;
+}
+
+std::vector<JudgeRates> RatesOfOtherJudges(const RunSummary& summary) {
+  std::vector<JudgeRates> others;
+  for (const std::string& judge : summary.judges) {
+    if (judge == summary.options.judge || judge.starts_with("human:")) continue;
+    const std::vector<JudgedEpisode> episodes = Judged(summary.data, judge);
+    JudgeRates& other = others.emplace_back(JudgeRates{judge, AllCells(summary, episodes)});
+    GiveLetters(episodes, 1 - summary.options.confidence, other.rates);
+  }
+  return others;
 }
 
 }  // namespace evac

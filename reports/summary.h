@@ -63,4 +63,12 @@ struct RunSummary {
 /// @throws InvalidInput unless 0 < confidence < 1 and bootstrap_replicates > 0.
 RunSummary Summarise(RunData data, const SummaryOptions& options);
 
+/// The same episodes as another judge counts them: `rates` as they would be with `options.judge` = `judge`.
+struct JudgeRates {
+  std::string judge;
+  std::vector<RateCell> rates;
+};
+/// Of every other judge that gave a verdict; not of single raters, whose votes are counted as judge `human`.
+std::vector<JudgeRates> RatesOfOtherJudges(const RunSummary& summary);
+
 }  // namespace evac

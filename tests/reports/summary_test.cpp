@@ -1,9 +1,11 @@
 #include "reports/summary.h"
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include "core/error.h"
 #include "core/statistics/rates.h"
+#include "reports/page.h"
 #include "reports/run_correlation.h"
 #include "tests/reports/sample_run.h"
 
@@ -47,6 +49,33 @@ TEST(Summary, AnErrorStaysAnErrorWhateverAJudgeSays) {
   verdict.label = Label::kSuccess;
   run.store().AddVerdict(verdict);
   EXPECT_EQ(CellOf(run.Summary(), "pick@good", "real").Of(Outcome::kError), 1);
+}
+
+TEST(Summary, OtherJudgesCountTheSameEpisodesWithTheirOwnVerdicts) {
+  SampleRun run({{"take_bottle", "pick", "good", "sse", "ss"}, {"take_bottle", "pick", "bad", "fff", "ff"}});
+  for (const Episode& episode : run.store().Episodes()) {
+    Verdict verdict;
+    verdict.episode_id = episode.key.Id();
+    verdict.label = episode.key.pair.checkpoint == "bad" ? Label::kSuccess : Label::kFailure;
+    for (const std::string judge : {"human", "human:ann"}) {
+      verdict.judge = judge;
+      run.store().AddVerdict(verdict);
+    }
+  }
+  const RunSummary summary = run.Summary();
+  const std::vector<JudgeRates> others = RatesOfOtherJudges(summary);
+  ASSERT_EQ(others.size(), 1u) << "one rater's votes are no judge of their own";
+  EXPECT_EQ(others[0].judge, "human");
+  const std::vector<RateCell> counted = run.Summary({.judge = "human"}).rates;
+  ASSERT_EQ(others[0].rates.size(), counted.size());
+  for (std::size_t i = 0; i < counted.size(); ++i) {
+    EXPECT_EQ(others[0].rates[i].policy, counted[i].policy);
+    EXPECT_EQ(others[0].rates[i].counts, counted[i].counts);
+    EXPECT_EQ(*others[0].rates[i].rate.value, counted[i].policy == "pick@bad" ? 1 : 0);
+  }
+  const std::string page = ReportPage(summary, {".", "evac test"});
+  EXPECT_THAT(page, testing::HasSubstr("id=\"rates-judge-1\">"));
+  EXPECT_THAT(page, testing::HasSubstr("As <b>human</b> sees the same episodes"));
 }
 
 TEST(Summary, CountsOneJudgeAndItsLastWord) {
