@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <map>
+#include <tuple>
 
 #include "judges/rating_votes.h"
 
@@ -61,9 +62,11 @@ Json ClipsJson(const std::vector<RatedClip>& clips) {
   return rows;
 }
 
-Json RatersJson(const StudyStore& store, const std::map<std::int64_t, StudyClip>& clips, double period_s) {
+Json RatersJson(const StudyStore& store, const std::vector<StudyStore::Ballot>& ballots,
+                const std::map<std::int64_t, StudyClip>& clips) {
+  const double period_s = store.info().period_s;
   std::map<std::int64_t, std::vector<StudyStore::Ballot>> by_rater;
-  for (StudyStore::Ballot& ballot : store.Ballots()) by_rater[ballot.rater].push_back(ballot);
+  for (const StudyStore::Ballot& ballot : ballots) by_rater[ballot.rater].push_back(ballot);
   Json rows = Json::array();
   for (const StudyRater& rater : store.Raters()) {
     const RaterQuality quality = QualityOfRater(by_rater[rater.id], clips, period_s);
@@ -130,21 +133,44 @@ Json ProgressJson(const StudyStore& store, const std::vector<RatedClip>& clips, 
   return json;
 }
 
+std::map<std::string, std::string> VersionsByHash(const StudyStore& store) {
+  std::map<std::string, std::string> versions;
+  for (const StudyRubric& rubric : store.Rubrics())
+    versions[rubric.hash] = Json::parse(rubric.document).value("version", "");
+  return versions;
+}
+
+/// By task, world and rubric: verdicts by different rubrics are in no rate together. Sorts the clips so that each group
+/// lies together.
+Json RatesJson(const StudyStore& store, std::vector<RatedClip>& clips) {
+  const std::map<std::string, std::string> versions = VersionsByHash(store);
+  const auto group = [&versions](const RatedClip& rated) {
+    const StudyClip& clip = rated.clip;
+    return std::tie(clip.task, clip.world, versions.at(clip.rubric_hash), clip.rubric_hash);
+  };
+  std::ranges::stable_sort(clips, {}, group);
+  Json rates = Json::array();
+  for (auto begin = clips.begin(); begin != clips.end();) {
+    const auto end =
+        std::find_if(begin, clips.end(), [&](const RatedClip& clip) { return group(clip) != group(*begin); });
+    Json row = ToJson(RatesOf({begin, end}));
+    row["task"] = begin->clip.task;
+    row["world"] = begin->clip.world;
+    row["rubric"] = versions.at(begin->clip.rubric_hash);
+    rates.push_back(std::move(row));
+    begin = end;
+  }
+  return rates;
+}
+
 }  // namespace
 
 Json RatingBoard(const StudyStore& store, std::int64_t now_ms) {
   const StudyInfo info = store.info();
   std::map<std::int64_t, StudyClip> by_id;
   for (StudyClip& clip : store.Clips()) by_id[clip.id] = std::move(clip);
-  const std::vector<RatedClip> clips = RatedClips(store);
-  Json rates = Json::array();
-  std::map<std::pair<std::string, std::string>, std::vector<RatedClip>> groups;
-  for (const RatedClip& clip : clips) groups[{clip.clip.task, clip.clip.world}].push_back(clip);
-  for (const auto& [group, of_group] : groups) {
-    rates.push_back(ToJson(RatesOf(of_group)));
-    rates.back()["task"] = group.first;
-    rates.back()["world"] = group.second;
-  }
+  const std::vector<StudyStore::Ballot> ballots = store.Ballots();
+  std::vector<RatedClip> clips = RatedClips(store, ballots);
   const std::vector<std::int64_t> disputes = store.Disputes();
   Json leases = Json::array(), unplayable = Json::array();
   for (const Presentation& lease : store.Leases(now_ms))
@@ -157,19 +183,22 @@ Json RatingBoard(const StudyStore& store, std::int64_t now_ms) {
                           {"reason", one.reason}});
   std::int64_t excluded = 0;
   for (const StudyRater& rater : store.Raters()) excluded += rater.counts ? 0 : 1;
+  Json rows = ClipsJson(clips);  // in the study's order
+  Json progress = ProgressJson(store, clips, now_ms), agreement = AgreementJson(clips, info.raters_per_clip);
+  Json all = ToJson(RatesOf(clips)), rates = RatesJson(store, clips);
   return {{"study", info.name},
           {"raters_per_clip", info.raters_per_clip},
-          {"progress", ProgressJson(store, clips, now_ms)},
+          {"progress", std::move(progress)},
           {"raters_excluded", excluded},
-          {"all", ToJson(RatesOf(clips))},
-          {"rates", rates},
-          {"agreement", AgreementJson(clips, info.raters_per_clip)},
+          {"all", std::move(all)},
+          {"rates", std::move(rates)},
+          {"agreement", std::move(agreement)},
           {"blinding", BlindingJson(store, by_id)},
-          {"raters", RatersJson(store, by_id, info.period_s)},
+          {"raters", RatersJson(store, ballots, by_id)},
           {"disputes", disputes},
           {"leases", leases},
           {"unplayable", unplayable},
-          {"clips", ClipsJson(clips)}};
+          {"clips", std::move(rows)}};
 }
 
 }  // namespace evac

@@ -29,7 +29,7 @@ double CategoryOf(const std::string& label) { return label == "success" ? 1 : la
 
 using Ratings = std::vector<std::vector<std::optional<double>>>;
 
-Ratings RatingsOf(const std::vector<RatedClip>& clips) {
+Ratings RatingsOf(std::span<const RatedClip> clips) {
   std::set<std::int64_t> raters;
   for (const RatedClip& clip : clips) {
     for (const auto& [rater, ballot] : clip.by_rater) raters.insert(rater);
@@ -45,7 +45,7 @@ Ratings RatingsOf(const std::vector<RatedClip>& clips) {
   return ratings;
 }
 
-Number DawidSkeneRate(const std::vector<RatedClip>& clips) {
+Number DawidSkeneRate(std::span<const RatedClip> clips) {
   const Ratings ratings = RatingsOf(clips);
   if (ratings.empty()) return Undefined{"no votes"};
   RaterCounts counts;
@@ -154,7 +154,9 @@ Resolution Resolve(const std::vector<Vote>& votes, const std::optional<std::stri
   return resolution;
 }
 
-std::vector<RatedClip> RatedClips(const StudyStore& store) {
+std::vector<RatedClip> RatedClips(const StudyStore& store) { return RatedClips(store, store.Ballots()); }
+
+std::vector<RatedClip> RatedClips(const StudyStore& store, const std::vector<StudyStore::Ballot>& ballots) {
   const std::int64_t wanted_valid = std::min(2, store.info().raters_per_clip);
   std::vector<RatedClip> clips;
   std::map<std::int64_t, std::size_t> index;
@@ -163,7 +165,7 @@ std::vector<RatedClip> RatedClips(const StudyStore& store) {
     index[clip.id] = clips.size();
     clips.push_back({.clip = std::move(clip)});
   }
-  for (StudyStore::Ballot& ballot : store.Ballots()) {
+  for (const StudyStore::Ballot& ballot : ballots) {
     const auto found = index.find(ballot.clip);
     if (found == index.end() || ballot.showing == Showing::kRepeat || ballot.showing == Showing::kPractice) continue;
     RatedClip& clip = clips[found->second];
@@ -176,7 +178,7 @@ std::vector<RatedClip> RatedClips(const StudyStore& store) {
   return clips;
 }
 
-LabelRates RatesOf(const std::vector<RatedClip>& clips) {
+LabelRates RatesOf(std::span<const RatedClip> clips) {
   LabelRates rates;
   std::int64_t successes = 0, unanimous = 0, unanimous_successes = 0, with_votes = 0;
   double soft = 0;

@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <map>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -33,6 +34,8 @@ struct RatedClip {
 
 /// Every clip of the study but practice, in its order, with its votes.
 std::vector<RatedClip> RatedClips(const StudyStore& store);
+/// The same of votes that were read already.
+std::vector<RatedClip> RatedClips(const StudyStore& store, const std::vector<StudyStore::Ballot>& ballots);
 
 /// The rates of some clips side by side; where they are far apart, a majority hides something.
 struct LabelRates {
@@ -44,7 +47,7 @@ struct LabelRates {
   Number low = Undefined{"no clips"}, high = Undefined{"no clips"};  ///< if all undecided were failures, successes
   bool far_apart = false;                                            ///< the first four differ by more than 3 points
 };
-LabelRates RatesOf(const std::vector<RatedClip>& clips);
+LabelRates RatesOf(std::span<const RatedClip> clips);
 
 struct RatingAgreement {
   Number alpha = Undefined{"no votes"};                ///< Krippendorff's, nominal, of success, failure and cannot tell

@@ -49,8 +49,9 @@ function ratersTable(data) {
 }
 
 function ratesTable(data) {
+  const hasRubrics = data.rates.some(rate => data.rates.some(other => other.task === rate.task && other.rubric !== rate.rubric));
   return table(['Task, world', 'Clips', 'Decided', 'Majority', 'Soft', 'Unanimous', 'Dawid–Skene', 'Bounds'], data.rates.map(rate => [
-    `${rate.task}, ${rate.world}`, String(rate.clips), String(rate.decided), percent(rate.majority), percent(rate.soft), percent(rate.unanimous), percent(rate.dawid_skene), `${percent(rate.low)} … ${percent(rate.high)}`]), 'Rates');
+    `${rate.task}, ${rate.world}${hasRubrics ? `, rubric ${rate.rubric}` : ''}`, String(rate.clips), String(rate.decided), percent(rate.majority), percent(rate.soft), percent(rate.unanimous), percent(rate.dawid_skene), `${percent(rate.low)} … ${percent(rate.high)}`]), 'Rates');
 }
 
 /** Clips by raters, a letter each; disputes first. */

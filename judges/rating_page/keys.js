@@ -1,23 +1,28 @@
 // Every key has one meaning; none has any while somebody writes. Two maps: keys for the left and for the right hand.
-const keyHelp = [
+const keyHelp = [  // [keys, meaning, the right hand's]
   ['Space', 'play, pause'], ['J  L', 'one second back, on'], [',  .', 'one frame back, on'], ['Home  End', 'first, last frame'],
-  ['[  ]', 'slower, faster'], ['R', 'again from the start'], ['A', 'loop the last two seconds'],
-  ['S  F  U', 'success, failure, cannot tell'], ['1 … 5', 'stage reached'], ['Shift+1 … 5  V', 'one view alone, all views'],
-  ['X, then 1 … 6', 'flags'], ['N', 'note (Esc leaves it)'], ['Z', 'undo the last verdict'], ['H', 'what you said'], ['?', 'this help, and the task'],
+  ['[  ]', 'slower, faster'], ['R', 'again from the start', 'O'], ['A', 'loop the last two seconds', 'P'],
+  ['S  F  U', 'success, failure, cannot tell', 'K  ;  U'], ['1 … 5', 'stage reached', '6 … 0'],
+  ['Shift+1 … 5  V', 'one view alone, all views', 'Shift+6 … 0  M'], ['X, then 1 … 6', 'flags', 'Y, then 6 … 0 and -'],
+  ['N', 'note (Esc leaves it)'], ['Z', 'undo the last verdict', 'Backspace'], ['H', 'what you said'], ['?', 'this help, and the task'],
 ];
-/** The same for the right hand alone: keys beside each other, none used twice. */
-const rightHand = {K: 'S', ';': 'F', I: 'U', O: 'R', P: 'A'};
+/** What the left hand's keys are to the right hand: keys beside each other, none used twice. The others are there already. */
+const rightHand = {K: 'S', ';': 'F', O: 'R', P: 'A', M: 'V', Y: 'X', Backspace: 'Z'};
+const rightDigits = ['Digit6', 'Digit7', 'Digit8', 'Digit9', 'Digit0', 'Minus'];
+const isRightHanded = () => localStorage.getItem('evac-keys') === 'right';
 let areFlagsOpen = false;
 
 function openHelp() {
   rating.player?.video.pause();
-  const isRight = localStorage.getItem('evac-keys') === 'right';
   const hand = make('input', {type: 'checkbox', id: 'hand'});
-  hand.checked = isRight;
-  hand.addEventListener('change', () => localStorage.setItem('evac-keys', hand.checked ? 'right' : 'left'));
+  hand.checked = isRightHanded();
+  const list = make('dl.keys', {});
+  const fill = () => list.replaceChildren(...keyHelp.map(([key, meaning, right]) => make('div', {},
+    make('dt', {}, (isRightHanded() && right || key).split('  ').map(one => make('kbd', {}, one))), make('dd', {}, meaning))));
+  fill();
+  hand.addEventListener('change', () => { localStorage.setItem('evac-keys', hand.checked ? 'right' : 'left'); fill(); });
   const clip = rating.clip;
-  ask('Keys', [make('dl.keys', {}, keyHelp.map(([key, meaning]) => make('div', {}, make('dt', {}, key.split('  ').map(one => make('kbd', {}, one))), make('dd', {}, meaning)))),
-    make('label.check', {for: 'hand'}, hand, 'Keys for the right hand too: K success, ; failure, I cannot tell, O again, P loop'),
+  ask('Keys', [list, make('label.check', {for: 'hand'}, hand, 'Keys for the right hand'),
     clip ? rubricCard(clip.rubric) : null].filter(Boolean), [['Close', null, 'primary']]);
 }
 
@@ -60,12 +65,13 @@ function onRateScreen(event) {
   if (!player) return false;
   const isButton = event.target.matches('button, summary') && (event.key === ' ' || event.key === 'Enter');
   if (isButton) return false;
-  const digit = /^Digit([1-9])$/.exec(event.code);
+  const digit = /^(?:Digit|Numpad)([1-9])$/.exec(event.code), right = isRightHanded() ? rightDigits.indexOf(event.code) : -1;
+  if (right >= 0) return onDigit(right, event.shiftKey, player), true;
   if (digit) return onDigit(Number(digit[1]) - 1, event.shiftKey, player), true;
   if (event.key === '?') return openHelp(), true;
-  if (event.key === 'Z' || event.key === 'z') return undo(), true;
   let key = event.key.length === 1 ? event.key.toUpperCase() : event.key;
-  if (localStorage.getItem('evac-keys') === 'right' && rightHand[key]) key = rightHand[key];
+  if (isRightHanded() && rightHand[key]) key = rightHand[key];
+  if (key === 'Z') return undo(), true;
   const act = acts[key];
   if (!act || (event.repeat && 'SFUXNHRA'.includes(key))) return false;
   if (session.isOther) return true;

@@ -41,9 +41,10 @@ RatedClip Rated(const std::vector<std::string>& labels) {
 }
 
 TEST(Rates, UndecidedClipsAreBoundsNotFailures) {
-  const LabelRates rates =
-      RatesOf({Rated({"success", "success", "success"}), Rated({"failure", "failure", "failure"}),
-               Rated({"success", "failure", "cannot_tell"}), Rated({"success", "success", "failure"})});
+  const std::vector<RatedClip> clips = {Rated({"success", "success", "success"}), Rated({"failure", "failure", "failure"}),
+                                        Rated({"success", "failure", "cannot_tell"}),
+                                        Rated({"success", "success", "failure"})};
+  const LabelRates rates = RatesOf(clips);
   EXPECT_EQ(rates.decided, 3);
   EXPECT_EQ(rates.undecided, 1);
   EXPECT_NEAR(*rates.majority, 2.0 / 3, 1e-12);

@@ -14,12 +14,14 @@ namespace evac {
 /// A run on disk, as `evac run` leaves it: task take, policy pick@1, worlds real and sim; its store can grow.
 class StoredRun {
  public:
-  /// @param real, sim  a letter per initial state: s success, f failure.
-  StoredRun(const std::string& name, const std::string& real, const std::string& sim, int frames = 4)
+  /// @param real, sim  a letter per initial state: s success, f failure. @param rubric  its version.
+  StoredRun(const std::string& name, const std::string& real, const std::string& sim, int frames = 4,
+            const std::string& rubric = "v1")
       : name_(name),
+        rubric_(rubric),
         frames_(frames),
         store_(Store::CreateOrContinue(folder(), {"suite: " + name, "hash-" + name, "suite.yaml", "test"})) {
-    store_.AddTask(TakeTask());
+    store_.AddTask(TakeTask(rubric));
     store_.AddWorld({"real", "mujoco", true, "real-profile"});
     store_.AddWorld({"sim", "mujoco", false, "sim-profile"});
     store_.AddPolicy({"pick", "1", "{}"});
@@ -35,7 +37,7 @@ class StoredRun {
   }
 
  private:
-  static Task TakeTask() {
+  static Task TakeTask(const std::string& rubric) {
     Task task;
     task.id = "take";
     task.instruction = "Take it.";
@@ -48,7 +50,7 @@ class StoredRun {
     camera.cx_px = 32;
     camera.cy_px = 24;
     task.cameras = {camera};
-    task.rubric.version = "v1";
+    task.rubric.version = rubric;
     task.rubric.success = "It is taken.";
     task.rubric.stages.resize(2);
     task.rubric.stages[0].name = "reach";
@@ -83,12 +85,12 @@ class StoredRun {
     verdict.label = outcome == 's' ? Label::kSuccess : Label::kFailure;
     verdict.stages = {{"reach", true}, {"grasp", outcome == 's'}};
     verdict.reason = outcome == 's' ? "grasped at 1.5 s" : "never grasped; nearest 0.04 m";
-    verdict.rubric_version = "v1";
+    verdict.rubric_version = rubric_;
     store_.AddVerdict(verdict);
   }
 
   TempFolder parent_;
-  std::string name_;
+  std::string name_, rubric_;
   int frames_;
   Store store_;
 };

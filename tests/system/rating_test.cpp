@@ -83,6 +83,32 @@ TEST(RatingSession, ASheetComesInAndLabelsGoBackIntoTheRun) {
   EXPECT_EQ(nlohmann::json::parse(lines.substr(0, lines.find('\n'))).at("note"), "clean, quick");
 }
 
+TEST(RatingSession, VerdictsByTwoRubricsAreInOneRateOnlyWhenAskedFor) {
+  StoredRun before("before", "ss", "ss", 4, "v1"), after("after", "", "", 4, "v2");
+  after.Add("42-0000", 's', 's');
+  { const Store closed = std::move(before.store()), too = std::move(after.store()); }
+  const std::string study = (before.folder().parent_path() / "study").string(), sheet = study + ".csv";
+  const auto import_votes_of = [&](const std::string& state) {
+    std::ofstream(sheet) << "episode,rater,label\nreal/take/pick@1/" << state << "-s1,ann,success\nreal/take/pick@1/"
+                         << state << "-s1,bob,success\n";
+    return Rate({"import", study, sheet}).exit_code;
+  };
+  for (const StoredRun* run : {&before, &after})
+    ASSERT_EQ(Rate({"new", study, "--run", run->folder().string(), "--height", "64"}).exit_code, 0);
+  ASSERT_EQ(import_votes_of("41-0000"), 0);
+  EXPECT_EQ(Rate({"resolve", study}).exit_code, 0) << "one rubric alone was voted by";
+  ASSERT_EQ(import_votes_of("42-0000"), 0);
+  const CommandResult refused = Rate({"resolve", study});
+  EXPECT_EQ(refused.exit_code, 2);
+  EXPECT_THAT(refused.err, HasSubstr("task take: was rated by 2 rubrics; --mix-rubrics"));
+  EXPECT_EQ(Rate({"resolve", study, "--mix-rubrics"}).exit_code, 0);
+  const auto rates = nlohmann::json::parse(Rate({"status", study, "--json"}).out).at("rates");
+  ASSERT_EQ(rates.size(), 4u) << "two worlds, two rubrics";
+  EXPECT_EQ(rates[0].at("rubric"), "v1");
+  EXPECT_EQ(rates[0].at("clips"), 2);
+  EXPECT_EQ(rates[1].at("rubric"), "v2");
+}
+
 TEST(RatingSession, WrongWordsAreRefusedWithWhatWasWanted) {
   const StoredRun run("refused", "s", "f");
   const std::string study = (run.folder().parent_path() / "study").string();
