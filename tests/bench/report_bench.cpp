@@ -3,6 +3,9 @@
 #include <fmt/format.h>
 #include <sys/resource.h>
 
+#include <cstdlib>
+#include <fstream>
+
 #include "core/statistics/paired_bootstrap.h"
 #include "core/store.h"
 #include "reports/gate.h"
@@ -77,6 +80,11 @@ double PeakMebibytes() {
   return static_cast<double>(usage.ru_maxrss) / 1024;
 }
 
+/// For tests/bench/report_paint.py.
+void KeepPage(const std::string& html) {
+  if (const char* path = std::getenv("EVAC_BENCH_PAGE")) std::ofstream(path, std::ios::binary) << html;
+}
+
 /// Everything `evac report` writes but the charts' files, from a store on disk.
 void ReportOfARun(benchmark::State& state) {
   const TempFolder folder;
@@ -86,7 +94,7 @@ void ReportOfARun(benchmark::State& state) {
     const ReportData report =
         ReportDataOf(Summarise(ReadRun(Store::Open(folder / "run", Store::Mode::kReadOnly)), {}));
     for (const ReportFile& file : ReportFiles(report, {"..", "evac bench"})) {
-      if (file.name == "index.html") page = file.bytes.size();
+      if (file.name == "index.html") page = file.bytes.size(), KeepPage(file.bytes);
       benchmark::DoNotOptimize(file.bytes.data());
     }
   }

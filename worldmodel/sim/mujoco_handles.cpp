@@ -62,12 +62,16 @@ Eigen::Isometry3d PoseOf(const mjtNum* position, const mjtNum* rotation) {
 }
 
 void PrepareMujoco() {
-  UseSoundBoxContacts();
-  mju_user_warning = [](const char*) {};
-  mju_user_error = [](const char* message) {  // may not return and may not throw through C
-    std::fprintf(stderr, "MuJoCo: %s\n", message);
-    std::_Exit(static_cast<int>(ExitCode::kInternal));
-  };
+  static const bool kIsPrepared = [] {  // once, however many threads come here first
+    UseSoundBoxContacts();
+    mju_user_warning = [](const char*) {};
+    mju_user_error = [](const char* message) {  // may not return and may not throw through C
+      std::fprintf(stderr, "MuJoCo: %s\n", message);
+      std::_Exit(static_cast<int>(ExitCode::kInternal));
+    };
+    return true;
+  }();
+  static_cast<void>(kIsPrepared);
 }
 
 }  // namespace evac::sim

@@ -44,7 +44,8 @@ Eigen::Isometry3d PoseOf(const mjtNum* position, const mjtNum* rotation);
 
 /// Sends MuJoCo's warnings nowhere (each scene reads its own counts) and its fatal errors to stderr and exit code 4;
 /// without this it would write files into the working directory and wait for a key. Repairs its box contacts
-/// (box_contacts.h). Process-wide; call before the first model.
+/// (box_contacts.h). Process-wide; call before the first model, from any
+/// thread and as often as you like.
 void PrepareMujoco();
 
 }  // namespace evac::sim
