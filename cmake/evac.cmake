@@ -18,6 +18,18 @@ if(EVAC_SANITIZE)
   add_link_options(-fsanitize=${EVAC_SANITIZE})
 endif()
 
+# A release is for whoever waits for it to compile, too: what only passes data on (apps, tests) with -O1, which is 25 to
+# 40 % less to compile, the rest with -O2, and the worlds and the network with -O3.
+function(evac_optimise target level)
+  target_compile_options(${target} PRIVATE $<$<CONFIG:Release>:${level}>)
+endfunction()
+
+# cmake/prelude.h, and what else is given, is compiled once for the target. (One for many targets: they would have to
+# agree in every option.)
+function(evac_precompile target)
+  target_precompile_headers(${target} PRIVATE ${CMAKE_SOURCE_DIR}/cmake/prelude.h ${ARGN})
+endfunction()
+
 # evac_module(NAME [LIBRARIES ...]): all .cpp files below this folder, except those in EXCLUDE.
 function(evac_module name)
   cmake_parse_arguments(ARG "" "" "LIBRARIES;EXCLUDE" ${ARGN})
@@ -32,6 +44,7 @@ function(evac_module name)
   endif()
   add_library(evac_${name} STATIC ${sources})
   target_link_libraries(evac_${name} PUBLIC evac_options ${ARG_LIBRARIES})
+  evac_precompile(evac_${name})
 endfunction()
 
 # evac_test(NAME [LIBRARIES ...]): all *_test.cpp below this folder become the binary bin/NAME_test, run by ctest.
@@ -43,6 +56,8 @@ function(evac_test name)
   endif()
   add_executable(${name}_test ${sources})
   target_link_libraries(${name}_test PRIVATE evac_options evac_test_support ${ARG_LIBRARIES} GTest::gmock GTest::gtest_main)
+  evac_optimise(${name}_test -O1)
+  evac_precompile(${name}_test <gmock/gmock.h>)
   target_compile_definitions(${name}_test PRIVATE EVAC_SOURCE_DIR="${CMAKE_SOURCE_DIR}"
     EVAC_SHARED_DIR="${CMAKE_SOURCE_DIR}/../shared" EVAC_BIN_DIR="${CMAKE_BINARY_DIR}/bin")
   add_test(NAME ${name} COMMAND ${name}_test)

@@ -25,37 +25,20 @@ std::vector<Vote> VotesOf(const RatedClip& clip) {
   return votes;
 }
 
-double CategoryOf(const std::string& label) { return label == "success" ? 1 : label == "failure" ? 0 : 2; }
-
-using Ratings = std::vector<std::vector<std::optional<double>>>;
-
-Ratings RatingsOf(std::span<const RatedClip> clips) {
-  std::set<std::int64_t> raters;
-  for (const RatedClip& clip : clips) {
-    for (const auto& [rater, ballot] : clip.by_rater) raters.insert(rater);
-  }
-  Ratings ratings;
-  for (const std::int64_t rater : raters) {
-    auto& row = ratings.emplace_back(clips.size());
-    for (std::size_t i = 0; i < clips.size(); ++i) {
-      const auto ballot = clips[i].by_rater.find(rater);
-      if (ballot != clips[i].by_rater.end()) row[i] = CategoryOf(ballot->second.label);
-    }
-  }
-  return ratings;
-}
+std::size_t CategoryOf(const std::string& label) { return label == "success" ? 1 : label == "failure" ? 0 : 2; }
 
 Number DawidSkeneRate(std::span<const RatedClip> clips) {
-  const Ratings ratings = RatingsOf(clips);
-  if (ratings.empty()) return Undefined{"no votes"};
-  RaterCounts counts;
-  for (const auto& row : ratings) {
-    Eigen::MatrixXd of_rater = Eigen::MatrixXd::Zero(static_cast<Eigen::Index>(clips.size()), 2);
-    for (std::size_t i = 0; i < row.size(); ++i) {
-      if (row[i] && *row[i] < 2) of_rater(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(*row[i])) = 1;
+  std::map<std::int64_t, std::vector<RaterCounts::Said>> said;
+  for (std::size_t i = 0; i < clips.size(); ++i) {
+    for (const auto& [rater, ballot] : clips[i].by_rater) {
+      std::vector<RaterCounts::Said>& of_rater = said[rater];
+      const std::size_t category = CategoryOf(ballot.label);
+      if (category < 2) of_rater.push_back({static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(category)});
     }
-    counts.of_rater.push_back(std::move(of_rater));
   }
+  if (said.empty()) return Undefined{"no votes"};
+  RaterCounts counts{.items = static_cast<Eigen::Index>(clips.size()), .labels = 2};
+  for (auto& [rater, of_rater] : said) counts.of_rater.push_back(std::move(of_rater));
   const DawidSkene fit = FitDawidSkene(counts, {.smoothing = 0.5, .max_iterations = 200, .tolerance = 1e-8});
   double rate = 0;
   std::int64_t with_votes = 0;
@@ -72,15 +55,22 @@ Number Share(std::int64_t part, std::int64_t whole, const char* reason) {
   return static_cast<double>(part) / static_cast<double>(whole);
 }
 
-/// Alpha needs sums of pairs alone: counted by clip once, resampled quickly.
+/// Krippendorff's nominal alpha needs sums of pairs alone: counted by clip once, resampled quickly.
 struct Pairs {
   std::array<double, 3> n{};        // ratings of each category, in clips with two or more
   double different = 0, total = 0;  // weighted pairs that differ within clips; ratings
+
+  Pairs& operator+=(const Pairs& other) {
+    for (std::size_t c = 0; c < n.size(); ++c) n[c] += other.n[c];
+    different += other.different;
+    total += other.total;
+    return *this;
+  }
 };
 
 Pairs PairsOf(const RatedClip& clip) {
   Pairs pairs;
-  for (const auto& [rater, ballot] : clip.by_rater) pairs.n[static_cast<std::size_t>(CategoryOf(ballot.label))] += 1;
+  for (const auto& [rater, ballot] : clip.by_rater) pairs.n[CategoryOf(ballot.label)] += 1;
   const double m = pairs.n[0] + pairs.n[1] + pairs.n[2];
   if (m < 2) return {};
   pairs.total = m;
@@ -95,22 +85,13 @@ std::optional<double> AlphaOf(const Pairs& sum) {
   return 1 - sum.different * (sum.total - 1) / expected;
 }
 
-Defined<Interval> AlphaInterval(const std::vector<RatedClip>& clips, double alpha, int replicates) {
-  std::vector<Pairs> pairs;
-  for (const RatedClip& clip : clips) {
-    if (clip.by_rater.size() > 1) pairs.push_back(PairsOf(clip));
-  }
+Defined<Interval> AlphaInterval(const std::vector<Pairs>& pairs, double alpha, int replicates) {
   if (pairs.size() < 2 || replicates == 0) return Undefined{"too few clips"};
   SplitMix64 draws(0);
   Resampled resampled{alpha, {}, {}};
   for (int b = 0; b < replicates; ++b) {
     Pairs sum;
-    for (std::size_t i = 0; i < pairs.size(); ++i) {
-      const Pairs& drawn = pairs[draws.Below(pairs.size())];
-      for (std::size_t c = 0; c < 3; ++c) sum.n[c] += drawn.n[c];
-      sum.different += drawn.different;
-      sum.total += drawn.total;
-    }
+    for (std::size_t i = 0; i < pairs.size(); ++i) sum += pairs[draws.Below(pairs.size())];
     if (const auto drawn_alpha = AlphaOf(sum)) resampled.replicates.push_back(*drawn_alpha);
   }
   return IntervalsOf(resampled).percentile;
@@ -212,20 +193,27 @@ LabelRates RatesOf(std::span<const RatedClip> clips) {
 RatingAgreement RatersAgreement(const std::vector<RatedClip>& clips, int raters_per_clip, int replicates) {
   RatingAgreement result;
   std::vector<std::vector<std::int64_t>> counts;
+  std::vector<Pairs> by_clip;
+  Pairs sum;
   double agreeing = 0, pairs = 0;
   for (const RatedClip& clip : clips) {
     if (clip.by_rater.size() < 2) continue;
     ++result.clips;
+    sum += by_clip.emplace_back(PairsOf(clip));
     std::vector<std::int64_t> of_clip(3);
-    for (const auto& [rater, ballot] : clip.by_rater) ++of_clip[static_cast<std::size_t>(CategoryOf(ballot.label))];
+    for (const auto& [rater, ballot] : clip.by_rater) ++of_clip[CategoryOf(ballot.label)];
     const auto m = static_cast<double>(clip.by_rater.size());
     for (const std::int64_t n : of_clip) agreeing += static_cast<double>(n * (n - 1)) / 2;
     pairs += m * (m - 1) / 2;
     if (static_cast<int>(clip.by_rater.size()) == raters_per_clip) counts.push_back(std::move(of_clip));
   }
   if (result.clips == 0) return result;
-  result.alpha = KrippendorffAlpha(RatingsOf(clips), RatingMetric::kNominal);
-  if (result.alpha) result.interval = AlphaInterval(clips, *result.alpha, replicates);
+  if (const auto alpha = AlphaOf(sum)) {
+    result.alpha = *alpha;
+    result.interval = AlphaInterval(by_clip, *alpha, replicates);
+  } else {
+    result.alpha = Undefined{"all ratings are equal"};
+  }
   result.agreement = agreeing / pairs;
   if (!counts.empty()) result.fleiss = FleissKappaOf(counts).kappa;
   return result;

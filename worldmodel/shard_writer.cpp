@@ -60,8 +60,8 @@ void WriteShard(const std::filesystem::path& path, std::span<const Clip> clips, 
     if (clip.views != clips.front().views)
       throw InternalError("{}: a clip of {} views beside one of {}", path.string(), clip.views, clips.front().views);
   }
-  metadata["format"] = "evac-shard";
-  metadata["version"] = "1";
+  metadata["format"] = std::string("evac-shard");
+  metadata["version"] = std::string("1");  // g++ 12 sees an endless copy in string = "text" (its bug 105651)
   const std::vector<TensorDeclaration> declarations =
       Declarations(static_cast<std::int64_t>(clips.size()), heads.clip_start.back(),
                    static_cast<std::int64_t>(clips.front().views), picture_px);

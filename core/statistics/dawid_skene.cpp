@@ -8,14 +8,16 @@ namespace evac {
 namespace {
 
 void Check(const RaterCounts& counts, const DawidSkeneOptions& options) {
-  if (counts.of_rater.empty() || counts.of_rater.front().size() == 0) {
+  if (counts.of_rater.empty() || counts.items < 1 || counts.labels < 1)
     throw InvalidInput("statistics: Dawid-Skene wants at least one rater, item and label");
-  }
-  for (const Eigen::MatrixXd& rater : counts.of_rater) {
-    if (rater.rows() != counts.of_rater.front().rows() || rater.cols() != counts.of_rater.front().cols()) {
-      throw InvalidInput("statistics: raters differ in their number of items or labels");
+  for (const std::vector<RaterCounts::Said>& rater : counts.of_rater) {
+    for (const RaterCounts::Said& said : rater) {
+      if (said.item < 0 || said.item >= counts.items || said.label < 0 || said.label >= counts.labels)
+        throw InvalidInput("statistics: label {} of item {}, wanted one of {} labels of {} items", said.label,
+                           said.item, counts.labels, counts.items);
+      if (!std::isfinite(said.count) || said.count < 0)
+        throw InvalidInput("statistics: a count is negative or not finite");
     }
-    if (!rater.allFinite() || rater.minCoeff() < 0) throw InvalidInput("statistics: a count is negative or not finite");
   }
   if (!(options.smoothing >= 0) || options.max_iterations < 1) {
     throw InvalidInput("statistics: smoothing {} and {} iterations, wanted at least 0 and 1", options.smoothing,
@@ -23,74 +25,91 @@ void Check(const RaterCounts& counts, const DawidSkeneOptions& options) {
   }
 }
 
-/// Each row divided by its sum; equal shares where that is 0.
-Eigen::MatrixXd RowShares(const Eigen::MatrixXd& weights) {
-  Eigen::MatrixXd shares = weights;
-  for (Eigen::Index row = 0; row < shares.rows(); ++row) {
-    const double sum = shares.row(row).sum();
-    shares.row(row) = sum > 0 ? Eigen::RowVectorXd(shares.row(row) / sum)
-                              : Eigen::RowVectorXd::Constant(shares.cols(), 1.0 / static_cast<double>(shares.cols()));
-  }
-  return shares;
-}
-
-Eigen::MatrixXd VoteShares(const RaterCounts& counts) {
-  Eigen::MatrixXd votes = Eigen::MatrixXd::Zero(counts.of_rater.front().rows(), counts.of_rater.front().cols());
-  for (const Eigen::MatrixXd& rater : counts.of_rater) votes += rater;
-  return RowShares(votes);
-}
-
-void Maximise(const RaterCounts& counts, double smoothing, DawidSkene& model) {
-  const Eigen::VectorXd items_of_label = model.posterior.colwise().sum().array() + smoothing;
-  model.prior = items_of_label / items_of_label.sum();
-  model.confusion.clear();
-  for (const Eigen::MatrixXd& rater : counts.of_rater) {
-    const Eigen::MatrixXd said = model.posterior.transpose() * rater;
-    model.confusion.push_back(RowShares((said.array() + smoothing).matrix()));
+/// Each column divided by its sum; equal shares where that is 0.
+void MakeColumnsShares(Eigen::MatrixXd& weights) {
+  for (Eigen::Index column = 0; column < weights.cols(); ++column) {
+    const double sum = weights.col(column).sum();
+    if (sum > 0)
+      weights.col(column) /= sum;
+    else
+      weights.col(column).setConstant(1.0 / static_cast<double>(weights.rows()));
   }
 }
 
-/// log P(all that was said of the item and its true label), [items, labels]; -inf where impossible.
-Eigen::MatrixXd LogJoint(const RaterCounts& counts, const DawidSkene& model) {
-  Eigen::MatrixXd log_joint = model.prior.array().log().matrix().transpose().replicate(model.posterior.rows(), 1);
-  for (std::size_t r = 0; r < counts.of_rater.size(); ++r) {
-    const Eigen::MatrixXd& said = counts.of_rater[r];
-    for (Eigen::Index item = 0; item < said.rows(); ++item) {
-      for (Eigen::Index label = 0; label < said.cols(); ++label) {
-        if (said(item, label) == 0) continue;  // 0 log 0 = 0
-        log_joint.row(item) += said(item, label) * model.confusion[r].col(label).array().log().matrix().transpose();
+/// What the iterations work on: a label's numbers of one item lie side by side, a vote costs a few multiplications.
+struct Fit {
+  const RaterCounts& counts;
+  Eigen::MatrixXd posterior;               ///< [labels, items]
+  Eigen::VectorXd prior;                   ///< [labels]
+  std::vector<Eigen::MatrixXd> confusion;  ///< [raters] of [said label, true label], columns sum to 1
+  double log_likelihood = 0;
+
+  explicit Fit(const RaterCounts& given)
+      : counts(given),
+        posterior(Eigen::MatrixXd::Zero(given.labels, given.items)),
+        confusion(given.of_rater.size(), Eigen::MatrixXd(given.labels, given.labels)) {
+    for (const auto& rater : counts.of_rater) {
+      for (const RaterCounts::Said& said : rater) posterior(said.label, said.item) += said.count;
+    }
+    MakeColumnsShares(posterior);
+  }
+
+  void Maximise(double smoothing) {
+    prior = posterior.rowwise().sum().array() + smoothing;
+    prior /= prior.sum();
+    for (std::size_t r = 0; r < confusion.size(); ++r) {
+      confusion[r].setConstant(smoothing);
+      for (const RaterCounts::Said& said : counts.of_rater[r]) {
+        for (Eigen::Index label = 0; label < counts.labels; ++label)
+          confusion[r](said.label, label) += said.count * posterior(label, said.item);
       }
+      MakeColumnsShares(confusion[r]);
     }
   }
-  return log_joint;
-}
 
-/// Bayes in log space. @returns the largest change of a posterior.
-double Expect(const RaterCounts& counts, DawidSkene& model) {
-  const Eigen::MatrixXd log_joint = LogJoint(counts, model);
-  const Eigen::MatrixXd before = model.posterior;
-  model.log_likelihood = 0;
-  for (Eigen::Index item = 0; item < log_joint.rows(); ++item) {
-    const double most = log_joint.row(item).maxCoeff();
-    const Eigen::RowVectorXd weights = (log_joint.row(item).array() - most).exp();
-    model.posterior.row(item) = weights / weights.sum();
-    model.log_likelihood += most + std::log(weights.sum());
+  /// log P(all that was said of the item and its true label), [labels, items]; -inf where impossible.
+  Eigen::MatrixXd LogJoint() const {
+    Eigen::MatrixXd log_joint = prior.array().log().matrix().replicate(1, counts.items);
+    for (std::size_t r = 0; r < confusion.size(); ++r) {
+      const Eigen::MatrixXd log_confusion = confusion[r].array().log();
+      for (const RaterCounts::Said& said : counts.of_rater[r]) {
+        if (said.count == 0) continue;  // 0 log 0 = 0
+        for (Eigen::Index label = 0; label < counts.labels; ++label)
+          log_joint(label, said.item) += said.count * log_confusion(said.label, label);
+      }
+    }
+    return log_joint;
   }
-  return (model.posterior - before).cwiseAbs().maxCoeff();
-}
+
+  /// Bayes in log space. @returns the largest change of a posterior.
+  double Expect() {
+    Eigen::MatrixXd weights = LogJoint();
+    const Eigen::RowVectorXd most = weights.colwise().maxCoeff();
+    weights = (weights.rowwise() - most).array().exp();
+    const Eigen::RowVectorXd sums = weights.colwise().sum();
+    weights.array().rowwise() /= sums.array();
+    log_likelihood = most.sum() + sums.array().log().sum();
+    posterior.swap(weights);
+    return (posterior - weights).cwiseAbs().maxCoeff();
+  }
+};
 
 }  // namespace
 
 DawidSkene FitDawidSkene(const RaterCounts& counts, const DawidSkeneOptions& options) {
   Check(counts, options);
+  Fit fit(counts);
   DawidSkene model;
-  model.posterior = VoteShares(counts);
   while (model.iterations < options.max_iterations) {
-    Maximise(counts, options.smoothing, model);
-    const double change = Expect(counts, model);
+    fit.Maximise(options.smoothing);
+    const double change = fit.Expect();
     ++model.iterations;
     if (options.tolerance && change < *options.tolerance) break;
   }
+  model.prior = fit.prior;
+  for (const Eigen::MatrixXd& rater : fit.confusion) model.confusion.push_back(rater.transpose());
+  model.posterior = fit.posterior.transpose();
+  model.log_likelihood = fit.log_likelihood;
   for (Eigen::Index item = 0; item < model.posterior.rows(); ++item) {
     Eigen::Index best = 0;
     model.posterior.row(item).maxCoeff(&best);

@@ -7,10 +7,16 @@
 
 namespace evac {
 
-/// What several raters said: counts[rater](item, label), how often (more than once where a rater saw an item again; 0
-/// where the rating is missing). All matrices of one size.
+/// What several raters said, without what they did not say: most raters see a small part of the items.
 struct RaterCounts {
-  std::vector<Eigen::MatrixXd> of_rater;  ///< [raters] of [items, labels]
+  /// That many times (more than one where a rater saw the item again) a rater called this item so.
+  struct Said {
+    Eigen::Index item = 0;   ///< 0 … items - 1
+    Eigen::Index label = 0;  ///< 0 … labels - 1
+    double count = 1;        ///< finite, not negative
+  };
+  Eigen::Index items = 0, labels = 0;
+  std::vector<std::vector<Said>> of_rater{};  ///< [raters]
 };
 
 struct DawidSkeneOptions {
@@ -31,8 +37,7 @@ struct DawidSkene {
   double log_likelihood = 0;
   int iterations = 0;
 };
-/// @throws InvalidInput without raters, items or labels, if sizes differ, a count is negative or an option out of
-/// range.
+/// @throws InvalidInput without raters, items or labels, if an item, a label, a count or an option is out of range.
 DawidSkene FitDawidSkene(const RaterCounts& counts, const DawidSkeneOptions& options = {});
 
 }  // namespace evac

@@ -3,6 +3,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "core/statistics/rater_agreement.h"
+
 namespace evac {
 namespace {
 
@@ -41,9 +43,9 @@ RatedClip Rated(const std::vector<std::string>& labels) {
 }
 
 TEST(Rates, UndecidedClipsAreBoundsNotFailures) {
-  const std::vector<RatedClip> clips = {Rated({"success", "success", "success"}), Rated({"failure", "failure", "failure"}),
-                                        Rated({"success", "failure", "cannot_tell"}),
-                                        Rated({"success", "success", "failure"})};
+  const std::vector<RatedClip> clips = {
+      Rated({"success", "success", "success"}), Rated({"failure", "failure", "failure"}),
+      Rated({"success", "failure", "cannot_tell"}), Rated({"success", "success", "failure"})};
   const LabelRates rates = RatesOf(clips);
   EXPECT_EQ(rates.decided, 3);
   EXPECT_EQ(rates.undecided, 1);
@@ -64,6 +66,28 @@ TEST(Agreement, RawAgreementStaysHighWhereKappaFalls) {
   ASSERT_TRUE(agreement.interval);
   EXPECT_LE(agreement.interval->low, *agreement.alpha);
   EXPECT_GE(agreement.interval->high, *agreement.alpha);
+}
+
+TEST(Agreement, AlphaIsKrippendorffsAlsoWhereRatersSawDifferentClips) {
+  const std::vector<std::map<std::int64_t, std::string>> votes = {{{1, "success"}, {2, "success"}, {3, "failure"}},
+                                                                  {{2, "failure"}, {4, "failure"}},
+                                                                  {{1, "cannot_tell"}, {3, "failure"}, {4, "failure"}},
+                                                                  {{5, "success"}},
+                                                                  {{2, "success"}, {5, "success"}}};
+  const std::map<std::string, double> category = {{"failure", 0}, {"success", 1}, {"cannot_tell", 2}};
+  std::vector<RatedClip> clips;
+  std::vector<std::vector<std::optional<double>>> ratings(5, std::vector<std::optional<double>>(votes.size()));
+  for (const auto& of_clip : votes) {
+    RatedClip& clip = clips.emplace_back();
+    for (const auto& [rater, label] : of_clip) {
+      clip.by_rater[rater].label = label;
+      ratings[static_cast<std::size_t>(rater - 1)][clips.size() - 1] = category.at(label);
+    }
+  }
+  const RatingAgreement agreement = RatersAgreement(clips, 3);
+  EXPECT_NEAR(*agreement.alpha, *KrippendorffAlpha(ratings, RatingMetric::kNominal), 1e-12);
+  EXPECT_EQ(agreement.clips, 4);
+  EXPECT_EQ(RatersAgreement({Rated({"success", "success"})}, 3).alpha.reason(), "all ratings are equal");
 }
 
 TEST(Quality, FastHandsAndOneAnswerAreSaidAloud) {

@@ -1,3 +1,4 @@
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 #include <sys/wait.h>
 #include <unistd.h>
@@ -21,7 +22,7 @@ struct Answer {
 };
 
 Answer RunCheck(const fs::path& folder) {
-  const std::string command = std::string(EVAC_BIN_DIR) + "/evac_golden_check '" + folder.string() + "' 2>&1";
+  const std::string command = fmt::format("{}/evac_golden_check '{}' 2>&1", EVAC_BIN_DIR, folder.string());
   Answer answer;
   FILE* pipe = ::popen(command.c_str(), "r");
   std::array<char, 4096> buffer{};

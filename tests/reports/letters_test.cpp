@@ -23,7 +23,7 @@ using Letters = std::map<std::string, std::string>;
 
 TEST(Letters, JoinPoliciesThatDoNotDifferAndPartThoseThatDo) {
   const std::string good(20, 's'), bad(20, 'f');
-  const std::string fair = std::string(17, 's') + "fff";
+  const std::string fair = "sssssssssssssssssfff";
   const ReportData report = ReportDataOf(
       SampleRun({{"a", "pick", "bad", bad, good}, {"a", "pick", "good", good, good}, {"a", "pick", "fair", fair, good}})
           .Summary());

@@ -111,19 +111,18 @@ RaterCounts CountsFrom(const Json& in) {
   const bool has_counts = in.contains("counts");
   const Json& items = in.at(has_counts ? "counts" : "votes_item_by_rater");
   if (items.empty() || items[0].empty()) return {};
-  const auto labels =
-      has_counts ? static_cast<Eigen::Index>(items[0][0].size()) : in.at("n_labels").get<Eigen::Index>();
   RaterCounts counts;
-  counts.of_rater.assign(items[0].size(), Eigen::MatrixXd::Zero(static_cast<Eigen::Index>(items.size()), labels));
+  counts.items = static_cast<Eigen::Index>(items.size());
+  counts.labels = has_counts ? static_cast<Eigen::Index>(items[0][0].size()) : in.at("n_labels").get<Eigen::Index>();
+  counts.of_rater.resize(items[0].size());
   for (std::size_t item = 0; item < items.size(); ++item) {
     const auto row = static_cast<Eigen::Index>(item);
     for (std::size_t rater = 0; rater < counts.of_rater.size(); ++rater) {
       const Json& said = items[item].at(rater);
-      Eigen::MatrixXd& of_rater = counts.of_rater[rater];
-      if (!has_counts && !said.is_null()) of_rater(row, said.get<Eigen::Index>()) = 1;
-      for (Eigen::Index label = 0; has_counts && label < labels; ++label) {
-        of_rater(row, label) = said.at(static_cast<std::size_t>(label));
-      }
+      auto& of_rater = counts.of_rater[rater];
+      if (!has_counts && !said.is_null()) of_rater.push_back({row, said.get<Eigen::Index>(), 1});
+      for (Eigen::Index label = 0; has_counts && label < counts.labels; ++label)
+        of_rater.push_back({row, label, said.at(static_cast<std::size_t>(label)).get<double>()});
     }
   }
   return counts;

@@ -116,14 +116,13 @@ TEST(Votes, UnsureAndMissingDecideNothing) {
 
 TEST(DawidSkene, FindsTheBadRater) {
   SplitMix64 random(2);
-  RaterCounts counts;
-  counts.of_rater.assign(3, Eigen::MatrixXd::Zero(200, 2));
+  RaterCounts counts{.items = 200, .labels = 2, .of_rater = std::vector<std::vector<RaterCounts::Said>>(3)};
   const double accuracy[] = {0.95, 0.9, 0.55};
   for (int item = 0; item < 200; ++item) {
     const int truth = random.Uniform() < 0.6;
     for (std::size_t rater = 0; rater < 3; ++rater) {
       const int said = random.Uniform() < accuracy[rater] ? truth : 1 - truth;
-      counts.of_rater[rater](item, said) = 1;
+      counts.of_rater[rater].push_back({item, said});
     }
   }
   const DawidSkene model = FitDawidSkene(counts);
@@ -131,14 +130,15 @@ TEST(DawidSkene, FindsTheBadRater) {
   EXPECT_GT(model.confusion[0](1, 1), 0.85);
   EXPECT_LT(model.confusion[2](1, 1), 0.75);
   EXPECT_THROW(FitDawidSkene({}), Error);
-  counts.of_rater[0].resize(3, 2);
-  EXPECT_THROW(FitDawidSkene(counts), Error);
+  for (const RaterCounts::Said wrong :
+       {RaterCounts::Said{200, 0}, RaterCounts::Said{0, 2}, RaterCounts::Said{-1, 0}, RaterCounts::Said{0, 0, -1}}) {
+    counts.of_rater[0][0] = wrong;
+    EXPECT_THROW(FitDawidSkene(counts), Error);
+  }
 }
 
 TEST(DawidSkene, AnItemThatNobodyRatedHasThePriorAsItsAnswer) {
-  RaterCounts counts;
-  counts.of_rater.assign(1, Eigen::MatrixXd::Zero(3, 2));
-  counts.of_rater[0](0, 1) = counts.of_rater[0](1, 1) = 1;
+  const RaterCounts counts{.items = 3, .labels = 2, .of_rater = {{{0, 1}, {1, 1}}}};
   const DawidSkene model = FitDawidSkene(counts);
   EXPECT_NEAR(model.posterior(2, 1), model.prior(1), 1e-6);
 }
