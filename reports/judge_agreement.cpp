@@ -4,6 +4,7 @@
 #include <map>
 #include <optional>
 
+#include "core/statistics/rate_difference.h"
 #include "core/statistics/rater_agreement.h"
 
 namespace evac {
@@ -60,7 +61,10 @@ JudgeAgreement AgreementOf(const RunSummary& summary, const std::string& judge, 
     if (true_one != verdicts->second.end()) Count(own->second, true_one->second, agreement, probabilities);
   }
   agreement.with_probability = static_cast<std::int64_t>(probabilities.stated.size());
-  agreement.statistics = StatisticsOf(agreement.confusion, summary.options.confidence);
+  const Confusion& confusion = agreement.confusion;
+  agreement.statistics = StatisticsOf(confusion, summary.options.confidence);
+  agreement.bias = TangoDifference({{confusion.only_judge_success, confusion.only_human_success}, confusion.total()},
+                                   summary.options.confidence);
   if (!probabilities.stated.empty())
     agreement.calibration = CalibrationOf(probabilities.stated, probabilities.outcomes);
   return agreement;

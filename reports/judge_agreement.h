@@ -19,6 +19,7 @@ struct JudgeAgreement {
   std::int64_t apart = 0;   ///< that both judged, and one of them called neither
   std::int64_t judged = 0;  ///< verdicts of the judge in this world
   ConfusionStatistics statistics;
+  Estimate bias;  ///< the judge's share of successes - the truth's, on the compared episodes, Tango's interval
   Calibration calibration;  ///< of its probabilities of success, where it gives any
   std::int64_t with_probability = 0;
   bool IsCalibrated() const { return confusion.total() > 0; }

@@ -23,7 +23,7 @@ std::string JudgeRow(const JudgeAgreement& judge) {
   std::string html = fmt::format("<tr><th scope=\"row\">{}</th><td>{}</td><td class=\"num\">{}</td>",
                                  Breakable(judge.judge), Breakable(judge.world), judge.judged);
   if (!judge.IsCalibrated()) {
-    return html + fmt::format("<td colspan=\"6\">{} no episode was judged by {} too</td></tr>", Tag("uncalibrated"),
+    return html + fmt::format("<td colspan=\"8\">{} no episode was judged by {} too</td></tr>", Tag("uncalibrated"),
                               Escaped(judge.against));
   }
   const std::string calibration =
@@ -32,7 +32,8 @@ std::string JudgeRow(const JudgeAgreement& judge) {
                         judge.calibration.ece ? Plain(*judge.calibration.ece) : "–", judge.with_probability)
           : "gives none";
   return html + fmt::format("<td class=\"num\">{}</td>", judge.statistics.n) + ConfusionCell(judge.confusion) +
-         fmt::format("<td class=\"num\">{}</td>", Escaped(NumberWithInterval(judge.statistics.kappa))) +
+         fmt::format("<td class=\"num\">{}</td><td class=\"num\">{}</td><td class=\"num\">{}</td>", judge.apart,
+                     Escaped(NumberWithInterval(judge.statistics.kappa)), Escaped(PointsWithInterval(judge.bias))) +
          NumberCell(judge.statistics.sensitivity) + NumberCell(judge.statistics.specificity) + "<td>" + calibration +
          "</td></tr>";
 }
@@ -67,7 +68,10 @@ std::string JudgesPart(const ReportData& report) {
       "{} · both failure.</p><div class=\"wide\"><table class=\"points\"><thead><tr><th scope=\"col\">judge</th><th "
       "scope=\"col\">world</th><th scope=\"col\" class=\"num\">judged</th><th scope=\"col\" "
       "class=\"num\">compared</th><th "
-      "scope=\"col\" class=\"num\">matrix</th><th scope=\"col\" class=\"num\">kappa [{:.0f} %]</th><th scope=\"col\" "
+      "scope=\"col\" class=\"num\">matrix</th><th scope=\"col\" class=\"num\" title=\"one of the two could not tell, "
+      "or gave no verdict that can be read\">neither</th><th scope=\"col\" class=\"num\">kappa [{:.0f} %]</th><th "
+      "scope=\"col\" class=\"num\" title=\"share that the judge calls a success, less the truth’s\">kinder by</th><th "
+      "scope=\"col\" "
       "class=\"num\">sensitivity</th><th scope=\"col\" class=\"num\">specificity</th><th "
       "scope=\"col\">probabilities</th></tr></thead><tbody>",
       Escaped(judges.truth), Escaped(judges.truth), 100 * report.summary.options.confidence);

@@ -82,6 +82,8 @@ TEST(Judges, AJudgeIsHeldAgainstPeopleInEachWorldApart) {
   EXPECT_EQ(judges.judges[0].confusion.only_human_success, 1);
   EXPECT_EQ(judges.judges[0].confusion.both_failure, 1);
   EXPECT_TRUE(judges.judges[0].IsCalibrated());
+  EXPECT_NEAR(*judges.judges[0].bias.value, 0.25, 1e-12) << "two of four too kind, one too hard";
+  EXPECT_LT(judges.judges[0].bias.interval->low, 0) << "four episodes prove nothing";
   EXPECT_EQ(judges.judges[1].world, "sim");
   EXPECT_EQ(judges.judges[1].judged, 4);
   EXPECT_FALSE(judges.judges[1].IsCalibrated()) << "nobody looked at sim";

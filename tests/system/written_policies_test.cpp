@@ -49,7 +49,7 @@ TEST(WrittenPolicies, TheOneInPythonRunsItsTasksByThePagesOwnCommands) {
   const std::string path = fmt::format("export PATH={}:$PATH\ncd {}\n", fs::path(Binary("evac")).parent_path().string(),
                                        folder.path().string());
   const CommandResult tried = RunCommand({"/bin/bash", "-ec", path + commands.substr(0, commands.find("lcm-gen"))});
-  if (tried.exit_code != 0) GTEST_SKIP() << "Python's LCM bindings cannot be had here: " << tried.err;
+  if (tried.exit_code != 0) GTEST_SKIP() << "Python's LCM bindings cannot be had here: " << tried.out << tried.err;
   const CommandResult result =
       RunCommand({"/bin/bash", "-ec", path + "cd wander\n" + commands.substr(commands.find("lcm-gen"))});
   ASSERT_EQ(result.exit_code, 0) << result.err;
