@@ -1,5 +1,5 @@
 // What nearly every file includes by way of core/types.h, compiled once per module (evac_precompile in cmake/evac.cmake):
-// a third of a clean build. No file may rely on it: each includes what it uses, which the asan build, without it, proves.
+// half of what a small file costs to compile. No file may rely on it: each includes what it uses, which the asan build, made without it, shows.
 #include <fmt/format.h>
 
 #include <Eigen/Geometry>
