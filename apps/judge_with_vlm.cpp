@@ -83,7 +83,7 @@ ExitCode JudgeWithVlm(const VlmJudgeArguments& arguments) {
   const VlmConfig config = VlmConfig::FromFile(arguments.config);
   Store store = Store::Open(arguments.run, Store::Mode::kReadWrite);
   if (arguments.dry_run) return SayWhatItWouldCost(config, store);
-  CallCache cache(store.folder() / "judge_calls.sqlite");
+  CallCache cache(store.folder() / CallCache::kFile);
   VlmClient client(ClientOptions(config, arguments.offline));
   VlmJudgeOptions options{.run_folder = store.folder(), .offline = arguments.offline, .now = Now};
   options.fingerprint = Greet(config, client, cache, arguments.offline);

@@ -25,7 +25,34 @@ std::int64_t Pragma(sqlite::Connection& connection, const char* sql) {
   return statement.Step() ? statement.Integer(0) : 0;
 }
 
+void Check(sqlite::Connection& connection, const std::filesystem::path& file) {
+  const std::int64_t version = Pragma(connection, "PRAGMA user_version");
+  if (Pragma(connection, "PRAGMA application_id") != kApplicationId || version != 1)
+    throw InvalidInput("{}: is no cache of judges' calls that this evac knows (version {})", file.string(), version);
+}
+
 }  // namespace
+
+std::vector<CallTotals> TotalsOfCalls(const std::filesystem::path& run) {
+  const std::filesystem::path file = run / CallCache::kFile;
+  if (!std::filesystem::exists(file)) return {};
+  sqlite::Connection connection = sqlite::Connection::OpenReadOnly(file);
+  Check(connection, file);
+  sqlite::Statement row = connection.Query(
+      "SELECT judge, status, count(*), sum(attempts), sum(prompt_tokens), sum(completion_tokens), sum(latency_ms) "
+      "FROM judge_calls GROUP BY judge, status ORDER BY judge, status");
+  std::vector<CallTotals> totals;
+  while (row.Step()) {
+    if (totals.empty() || totals.back().judge != row.View(0)) totals.push_back({.judge = row.Text(0)});
+    CallTotals& of_judge = totals.back();
+    of_judge.calls[row.Text(1)] = row.Integer(2);
+    of_judge.attempts += row.Integer(3);
+    of_judge.prompt_tokens += row.Integer(4);
+    of_judge.completion_tokens += row.Integer(5);
+    of_judge.latency_ms += row.Integer(6);
+  }
+  return totals;
+}
 
 struct CallCache::Database {
   sqlite::Connection connection;
@@ -34,15 +61,12 @@ struct CallCache::Database {
 CallCache::CallCache(const std::filesystem::path& file)
     : database_(new Database{sqlite::Connection::OpenReadWrite(file)}) {
   sqlite::Connection& connection = database_->connection;
-  const std::int64_t version = Pragma(connection, "PRAGMA user_version");
-  if (version == 0 && Pragma(connection, "SELECT count(*) FROM sqlite_schema") == 0) {
-    sqlite::Transaction transaction(connection);
-    connection.RunScript(kSchema);
-    connection.RunScript(fmt::format("PRAGMA application_id = {}", kApplicationId));
-    transaction.Commit();
-  } else if (Pragma(connection, "PRAGMA application_id") != kApplicationId || version != 1) {
-    throw InvalidInput("{}: is no cache of judges' calls that this evac knows (version {})", file.string(), version);
-  }
+  if (Pragma(connection, "PRAGMA user_version") != 0 || Pragma(connection, "SELECT count(*) FROM sqlite_schema") != 0)
+    return Check(connection, file);
+  sqlite::Transaction transaction(connection);
+  connection.RunScript(kSchema);
+  connection.RunScript(fmt::format("PRAGMA application_id = {}", kApplicationId));
+  transaction.Commit();
 }
 
 CallCache::~CallCache() = default;

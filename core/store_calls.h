@@ -2,10 +2,12 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <map>
 #include <memory>
 #include <mutex>
 #include <optional>
 #include <string>
+#include <vector>
 
 namespace evac {
 
@@ -21,10 +23,23 @@ struct JudgeCall {
   std::string created_at{};  ///< ISO 8601, UTC
 };
 
+/// What one judge's calls of a run came to.
+struct CallTotals {
+  std::string judge;
+  std::map<std::string, std::int64_t> calls{};  ///< by status: how many
+  std::int64_t attempts = 0;                    ///< requests sent, tries again included
+  std::int64_t prompt_tokens = 0, completion_tokens = 0;
+  std::int64_t latency_ms = 0;  ///< of all calls together; they may have run side by side
+};
+/// By judge, in alphabetical order; none if the run has no such file. @throws Error if it cannot be read.
+std::vector<CallTotals> TotalsOfCalls(const std::filesystem::path& run);
+
 /// Every call to a model server, RUN/judge_calls.sqlite (docs/formats/judge_calls.md): answers are never paid for
 /// twice. Calls that failed are kept as history and never found again. Thread-safe; one file may serve several runs.
 class CallCache {
  public:
+  static constexpr const char* kFile = "judge_calls.sqlite";  ///< in a run's folder
+
   /// Made if absent. @throws Error if it cannot be opened or is another program's database.
   explicit CallCache(const std::filesystem::path& file);
   ~CallCache();

@@ -36,10 +36,19 @@ std::string Escaped(const fs::path& file) {
 
 }  // namespace
 
-Statement::Statement(sqlite3* database, const char* sql) {
+sqlite3_stmt* IdleStatements::Take(sqlite3* database, const char* sql) {
+  if (auto found = by_text_.extract(sql)) return found.mapped().release();
   sqlite3_stmt* statement = nullptr;
-  Check(database, sqlite3_prepare_v2(database, sql, -1, &statement, nullptr));
-  statement_.reset(statement);
+  Check(database, sqlite3_prepare_v3(database, sql, -1, SQLITE_PREPARE_PERSISTENT, &statement, nullptr));
+  return statement;
+}
+
+void IdleStatements::Keep(sqlite3_stmt* statement) {
+  constexpr std::size_t kMost = 128;  // texts that are made up while running would never be seen again
+  sqlite3_reset(statement);           // its error, if any, was thrown when it was run
+  sqlite3_clear_bindings(statement);
+  std::unique_ptr<sqlite3_stmt, Finalize> kept(statement);
+  if (by_text_.size() < kMost) by_text_.try_emplace(sqlite3_sql(statement), std::move(kept));
 }
 
 bool Statement::Step() {

@@ -9,6 +9,7 @@
 #include <optional>
 #include <string>
 #include <string_view>
+#include <unordered_map>
 
 /// SQLite, owned and with exceptions. Used by core/store*.cpp only.
 namespace evac::sqlite {
@@ -18,10 +19,26 @@ struct Blob {
   std::string_view bytes;
 };
 
-/// One prepared statement with its values. Columns count from 0, parameters are bound in their order.
+/// Prepared statements that nobody uses just now, by their text: to prepare one takes longer than most take to run.
+class IdleStatements {
+ public:
+  /// One that was kept, or a new one.
+  sqlite3_stmt* Take(sqlite3* database, const char* sql);
+  void Keep(sqlite3_stmt* statement);
+
+ private:
+  struct Finalize {
+    void operator()(sqlite3_stmt* statement) const { sqlite3_finalize(statement); }
+  };
+  std::unordered_map<std::string, std::unique_ptr<sqlite3_stmt, Finalize>> by_text_;
+};
+
+/// One prepared statement with its values. Columns count from 0, parameters are bound in their order. Ends before its
+/// connection does.
 class Statement {
  public:
-  Statement(sqlite3* database, const char* sql);
+  Statement(sqlite3* database, IdleStatements& idle, const char* sql)
+      : statement_(idle.Take(database, sql), GiveBack{&idle}) {}
 
   template <typename... Values>
   void BindAll(const Values&... values) {
@@ -53,10 +70,11 @@ class Statement {
     if (value) Bind(position, *value);  // a fresh parameter is NULL
   }
 
-  struct Finalize {
-    void operator()(sqlite3_stmt* statement) const { sqlite3_finalize(statement); }
+  struct GiveBack {
+    IdleStatements* idle;
+    void operator()(sqlite3_stmt* statement) const { idle->Keep(statement); }
   };
-  std::unique_ptr<sqlite3_stmt, Finalize> statement_;
+  std::unique_ptr<sqlite3_stmt, GiveBack> statement_;
 };
 
 class Connection {
@@ -68,7 +86,7 @@ class Connection {
 
   template <typename... Values>
   Statement Query(const char* sql, const Values&... values) {
-    Statement statement(database_.get(), sql);
+    Statement statement(database_.get(), *idle_, sql);
     statement.BindAll(values...);
     return statement;
   }
@@ -86,9 +104,10 @@ class Connection {
   Connection(const std::string& name, int flags);
 
   struct Close {
-    void operator()(sqlite3* database) const { sqlite3_close(database); }
+    void operator()(sqlite3* database) const { sqlite3_close_v2(database); }  // waits for its idle statements
   };
   std::unique_ptr<sqlite3, Close> database_;
+  std::unique_ptr<IdleStatements> idle_ = std::make_unique<IdleStatements>();
 };
 
 /// Everything until Commit happens, or nothing does.

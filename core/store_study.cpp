@@ -110,6 +110,7 @@ StudyStore StudyStore::Create(const fs::path& folder, const StudyInfo& info) {
   sqlite::Connection& connection = database->connection;
   sqlite::Transaction transaction(connection);
   connection.RunScript(kStudySchema);
+  connection.RunScript(kStudyIndexes);
   connection.RunScript(fmt::format("PRAGMA application_id = {}", kApplicationId));
   connection.Run("INSERT INTO study VALUES (1, ?, ?, ?, ?, ?, ?, ?)", info.name, std::to_string(info.seed),
                  info.raters_per_clip, info.width_px, info.height_px, info.period_s, info.evac_version);
@@ -124,6 +125,7 @@ StudyStore StudyStore::Open(const fs::path& folder, Mode mode) {
       std::make_unique<Database>(Database{folder, mode == Mode::kReadOnly ? sqlite::Connection::OpenReadOnly(file)
                                                                           : sqlite::Connection::OpenReadWrite(file)});
   Check(database->connection, file);
+  if (mode == Mode::kReadWrite) database->connection.RunScript(kStudyIndexes);
   return StudyStore(std::move(database));
 }
 
@@ -198,9 +200,11 @@ std::vector<StudyRubric> StudyStore::Rubrics() const {
   return rubrics;
 }
 
-std::int64_t StudyStore::VotesOf(std::int64_t clip) const {
-  sqlite::Statement row = database_->connection.Query("SELECT count(*) FROM votes WHERE clip = ?", clip);
-  return row.Step() ? row.Integer(0) : 0;
+std::map<std::int64_t, std::int64_t> StudyStore::Votes() const {
+  sqlite::Statement row = database_->connection.Query("SELECT clip, count(*) FROM votes GROUP BY clip");
+  std::map<std::int64_t, std::int64_t> votes;
+  while (row.Step()) votes[row.Integer(0)] = row.Integer(1);
+  return votes;
 }
 
 }  // namespace evac

@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <map>
 #include <memory>
 #include <optional>
 #include <span>
@@ -152,8 +153,8 @@ class StudyStore {
   std::vector<StudyClip> Clips() const;
   StudyClip Clip(std::int64_t id) const;
   std::vector<StudyRubric> Rubrics() const;
-  /// How many votes each clip has that count, by clip.
-  std::int64_t VotesOf(std::int64_t clip) const;
+  /// How many votes each clip has that count, by clip; those without are left out.
+  std::map<std::int64_t, std::int64_t> Votes() const;
 
   // ---- people
   /// @param secret  of the link; its hash alone is kept.
@@ -180,6 +181,11 @@ class StudyStore {
   void AddPresentations(std::span<const Presentation> presentations);
   std::optional<Presentation> FindPresentation(const std::string& id) const;
   std::vector<Presentation> PresentationsOf(std::int64_t rater) const;
+  struct Progress {
+    std::int64_t done = 0, total = 0;  ///< clips, practice and examples not
+    std::int64_t practice_left = 0;
+  };
+  Progress ProgressOf(std::int64_t rater) const;
   /// The first open one of the rater's order whose clip still wants votes: those that count and those to come under a
   /// lease of others are fewer than raters_per_clip (gold and practice always are wanted, a repeat once its first is
   /// answered).

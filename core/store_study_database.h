@@ -15,5 +15,7 @@ struct StudyStore::Database {
 
 /// Tables, triggers and views of a study of schema 1.
 extern const char* const kStudySchema;
+/// What makes its questions quick; a study of an earlier evac gets them when it is next opened for writing.
+extern const char* const kStudyIndexes;
 
 }  // namespace evac

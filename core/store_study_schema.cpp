@@ -37,7 +37,6 @@ CREATE TABLE presentations (
   state TEXT NOT NULL DEFAULT 'open' CHECK (state IN ('open', 'answered', 'unplayable')),
   shown_ms INTEGER, lease_until_ms INTEGER NOT NULL DEFAULT 0,
   UNIQUE (rater, order_index));
-CREATE INDEX presentations_of_clip ON presentations (clip, state);
 CREATE UNIQUE INDEX one_first_showing ON presentations (rater, clip) WHERE repeat_of IS NULL;
 
 CREATE TABLE verdicts (
@@ -76,6 +75,18 @@ CREATE VIEW votes AS
   SELECT v.* FROM current_verdicts v JOIN raters r ON r.id = v.rater JOIN presentations p ON p.id = v.presentation
   WHERE r.counts = 1 AND p.showing IN ('counted', 'gold', 'import');
 PRAGMA user_version = 1;
+)sql";
+
+/// A rater's next clip, who holds one, how far a rater is: each read from an index of just those rows.
+const char* const kStudyIndexes = R"sql(
+CREATE INDEX IF NOT EXISTS presentations_to_finish ON presentations (rater, order_index)
+  WHERE state = 'open' AND shown_ms IS NOT NULL;
+CREATE INDEX IF NOT EXISTS presentations_to_come ON presentations (rater, order_index)
+  WHERE state = 'open' AND shown_ms IS NULL;
+CREATE INDEX IF NOT EXISTS presentations_held ON presentations (clip, lease_until_ms)
+  WHERE state = 'open' AND lease_until_ms > 0;
+CREATE INDEX IF NOT EXISTS presentations_of_rater ON presentations (rater, showing, state);
+DROP INDEX IF EXISTS presentations_of_clip;
 )sql";
 
 }  // namespace evac

@@ -107,27 +107,55 @@ std::vector<Presentation> StudyStore::PresentationsOf(std::int64_t rater) const 
   return presentations;
 }
 
+StudyStore::Progress StudyStore::ProgressOf(std::int64_t rater) const {
+  sqlite::Statement row = database_->connection.Query(
+      "SELECT showing, state = 'open', count(*) FROM presentations WHERE rater = ? GROUP BY showing, state", rater);
+  Progress progress;
+  while (row.Step()) {
+    const Showing showing = ShowingFromName(row.Text(0));
+    const bool is_open = row.Integer(1) != 0;
+    if (showing == Showing::kExample) continue;
+    if (showing == Showing::kPractice) {
+      if (is_open) progress.practice_left += row.Integer(2);
+      continue;
+    }
+    progress.total += row.Integer(2);
+    if (!is_open) progress.done += row.Integer(2);
+  }
+  return progress;
+}
+
 std::optional<Presentation> StudyStore::NextOpen(std::int64_t rater, std::span<const std::string> held,
                                                  std::int64_t now_ms) const {
+  const auto first_not_held = [held](sqlite::Statement row) -> std::optional<Presentation> {
+    while (row.Step()) {
+      Presentation found = PresentationOf(row);
+      if (std::ranges::find(held, found.id) == held.end()) return found;
+    }
+    return std::nullopt;
+  };
   // What was shown and not answered comes first: a reload goes on where it was, an undone verdict is asked again.
-  sqlite::Statement row = database_->connection.Query(
-      (std::string(kPresentationColumns) +
-       "WHERE p.rater = ?1 AND p.state = 'open' AND (p.shown_ms IS NOT NULL OR p.showing IN ('gold', 'practice', "
-       "'adjudication') OR "
+  sqlite::Connection& connection = database_->connection;
+  const std::string columns = kPresentationColumns;
+  if (auto shown = first_not_held(connection.Query(
+          (columns + "WHERE p.rater = ? AND p.state = 'open' AND p.shown_ms IS NOT NULL ORDER BY p.order_index")
+              .c_str(),
+          rater)))
+    return shown;
+  // The index stands in the order asked for, so that rows are looked at until the first that is wanted.
+  return first_not_held(connection.Query(
+      (columns +
+       "INDEXED BY presentations_to_come WHERE p.rater = ?1 AND p.state = 'open' AND p.shown_ms IS NULL "
+       "AND (p.showing IN ('gold', 'practice', 'adjudication') OR "
        "p.showing = 'repeat' AND EXISTS (SELECT 1 FROM presentations f WHERE f.id = p.repeat_of AND f.state = "
        "'answered') "
        "OR p.showing = 'counted' AND "
        "(SELECT count(*) FROM votes v WHERE v.clip = p.clip) + "
-       "(SELECT count(*) FROM presentations o WHERE o.clip = p.clip AND o.state = 'open' AND o.rater <> ?1 "
-       "AND o.lease_until_ms > ?2 AND o.showing = 'counted') < (SELECT raters_per_clip FROM study)) "
-       "ORDER BY p.shown_ms IS NULL, p.order_index")
+       "(SELECT count(*) FROM presentations o WHERE o.clip = p.clip AND o.state = 'open' AND o.lease_until_ms > 0 "
+       "AND o.lease_until_ms > ?2 AND o.rater <> ?1 AND o.showing = 'counted') < "
+       "(SELECT raters_per_clip FROM study)) ORDER BY p.order_index")
           .c_str(),
-      rater, now_ms);
-  while (row.Step()) {
-    Presentation found = PresentationOf(row);
-    if (std::ranges::find(held, found.id) == held.end()) return found;
-  }
-  return std::nullopt;
+      rater, now_ms));
 }
 
 void StudyStore::Lease(const std::string& presentation, std::int64_t until_ms, std::int64_t now_ms) {
@@ -247,7 +275,9 @@ std::vector<StudyStore::Unplayable> StudyStore::UnplayableClips() const {
 
 std::vector<Presentation> StudyStore::Leases(std::int64_t now_ms) const {
   sqlite::Statement row = database_->connection.Query(
-      (std::string(kPresentationColumns) + "WHERE p.state = 'open' AND p.lease_until_ms > ? ORDER BY p.rater").c_str(),
+      (std::string(kPresentationColumns) +
+       "WHERE p.state = 'open' AND p.lease_until_ms > 0 AND p.lease_until_ms > ? ORDER BY p.rater")
+          .c_str(),
       now_ms);
   std::vector<Presentation> leases;
   while (row.Step()) leases.push_back(PresentationOf(row));

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <map>
+#include <span>
 #include <tuple>
 
 #include "judges/rating_votes.h"
@@ -44,10 +45,25 @@ Json AgreementJson(const std::vector<RatedClip>& clips, int raters_per_clip) {
   return json;
 }
 
+/// @param disputes  in ascending order, as `clips` are.
+std::vector<const RatedClip*> DisputedFirst(const std::vector<RatedClip>& clips,
+                                            const std::vector<std::int64_t>& disputes) {
+  std::vector<const RatedClip*> ordered;
+  ordered.reserve(clips.size());
+  for (const RatedClip& rated : clips) ordered.push_back(&rated);
+  std::ranges::stable_partition(
+      ordered, [&](const RatedClip* rated) { return std::ranges::binary_search(disputes, rated->clip.id); });
+  return ordered;
+}
+
 /// One row per clip: what the matrix shows.
-Json ClipsJson(const std::vector<RatedClip>& clips) {
+Json ClipsJson(const std::vector<RatedClip>& clips, const std::vector<std::int64_t>& disputes,
+               const BoardRows& wanted) {
   Json rows = Json::array();
-  for (const RatedClip& rated : clips) {
+  const std::vector<const RatedClip*> ordered = DisputedFirst(clips, disputes);
+  const std::size_t from = std::min(wanted.from, ordered.size());
+  for (const RatedClip* one : std::span(ordered).subspan(from, std::min(wanted.count, ordered.size() - from))) {
+    const RatedClip& rated = *one;
     Json votes = Json::object();
     for (const auto& [rater, ballot] : rated.by_rater) votes[PublicName(rater)] = ballot.label;
     rows.push_back({{"clip", rated.clip.id},
@@ -165,7 +181,7 @@ Json RatesJson(const StudyStore& store, std::vector<RatedClip>& clips) {
 
 }  // namespace
 
-Json RatingBoard(const StudyStore& store, std::int64_t now_ms) {
+Json RatingBoard(const StudyStore& store, std::int64_t now_ms, const BoardRows& wanted) {
   const StudyInfo info = store.info();
   std::map<std::int64_t, StudyClip> by_id;
   for (StudyClip& clip : store.Clips()) by_id[clip.id] = std::move(clip);
@@ -183,7 +199,7 @@ Json RatingBoard(const StudyStore& store, std::int64_t now_ms) {
                           {"reason", one.reason}});
   std::int64_t excluded = 0;
   for (const StudyRater& rater : store.Raters()) excluded += rater.counts ? 0 : 1;
-  Json rows = ClipsJson(clips);  // in the study's order
+  Json rows = ClipsJson(clips, disputes, wanted);
   Json progress = ProgressJson(store, clips, now_ms), agreement = AgreementJson(clips, info.raters_per_clip);
   Json all = ToJson(RatesOf(clips)), rates = RatesJson(store, clips);
   return {{"study", info.name},
@@ -198,6 +214,7 @@ Json RatingBoard(const StudyStore& store, std::int64_t now_ms) {
           {"disputes", disputes},
           {"leases", leases},
           {"unplayable", unplayable},
+          {"clips_from", wanted.from},
           {"clips", std::move(rows)}};
 }
 

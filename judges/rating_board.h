@@ -1,14 +1,22 @@
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
+#include <limits>
 #include <nlohmann/json.hpp>
 
 #include "core/store_study.h"
 
 namespace evac {
 
+/// Which clips' rows are wanted, of all: disputed ones first, then the others, each in the study's order.
+struct BoardRows {
+  std::size_t from = 0, count = std::numeric_limits<std::size_t>::max();
+};
+
 /// All that a study's lead sees, and `evac rate status --json`: clips with their votes, rates, agreement, raters with
-/// concerns, blinding, disputes, leases. Numbers that are undefined are null with the reason beside them.
-nlohmann::ordered_json RatingBoard(const StudyStore& store, std::int64_t now_ms);
+/// concerns, blinding, disputes, leases. Numbers that are undefined are null with the reason beside them. They are of
+/// the whole study, whichever rows are wanted.
+nlohmann::ordered_json RatingBoard(const StudyStore& store, std::int64_t now_ms, const BoardRows& wanted = {});
 
 }  // namespace evac

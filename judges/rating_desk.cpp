@@ -91,14 +91,16 @@ void RatingDesk::Plan(const StudyRater& rater, std::int64_t now_ms) {
   OrderWriter writer(rater, next);
   std::vector<StudyClip> rated;
   std::vector<OrderedClip> ordered;
+  const std::map<std::int64_t, std::int64_t> votes = store_.Votes();
   for (const StudyClip& clip : clips) {
     if (clip.use == Showing::kExample || clip.use == Showing::kPractice) {
       writer.Add(clip, clip.use, now_ms);
       continue;
     }
     rated.push_back(clip);
+    const auto of_clip = votes.find(clip.id);
     ordered.push_back({clip.task + "\n" + clip.initial_state, clip.world + "\n" + clip.policy + "@" + clip.checkpoint,
-                       store_.VotesOf(clip.id)});
+                       of_clip == votes.end() ? 0 : of_clip->second});
   }
   const auto share = static_cast<std::size_t>(std::lround(options_.repeat_share * static_cast<double>(rated.size())));
   const std::size_t repeats =
@@ -112,17 +114,8 @@ void RatingDesk::Plan(const StudyRater& rater, std::int64_t now_ms) {
 }
 
 Json RatingDesk::Progress(const StudyRater& rater) const {
-  std::int64_t done = 0, total = 0, practice_left = 0;
-  for (const Presentation& p : store_.PresentationsOf(rater.id)) {
-    if (p.showing == Showing::kExample) continue;
-    if (p.showing == Showing::kPractice) {
-      if (p.state == "open") ++practice_left;
-      continue;
-    }
-    ++total;
-    if (p.state != "open") ++done;
-  }
-  return {{"done", done}, {"total", total}, {"practice_left", practice_left}};
+  const StudyStore::Progress progress = store_.ProgressOf(rater.id);
+  return {{"done", progress.done}, {"total", progress.total}, {"practice_left", progress.practice_left}};
 }
 
 DeskAnswer RatingDesk::Me(const StudyRater& rater, std::int64_t now_ms) {

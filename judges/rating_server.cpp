@@ -20,6 +20,7 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
+constexpr std::size_t kBoardRows = 200;  // a page; a large study has tens of thousands
 constexpr const char* kCookie = "evac_rating";
 constexpr const char* kPolicy =
     "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' data: blob:; media-src 'self' blob:; "
@@ -61,6 +62,7 @@ struct RatingServer::Impl {
       : options(std::move(given)),
         lock(options.study / "lock"),
         writer(StudyStore::Open(options.study, StudyStore::Mode::kReadWrite), true),
+        player(StudyStore::Open(options.study, StudyStore::Mode::kReadOnly), false),
         reader(StudyStore::Open(options.study, StudyStore::Mode::kReadOnly), false),
         http(options.host, options.port, options.limits,
              [this](HttpAsked asked, RatingHttp::Reply reply) { Answer(std::move(asked), std::move(reply)); }) {}
@@ -76,6 +78,8 @@ struct RatingServer::Impl {
     if (const auto page = StaticPage(asked)) return guarded(*page);
     if (asked.path == "/api/board")
       return reader.Push([this, asked](StudyStore& store) { return Board(asked, store); }, guarded);
+    if (asked.path.starts_with("/clip/") && asked.method != "POST")
+      return player.Push([this, asked](StudyStore& store) { return Routed(asked, store); }, guarded);
     writer.Push([this, asked](StudyStore& store) { return Routed(asked, store); }, guarded);
   }
 
@@ -247,14 +251,17 @@ struct RatingServer::Impl {
     const Caller caller = CallerOf(asked, store);
     if (const auto refusal = WhyNot(asked, caller, Now_ms())) return *refusal;
     if (caller.rater->role != RaterRole::kLead) return Refused(403, "role", "the board is the lead's");
-    return Said({200, RatingBoard(store, Now_ms())});
+    const auto from = ParseFrom(asked.query);
+    if (!from) return Refused(422, "query", "found '" + asked.query + "', wanted from=NUMBER");
+    return Said({200, RatingBoard(store, Now_ms(), {.from = *from, .count = kBoardRows})});
   }
 
   RatingServerOptions options;
   RunLock lock;
   std::mutex limits_mutex;
   RateLimiter strangers{{.burst = 30, .per_s = 0.5}}, raters{{.burst = 120, .per_s = 30}};
-  RatingWorker writer, reader;
+  // Who looks at clips or at the board waits for nobody's verdict to be written, and nobody's verdict for them.
+  RatingWorker writer, player, reader;
   RatingHttp http;
 };
 
@@ -280,6 +287,7 @@ void RatingServer::Serve() { impl_->http.Serve(); }
 void RatingServer::Stop() {
   impl_->http.Stop();
   impl_->writer.Stop();
+  impl_->player.Stop();
   impl_->reader.Stop();
 }
 

@@ -172,6 +172,13 @@ void ReadWatching(Fields& fields, HumanVerdict& verdict) {
   verdict.pixel_ratio = fields.Real("pixel_ratio", 0, 100);
 }
 
+std::optional<std::uint64_t> WholeNumber(std::string_view digits) {
+  std::uint64_t value = 0;
+  const auto [end, error] = std::from_chars(digits.data(), digits.data() + digits.size(), value);
+  if (digits.empty() || error != std::errc() || end != digits.data() + digits.size()) return std::nullopt;
+  return value;
+}
+
 }  // namespace
 
 const std::vector<std::string>& RatingFlags() {
@@ -251,20 +258,20 @@ Parsed<GuessBody> ParseGuess(std::string_view text) {
   return Result(fields, std::move(body));
 }
 
+std::optional<std::size_t> ParseFrom(std::string_view query) {
+  constexpr std::string_view kName = "from=";
+  if (query.empty()) return 0;
+  return query.starts_with(kName) ? WholeNumber(query.substr(kName.size())) : std::nullopt;
+}
+
 std::optional<ByteRange> ParseRange(std::string_view header, std::uint64_t size) {
   constexpr std::string_view kUnit = "bytes=";
   if (!header.starts_with(kUnit)) return std::nullopt;
   header.remove_prefix(kUnit.size());
   const std::size_t dash = header.find('-');
   if (dash == std::string_view::npos) return std::nullopt;
-  const auto number = [](std::string_view digits) -> std::optional<std::uint64_t> {
-    std::uint64_t value = 0;
-    const auto [end, error] = std::from_chars(digits.data(), digits.data() + digits.size(), value);
-    if (digits.empty() || error != std::errc() || end != digits.data() + digits.size()) return std::nullopt;
-    return value;
-  };
   const std::string_view first_text = header.substr(0, dash), last_text = header.substr(dash + 1);
-  const auto first = number(first_text), last = number(last_text);
+  const auto first = WholeNumber(first_text), last = WholeNumber(last_text);
   if ((!first && !first_text.empty()) || (!last && !last_text.empty()) || (!first && !last)) return std::nullopt;
   if (!first) {
     const std::uint64_t count = std::min(*last, size);

@@ -70,6 +70,9 @@ struct ByteRange {
 /// Nothing if it is another kind, more than one, or outside of the file.
 std::optional<ByteRange> ParseRange(std::string_view header, std::uint64_t size);
 
+/// "" or "from=200" of a question for part of a list: where it begins.
+std::optional<std::size_t> ParseFrom(std::string_view query);
+
 /// The value of one cookie in a Cookie header, or "".
 std::string_view CookieOf(std::string_view header, std::string_view name);
 

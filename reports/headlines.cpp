@@ -173,19 +173,24 @@ void AddStage(const ReportData& report, std::vector<HeadlineItem>& items) {
        "#stages"});
 }
 
-void AddMorePairs(const ReportData& report, std::vector<HeadlineItem>& items) {
-  for (const TrustReport& trust : report.trust) {
-    const TaskTrust* nearest = nullptr;
-    for (const TaskTrust& task : trust.tasks) {
-      if (task.trust == Trust::kUnknown && task.more && (nearest == nullptr || *task.more < *nearest->more))
-        nearest = &task;
-    }
-    if (nearest == nullptr) continue;
-    items.push_back({"",
-                     fmt::format("About {} would decide whether {} may be trusted at {}",
-                                 Counted(*nearest->more, "more pair"), trust.world, nearest->task),
-                     "#trust"});
+/// Tasks at which it is open whether a world may be trusted, the cheapest to decide first.
+void AddTrustToDecide(const TrustReport& trust, std::vector<HeadlineItem>& items) {
+  std::vector<const TaskTrust*> open;
+  for (const TaskTrust& task : trust.tasks) {
+    if (task.trust == Trust::kUnknown && task.more) open.push_back(&task);
   }
+  if (open.empty()) return;
+  std::ranges::stable_sort(open, {}, [](const TaskTrust* task) { return *task->more; });
+  std::string text = fmt::format("To decide whether {} may be trusted: about {} at {}", trust.world,
+                                 Counted(*open[0]->more, "more pair"), open[0]->task);
+  for (std::size_t i = 1; i < std::min(open.size(), kMostNamed); ++i)
+    text += fmt::format(", {} at {}", *open[i]->more, open[i]->task);
+  if (open.size() > kMostNamed) text += fmt::format("; {} further tasks", open.size() - kMostNamed);
+  items.push_back({"", std::move(text), "#trust"});
+}
+
+void AddMorePairs(const ReportData& report, std::vector<HeadlineItem>& items) {
+  for (const TrustReport& trust : report.trust) AddTrustToDecide(trust, items);
   for (const Candidate& candidate : report.candidates) {
     const ComparisonRow& all = candidate.comparison.all;
     if (IsDecided(candidate.p_holm) || !all.more) continue;

@@ -46,6 +46,33 @@ std::string Raters(const JudgeReport& judges) {
                      judges.alpha ? Plain(*judges.alpha) : "undefined: " + Escaped(judges.alpha.reason()));
 }
 
+/// "312 ok, 3 timeout, 1 parse_error"
+std::string CallsByStatus(const CallTotals& totals) {
+  std::string text;
+  for (const auto& [status, count] : totals.calls)
+    text += fmt::format("{}{} {}", text.empty() ? "" : ", ", count, Escaped(status));
+  return text;
+}
+
+/// What asking model servers took. The money is the server's owner's business: prices are in nobody's reply.
+std::string Calls(const std::vector<CallTotals>& all) {
+  if (all.empty()) return "";
+  std::string html =
+      "<h3>Calls to model servers</h3><div class=\"wide\"><table class=\"points\"><thead><tr><th scope=\"col\">judge</th>"
+      "<th scope=\"col\">calls by how they ended</th><th scope=\"col\" class=\"num\" title=\"tries again "
+      "included\">requests</th><th scope=\"col\" class=\"num\">prompt tokens</th><th scope=\"col\" "
+      "class=\"num\">completion tokens</th><th scope=\"col\" class=\"num\" title=\"the sum; calls may have run "
+      "side by side\">seconds waited</th></tr></thead><tbody>";
+  for (const CallTotals& totals : all) {
+    html += fmt::format(
+        "<tr><th scope=\"row\">{}</th><td>{}</td><td class=\"num\">{}</td><td class=\"num\">{}</td><td "
+        "class=\"num\">{}</td><td class=\"num\">{:.1f}</td></tr>",
+        Breakable(totals.judge), CallsByStatus(totals), totals.attempts, totals.prompt_tokens, totals.completion_tokens,
+        static_cast<double>(totals.latency_ms) / 1000);
+  }
+  return html + "</tbody></table></div>";
+}
+
 }  // namespace
 
 std::string JudgesPart(const ReportData& report) {
@@ -60,7 +87,7 @@ std::string JudgesPart(const ReportData& report) {
                            ? " It reads the simulator’s physics against the rubric; whether people would call the same "
                              "episodes a success is not measured."
                            : "") +
-           Raters(judges) + "</section>";
+           Raters(judges) + Calls(report.summary.data.judge_calls) + "</section>";
   }
   html += fmt::format(
       "<p class=\"quiet\">Each judge held against <b>{}</b>, world by world. Matrix: both success · only the judge · "
@@ -76,7 +103,7 @@ std::string JudgesPart(const ReportData& report) {
       "scope=\"col\">probabilities</th></tr></thead><tbody>",
       Escaped(judges.truth), Escaped(judges.truth), 100 * report.summary.options.confidence);
   for (const JudgeAgreement& judge : judges.judges) html += JudgeRow(judge);
-  return html + "</tbody></table></div>" + Raters(judges) + "</section>";
+  return html + "</tbody></table></div>" + Raters(judges) + Calls(report.summary.data.judge_calls) + "</section>";
 }
 
 }  // namespace evac

@@ -125,7 +125,7 @@ std::vector<WorldComparison> ComparisonsOf(const RunSummary& summary) {
 RunData ReadRun(const Store& store) {
   return {store.run(),        store.Tasks(),           store.Worlds(),           store.Policies(),
           store.Episodes(),   store.CurrentVerdicts(), store.CountersByPolicy(), store.RealTrials(),
-          store.GateRecords()};
+          store.GateRecords(), TotalsOfCalls(store.folder())};
 }
 
 std::int64_t RateCell::Apart() const {

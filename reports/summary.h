@@ -9,6 +9,7 @@
 
 #include "core/statistics/estimate.h"
 #include "core/store.h"
+#include "core/store_calls.h"
 #include "core/types.h"
 #include "reports/comparison.h"
 #include "reports/outcome.h"
@@ -27,6 +28,7 @@ struct RunData {
   std::map<std::string, Counters> counters;                        ///< per policy
   std::vector<RealTrial> real_trials = {};                         ///< imported ones, in the order they were added
   std::vector<GateRecord> gates;                                   ///< what gates decided, oldest first
+  std::vector<CallTotals> judge_calls = {};                        ///< to model servers, by judge
 };
 RunData ReadRun(const Store& store);
 

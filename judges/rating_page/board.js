@@ -3,8 +3,8 @@ const percent = number => number.value === null ? '–' : `${(100 * number.value
 const decimal = number => number.value === null ? '–' : number.value.toFixed(3);
 const range = number => number.low === undefined ? '' : `[${number.low.toFixed(2)}, ${number.high.toFixed(2)}]`;
 
-async function board() {
-  const data = await patiently(() => get('/api/board'));
+async function board(from = 0, height_px = 0) {
+  const data = await patiently(() => get(`/api/board?from=${from}`));
   const {progress} = data;
   const screen = show(make('.board', {},
     make('header', {}, make('h1', {}, data.study), make('p.quiet', {}, `${progress.complete} of ${plural(progress.clips, 'clip')} have ${plural(data.raters_per_clip, 'vote')}; ${progress.votes} votes, ${progress.missing} missing` +
@@ -20,8 +20,9 @@ async function board() {
     make('section', {}, make('h2', {}, 'Clips'), matrix(data)),
     data.leases.length ? make('section', {}, make('h2', {}, 'Being rated now'), make('p', {}, data.leases.map(lease => `${lease.rater}: clip ${lease.clip}, ${Math.ceil(lease.left_s / 60)} min`).join(' · '))) : null));
   screen.className = 'wide-screen';
+  window.scrollTo(0, height_px);
   clearTimeout(board.timer);
-  board.timer = setTimeout(() => { if (document.visibilityState === 'visible' && $('.board')) board().catch(() => {}); }, 15000);
+  board.timer = setTimeout(() => { if (document.visibilityState === 'visible' && $('.board')) board(from, window.scrollY).catch(() => {}); }, 15000);
 }
 
 const figure = (name, value, under) => make('.figure', {}, make('span.quiet', {}, name), make('b', {}, value), make('small.quiet', {}, under));
@@ -54,15 +55,23 @@ function ratesTable(data) {
     `${rate.task}, ${rate.world}${hasRubrics ? `, rubric ${rate.rubric}` : ''}`, String(rate.clips), String(rate.decided), percent(rate.majority), percent(rate.soft), percent(rate.unanimous), percent(rate.dawid_skene), `${percent(rate.low)} … ${percent(rate.high)}`]), 'Rates');
 }
 
-/** Clips by raters, a letter each; disputes first. */
+/** Clips by the raters who saw them, a letter each; disputes first; a page at a time. */
 function matrix(data) {
-  const raters = data.raters.filter(rater => rater.role === 'rater' && rater.verdicts > 0).map(rater => rater.rater);
+  const seen = new Set(data.clips.flatMap(clip => Object.keys(clip.votes)));
+  const raters = data.raters.filter(rater => seen.has(rater.rater)).map(rater => rater.rater);
   const letters = {success: 'S', failure: 'F', cannot_tell: 'U'}, disputed = new Set(data.disputes);
-  const clips = [...data.clips].sort((a, b) => disputed.has(b.clip) - disputed.has(a.clip));
-  const most = 400;
-  const rows = clips.slice(0, most).map(clip => make('tr' + (disputed.has(clip.clip) ? '.disputed' : ''), {}, make('th', {scope: 'row'}, clip.episode, clip.use === 'gold' ? make('small.quiet', {}, ' known') : null),
+  const rows = data.clips.map(clip => make('tr' + (disputed.has(clip.clip) ? '.disputed' : ''), {}, make('th', {scope: 'row'}, clip.episode, clip.use === 'gold' ? make('small.quiet', {}, ' known') : null),
     raters.map(rater => make('td.vote', {'data-vote': clip.votes[rater] || null}, letters[clip.votes[rater]] || '')),
     make('td', {}, clip.label ? words[clip.label] : '–'), make('td.quiet', {}, clip.how)));
   return make('.scroll', {tabindex: '0', role: 'region', 'aria-label': 'Clips and votes'}, make('table.matrix', {}, make('thead', {}, make('tr', {}, make('th', {scope: 'col'}, 'Episode'), raters.map(rater => make('th', {scope: 'col'}, rater)), make('th', {scope: 'col'}, 'Label'), make('th', {scope: 'col'}, 'How'))), make('tbody', {}, rows)),
-    clips.length > most ? make('p.quiet', {}, `${clips.length - most} more: evac rate status --json`) : null);
+    pages(data));
+}
+
+/** Where the rows shown are among all of them, with ways to the others. */
+function pages(data) {
+  const all = data.progress.clips, first = data.clips_from, end = first + data.clips.length;
+  if (first === 0 && end === all) return null;
+  const to = (name, from, isThere) => make('button', {type: 'button', disabled: !isThere, onclick: () => board(from, window.scrollY)}, name);
+  board.rows = Math.max(board.rows || 1, data.clips.length);
+  return make('.row', {}, to('Previous', Math.max(0, first - board.rows), first > 0), to('Next', end, end < all), make('span.quiet', {}, `${first + 1} … ${end} of ${all}, disputes first`));
 }

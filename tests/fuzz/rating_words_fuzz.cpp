@@ -50,6 +50,8 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   OneOrTheOther(evac::ParsePresentation(text));
   OneOrTheOther(evac::ParseWithdraw(text));
   OneOrTheOther(evac::ParseGuess(text));
+  const auto from = evac::ParseFrom(text);
+  Require(!from || text.empty() || text.starts_with("from="));
   const std::string_view cookie = evac::CookieOf(text, "evac_rating");
   Require(cookie.find(';') == std::string_view::npos);
   return 0;

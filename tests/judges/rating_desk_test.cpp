@@ -6,6 +6,8 @@
 #include <set>
 
 #include "core/error.h"
+#include "core/store_sqlite.h"
+#include "judges/rating_board.h"
 #include "judges/rating_votes.h"
 #include "tests/judges/rating_support.h"
 
@@ -84,7 +86,7 @@ TEST_F(RatingDeskTest, UndoAddsARowAndTheClipIsAskedAgain) {
   EXPECT_EQ(desk.Retract(ann.Me(), undo, 2).status, 200) << "sent twice, done once";
   EXPECT_EQ(Rows(), 2);
   EXPECT_FALSE(store.CurrentVerdict(clip));
-  EXPECT_EQ(store.VotesOf(store.FindPresentation(clip)->clip), 0);
+  EXPECT_EQ(store.Votes()[store.FindPresentation(clip)->clip], 0);
   EXPECT_EQ(ann.Next().body.at("presentation"), clip);
   EXPECT_EQ(ann.Say(clip, "failure").status, 200);
   EXPECT_EQ(store.CurrentVerdict(clip)->label, "failure");
@@ -109,7 +111,7 @@ TEST_F(RatingDeskTest, ManyRatersGiveEachClipTheVotesItWantsAndNoMore) {
   const int total = ann.RateAll(label) + bob.RateAll(label) + eve.RateAll(label);
   const auto clips = static_cast<int>(store.Clips().size());
   EXPECT_GE(total, 2 * clips);
-  for (const StudyClip& clip : store.Clips()) EXPECT_EQ(store.VotesOf(clip.id), 2) << clip.episode;
+  for (const StudyClip& clip : store.Clips()) EXPECT_EQ(store.Votes()[clip.id], 2) << clip.episode;
 }
 
 TEST_F(RatingDeskTest, ALeaseHoldsAPlaceUntilItExpiresAndALateVoteStillCounts) {
@@ -129,7 +131,7 @@ TEST_F(RatingDeskTest, ALeaseHoldsAPlaceUntilItExpiresAndALateVoteStillCounts) {
   ann.now_ms += 600'001;
   const std::string late = held.front();
   EXPECT_EQ(ann.Say(late, "success").status, 200);
-  EXPECT_EQ(store.VotesOf(store.FindPresentation(late)->clip), 3) << "N + 1, never thrown away";
+  EXPECT_EQ(store.Votes()[store.FindPresentation(late)->clip], 3) << "N + 1, never thrown away";
 }
 
 TEST_F(RatingDeskTest, AReloadGoesOnWithTheSameClip) {
@@ -186,9 +188,9 @@ TEST_F(RatingDeskTest, WhoLeavesDecidesWhetherTheVerdictsCount) {
   bob.RateAll(label);
   eve.RateAll(label);
   const std::int64_t clip = store.FindPresentation(noted.presentation)->clip;
-  const std::int64_t before = store.VotesOf(clip);
+  const std::int64_t before = store.Votes()[clip];
   desk.Withdraw(ann.Me(), {.keep = false, .erase = true}, 9);
-  EXPECT_EQ(store.VotesOf(clip), before - 1);
+  EXPECT_EQ(store.Votes()[clip], before - 1);
   EXPECT_FALSE(store.RaterOfSession(ann.session)) << "the session is over";
   EXPECT_EQ(desk.Join({ann.link, ann.uuid, ""}, 9).status, 410);
   EXPECT_EQ(store.Rater(ann.id).name, "");
@@ -256,6 +258,37 @@ TEST_F(RatingDeskTest, AdjudicatorsSayWhatTheySeeBeforeTheySeeTheOthers) {
   HumanVerdict usurped = ann.Watched(store.PresentationsOf(ann.id)[0].id, "failure");
   usurped.is_final = true;
   EXPECT_EQ(ann.Say(usurped).status, 403);
+}
+
+TEST_F(RatingDeskTest, TheBoardGivesItsRowsInPagesDisputesFirstAndItsNumbersOfAll) {
+  AtTheDesk ann(store, desk), bob(store, desk);
+  ann.RateAll([](const StudyClip&) { return "success"; });
+  bob.RateAll([](const StudyClip& clip) { return clip.initial_state == "41-0003" ? "failure" : "success"; });
+  const auto whole = RatingBoard(store, 0);
+  ASSERT_EQ(whole.at("clips").size(), 16u);
+  ASSERT_EQ(whole.at("disputes").size(), 2u);
+  for (std::size_t i = 0; i < 2; ++i) EXPECT_EQ(whole.at("clips")[i].at("clip"), whole.at("disputes")[i]);
+  auto rows = nlohmann::ordered_json::array();
+  for (std::size_t from = 0; from < 16; from += 5) {
+    const auto page = RatingBoard(store, 0, {.from = from, .count = 5});
+    EXPECT_EQ(page.at("clips_from"), from);
+    for (const auto& row : page.at("clips")) rows.push_back(row);
+    EXPECT_EQ(page.at("rates"), whole.at("rates"));
+    EXPECT_EQ(page.at("progress"), whole.at("progress"));
+  }
+  EXPECT_EQ(rows, whole.at("clips"));
+  EXPECT_TRUE(RatingBoard(store, 0, {.from = 17, .count = 5}).at("clips").empty());
+}
+
+TEST_F(RatingDeskTest, AStudyOfAnEarlierEvacIsMadeQuickWhenItIsOpened) {
+  {
+    sqlite::Connection old = sqlite::Connection::OpenReadWrite(study.folder() / "study.sqlite");
+    old.RunScript("DROP INDEX presentations_to_come; CREATE INDEX presentations_of_clip ON presentations (clip)");
+  }
+  StudyStore reopened = study.Open();
+  RatingDesk again(reopened, {});
+  AtTheDesk ann(reopened, again);
+  EXPECT_TRUE(ann.Next().body.contains("presentation"));
 }
 
 TEST(RatingDeskGold, PracticeTellsWhatIsKnownAndGoldDoesNot) {

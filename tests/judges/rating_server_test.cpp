@@ -122,6 +122,8 @@ TEST_F(RatingServerTest, WithoutAnInvitationThereIsAPageAndNothingElse) {
   EXPECT_EQ(Get("/api/board", ann).status, 403) << "a rater sees no board";
   const std::string lead = Join(RaterRole::kLead);
   EXPECT_EQ(Get("/api/board", lead).status, 200);
+  EXPECT_EQ(Get("/api/board?from=200", lead).status, 200);
+  EXPECT_EQ(Get("/api/board?from=all", lead).status, 422);
   EXPECT_EQ(Post("/api/next", "{\"tab_epoch\":0}", lead).status, 403);
 }
 

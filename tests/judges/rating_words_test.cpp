@@ -77,6 +77,14 @@ TEST(RatingWords, RangesStayInsideTheFile) {
     EXPECT_EQ(range(bad).first, -1) << bad;
 }
 
+TEST(RatingWords, WhereAListBeginsIsAWholeNumberOrNothing) {
+  EXPECT_EQ(ParseFrom(""), 0u);
+  EXPECT_EQ(ParseFrom("from=0"), 0u);
+  EXPECT_EQ(ParseFrom("from=200"), 200u);
+  for (const char* wrong : {"from=", "from=-1", "from=1&from=2", "from=1.5", "from=99999999999999999999", "From=1", "x"})
+    EXPECT_FALSE(ParseFrom(wrong)) << wrong;
+}
+
 TEST(RatingWords, ACookieIsFoundAmongOthers) {
   EXPECT_EQ(CookieOf("a=1; evac_rating=abc; b=2", "evac_rating"), "abc");
   EXPECT_EQ(CookieOf("xevac_rating=abc", "evac_rating"), "");

@@ -12,6 +12,7 @@
 #include "reports/charts.h"
 #include "reports/html.h"
 #include "tests/reports/sample_run.h"
+#include "tests/reports/stored_run.h"
 
 namespace evac {
 namespace {
@@ -262,6 +263,23 @@ TEST(ReportPage, CarriesThumbnailsInsideWhenAskedTo) {
   const std::string page = ReportPage(run.Summary(), options);
   EXPECT_EQ(Matches(page, "(\"SlBFRw==\")").size(), 4U) << "of pick@1 in both worlds";
   EXPECT_THAT(ReportPage(run.Summary(), kBeside), Not(HasSubstr("SlBFRw==")));
+}
+
+TEST(Page, SaysWhatAskingModelServersTook) {
+  const StoredRun run("asked", "sf", "sf");
+  EXPECT_THAT(ReportPage(Summarise(ReadRun(run.store()), {}), kBeside), Not(HasSubstr("Calls to model servers")));
+  {
+    CallCache cache(run.folder() / CallCache::kFile);
+    for (const char* status : {"ok", "ok", "timeout"})
+      cache.Add({.key = "k", .judge = "vlm:<b>", .status = status, .prompt_tokens = 1000, .completion_tokens = 70,
+                 .latency_ms = 1500, .attempts = 2});
+  }
+  const std::string page = ReportPage(Summarise(ReadRun(run.store()), {}), kBeside);
+  EXPECT_THAT(page, HasSubstr("Calls to model servers"));
+  EXPECT_THAT(page, HasSubstr("<td>2 ok, 1 timeout</td><td class=\"num\">6</td><td class=\"num\">3000</td><td "
+                              "class=\"num\">210</td><td class=\"num\">4.5</td>"));
+  EXPECT_THAT(page, Not(HasSubstr("vlm:<b>")));
+  EXPECT_TRUE(UnbalancedTags(page).empty());
 }
 
 }  // namespace

@@ -30,6 +30,7 @@ class StoredRun {
 
   std::filesystem::path folder() const { return parent_.path() / name_; }
   Store& store() { return store_; }
+  const Store& store() const { return store_; }
 
   void Add(const std::string& state, char real, char sim) {
     AddEpisode({{"take", state, "pick", "1", 1}, "real"}, real);
