@@ -61,8 +61,10 @@ struct CallCache::Database {
 CallCache::CallCache(const std::filesystem::path& file)
     : database_(new Database{sqlite::Connection::OpenReadWrite(file)}) {
   sqlite::Connection& connection = database_->connection;
-  if (Pragma(connection, "PRAGMA user_version") != 0 || Pragma(connection, "SELECT count(*) FROM sqlite_schema") != 0)
-    return Check(connection, file);
+  if (Pragma(connection, "PRAGMA user_version") != 0 || Pragma(connection, "SELECT count(*) FROM sqlite_schema") != 0) {
+    Check(connection, file);
+    return;
+  }
   sqlite::Transaction transaction(connection);
   connection.RunScript(kSchema);
   connection.RunScript(fmt::format("PRAGMA application_id = {}", kApplicationId));
