@@ -8,7 +8,7 @@
 
 #include "core/error.h"
 #include "core/store.h"
-#include "judges/rating_votes.h"
+#include "judges/rating_tally.h"
 
 namespace evac {
 namespace {
@@ -105,7 +105,9 @@ std::int64_t WriteTo(const std::string& run, const std::vector<Verdict>& verdict
 }  // namespace
 
 Resolved ResolveStudy(const StudyStore& study, const ResolveOptions& options) {
-  const std::vector<RatedClip> clips = RatedClips(study);
+  RatingTally tally;
+  tally.Read(study);
+  const std::vector<RatedClip>& clips = tally.rated();
   if (!options.mix_rubrics) CheckRubrics(clips);
   const auto facts = FactsOf(study);
   const std::string name = study.info().name;

@@ -217,8 +217,9 @@ class StudyStore {
   std::vector<Said> CurrentOf(std::int64_t clip) const;
   std::vector<Said> CurrentBy(std::int64_t rater) const;
 
-  /// The same, all of them that count, without what only an export wants.
+  /// A verdict as it is counted, without what only an export wants.
   struct Ballot {
+    std::int64_t id = 0, supersedes = 0;  ///< of verdicts; 0: it replaces none
     std::int64_t rater = 0, clip = 0;
     std::string label;
     Showing showing = Showing::kCounted;
@@ -228,7 +229,8 @@ class StudyStore {
     bool has_flags = false;
     double rt_ms = 0, max_speed = 0;
   };
-  std::vector<Ballot> Ballots() const;
+  /// Every row after that verdict, oldest first: replaced ones, "retracted" ones and those that do not count too.
+  std::vector<Ballot> BallotsAfter(std::int64_t verdict) const;
   /// Rows of any kind but undone ones, by the server's clock.
   std::int64_t VerdictsSince(std::int64_t from_ms) const;
   /// Clips with all their votes that somebody must decide: split, nobody could tell, against the reference, or flagged

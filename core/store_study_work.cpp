@@ -229,16 +229,17 @@ std::vector<StudyStore::Said> StudyStore::CurrentBy(std::int64_t rater) const {
   return AllSaid(database_->connection.Query(EVAC_SAID "WHERE v.rater = ? ORDER BY v.id", rater));
 }
 
-std::vector<StudyStore::Ballot> StudyStore::Ballots() const {
+std::vector<StudyStore::Ballot> StudyStore::BallotsAfter(std::int64_t verdict) const {
   sqlite::Statement row = database_->connection.Query(
-      "SELECT v.rater, v.clip, v.label, p.showing, r.role, v.is_final, v.stages, v.flags <> '', v.rt_ms, v.max_speed "
-      "FROM current_verdicts v JOIN presentations p ON p.id = v.presentation JOIN raters r ON r.id = v.rater "
-      "WHERE r.counts = 1 ORDER BY v.id");
+      "SELECT v.id, coalesce(v.supersedes, 0), v.rater, v.clip, v.label, p.showing, r.role, v.is_final, v.stages, "
+      "v.flags <> '', v.rt_ms, v.max_speed FROM verdicts v JOIN presentations p ON p.id = v.presentation "
+      "JOIN raters r ON r.id = v.rater WHERE v.id > ? ORDER BY v.id",
+      verdict);
   std::vector<Ballot> ballots;
   while (row.Step()) {
-    ballots.push_back({row.Integer(0), row.Integer(1), row.Text(2), ShowingFromName(row.Text(3)),
-                       RaterRoleFromName(row.Text(4)), row.Integer(5) != 0, static_cast<int>(row.Integer(6)),
-                       row.Integer(7) != 0, row.Real(8), row.Real(9)});
+    ballots.push_back({row.Integer(0), row.Integer(1), row.Integer(2), row.Integer(3), row.Text(4),
+                       ShowingFromName(row.Text(5)), RaterRoleFromName(row.Text(6)), row.Integer(7) != 0,
+                       static_cast<int>(row.Integer(8)), row.Integer(9) != 0, row.Real(10), row.Real(11)});
   }
   return ballots;
 }

@@ -3,9 +3,10 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <map>
 #include <span>
-#include <tuple>
+#include <string_view>
 
 #include "judges/rating_votes.h"
 
@@ -78,14 +79,11 @@ Json ClipsJson(const std::vector<RatedClip>& clips, const std::vector<std::int64
   return rows;
 }
 
-Json RatersJson(const StudyStore& store, const std::vector<StudyStore::Ballot>& ballots,
-                const std::map<std::int64_t, StudyClip>& clips) {
+Json RatersJson(const StudyStore& store, const RatingTally& tally) {
   const double period_s = store.info().period_s;
-  std::map<std::int64_t, std::vector<StudyStore::Ballot>> by_rater;
-  for (const StudyStore::Ballot& ballot : ballots) by_rater[ballot.rater].push_back(ballot);
   Json rows = Json::array();
   for (const StudyRater& rater : store.Raters()) {
-    const RaterQuality quality = QualityOfRater(by_rater[rater.id], clips, period_s);
+    const RaterQuality quality = QualityOfRater(tally.By(rater.id), tally.clips(), period_s);
     rows.push_back({{"rater", PublicName(rater.id)},
                     {"name", rater.name},
                     {"role", Name(rater.role)},
@@ -104,10 +102,10 @@ Json RatersJson(const StudyStore& store, const std::vector<StudyStore::Ballot>& 
 }
 
 /// Bang's index per kind of world: did raters see which clips are generated?
-Json BlindingJson(const StudyStore& store, const std::map<std::int64_t, StudyClip>& clips) {
+Json BlindingJson(const StudyStore& store, const RatingTally& tally) {
   std::map<bool, BlindingGuesses> guesses;
   for (const StudyStore::Guess& guess : store.Guesses()) {
-    const bool is_real = clips.at(guess.clip).is_real;
+    const bool is_real = tally.clips().at(guess.clip).is_real;
     BlindingGuesses& of_world = guesses[is_real];
     if (guess.guess == "unsure")
       ++of_world.unsure;
@@ -156,25 +154,21 @@ std::map<std::string, std::string> VersionsByHash(const StudyStore& store) {
   return versions;
 }
 
-/// By task, world and rubric: verdicts by different rubrics are in no rate together. Sorts the clips so that each group
-/// lies together.
-Json RatesJson(const StudyStore& store, std::vector<RatedClip>& clips) {
+/// By task, world and rubric: verdicts by different rubrics are in no rate together.
+Json RatesJson(const StudyStore& store, const std::vector<RatedClip>& clips) {
   const std::map<std::string, std::string> versions = VersionsByHash(store);
-  const auto group = [&versions](const RatedClip& rated) {
+  std::map<std::array<std::string_view, 4>, std::vector<const RatedClip*>> groups;
+  for (const RatedClip& rated : clips) {
     const StudyClip& clip = rated.clip;
-    return std::tie(clip.task, clip.world, versions.at(clip.rubric_hash), clip.rubric_hash);
-  };
-  std::ranges::stable_sort(clips, {}, group);
+    groups[{clip.task, clip.world, versions.at(clip.rubric_hash), clip.rubric_hash}].push_back(&rated);
+  }
   Json rates = Json::array();
-  for (auto begin = clips.begin(); begin != clips.end();) {
-    const auto end =
-        std::find_if(begin, clips.end(), [&](const RatedClip& clip) { return group(clip) != group(*begin); });
-    Json row = ToJson(RatesOf({begin, end}));
-    row["task"] = begin->clip.task;
-    row["world"] = begin->clip.world;
-    row["rubric"] = versions.at(begin->clip.rubric_hash);
+  for (const auto& [name, group] : groups) {
+    Json row = ToJson(RatesOf(group));
+    row["task"] = name[0];
+    row["world"] = name[1];
+    row["rubric"] = name[2];
     rates.push_back(std::move(row));
-    begin = end;
   }
   return rates;
 }
@@ -182,12 +176,15 @@ Json RatesJson(const StudyStore& store, std::vector<RatedClip>& clips) {
 }  // namespace
 
 Json RatingBoard(const StudyStore& store, std::int64_t now_ms, const BoardRows& wanted) {
+  RatingTally tally;
+  return RatingBoard(store, tally, now_ms, wanted);
+}
+
+Json RatingBoard(const StudyStore& store, RatingTally& tally, std::int64_t now_ms, const BoardRows& wanted) {
+  tally.Read(store);
   const StudyInfo info = store.info();
-  std::map<std::int64_t, StudyClip> by_id;
-  for (StudyClip& clip : store.Clips()) by_id[clip.id] = std::move(clip);
-  const std::vector<StudyStore::Ballot> ballots = store.Ballots();
-  std::vector<RatedClip> clips = RatedClips(store, ballots);
-  const std::vector<std::int64_t> disputes = store.Disputes();
+  const std::vector<RatedClip>& clips = tally.rated();
+  const std::vector<std::int64_t> disputes = tally.Disputes();
   Json leases = Json::array(), unplayable = Json::array();
   for (const Presentation& lease : store.Leases(now_ms))
     leases.push_back(
@@ -195,27 +192,24 @@ Json RatingBoard(const StudyStore& store, std::int64_t now_ms, const BoardRows& 
   for (const StudyStore::Unplayable& one : store.UnplayableClips())
     unplayable.push_back({{"rater", PublicName(one.rater)},
                           {"clip", one.clip},
-                          {"episode", by_id.at(one.clip).episode},
+                          {"episode", tally.clips().at(one.clip).episode},
                           {"reason", one.reason}});
   std::int64_t excluded = 0;
   for (const StudyRater& rater : store.Raters()) excluded += rater.counts ? 0 : 1;
-  Json rows = ClipsJson(clips, disputes, wanted);
-  Json progress = ProgressJson(store, clips, now_ms), agreement = AgreementJson(clips, info.raters_per_clip);
-  Json all = ToJson(RatesOf(clips)), rates = RatesJson(store, clips);
   return {{"study", info.name},
           {"raters_per_clip", info.raters_per_clip},
-          {"progress", std::move(progress)},
+          {"progress", ProgressJson(store, clips, now_ms)},
           {"raters_excluded", excluded},
-          {"all", std::move(all)},
-          {"rates", std::move(rates)},
-          {"agreement", std::move(agreement)},
-          {"blinding", BlindingJson(store, by_id)},
-          {"raters", RatersJson(store, ballots, by_id)},
+          {"all", ToJson(RatesOf(clips))},
+          {"rates", RatesJson(store, clips)},
+          {"agreement", AgreementJson(clips, info.raters_per_clip)},
+          {"blinding", BlindingJson(store, tally)},
+          {"raters", RatersJson(store, tally)},
           {"disputes", disputes},
           {"leases", leases},
           {"unplayable", unplayable},
           {"clips_from", wanted.from},
-          {"clips", std::move(rows)}};
+          {"clips", ClipsJson(clips, disputes, wanted)}};
 }
 
 }  // namespace evac

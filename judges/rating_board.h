@@ -5,7 +5,7 @@
 #include <limits>
 #include <nlohmann/json.hpp>
 
-#include "core/store_study.h"
+#include "judges/rating_tally.h"
 
 namespace evac {
 
@@ -18,5 +18,8 @@ struct BoardRows {
 /// concerns, blinding, disputes, leases. Numbers that are undefined are null with the reason beside them. They are of
 /// the whole study, whichever rows are wanted.
 nlohmann::ordered_json RatingBoard(const StudyStore& store, std::int64_t now_ms, const BoardRows& wanted = {});
+/// The same for whoever looks again and again: what `tally` knows of the study already is not read anew.
+nlohmann::ordered_json RatingBoard(const StudyStore& store, RatingTally& tally, std::int64_t now_ms,
+                                   const BoardRows& wanted = {});
 
 }  // namespace evac

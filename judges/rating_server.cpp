@@ -253,13 +253,14 @@ struct RatingServer::Impl {
     if (caller.rater->role != RaterRole::kLead) return Refused(403, "role", "the board is the lead's");
     const auto from = ParseFrom(asked.query);
     if (!from) return Refused(422, "query", "found '" + asked.query + "', wanted from=NUMBER");
-    return Said({200, RatingBoard(store, Now_ms(), {.from = *from, .count = kBoardRows})});
+    return Said({200, RatingBoard(store, tally, Now_ms(), {.from = *from, .count = kBoardRows})});
   }
 
   RatingServerOptions options;
   RunLock lock;
   std::mutex limits_mutex;
   RateLimiter strangers{{.burst = 30, .per_s = 0.5}}, raters{{.burst = 120, .per_s = 30}};
+  RatingTally tally;  // the reader's thread's
   // Who looks at clips or at the board waits for nobody's verdict to be written, and nobody's verdict for them.
   RatingWorker writer, player, reader;
   RatingHttp http;

@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <set>
 
 #include "core/seed.h"
 #include "core/statistics/bootstrap.h"
@@ -27,10 +26,10 @@ std::vector<Vote> VotesOf(const RatedClip& clip) {
 
 std::size_t CategoryOf(const std::string& label) { return label == "success" ? 1 : label == "failure" ? 0 : 2; }
 
-Number DawidSkeneRate(std::span<const RatedClip> clips) {
+Number DawidSkeneRate(std::span<const RatedClip* const> clips) {
   std::map<std::int64_t, std::vector<RaterCounts::Said>> said;
   for (std::size_t i = 0; i < clips.size(); ++i) {
-    for (const auto& [rater, ballot] : clips[i].by_rater) {
+    for (const auto& [rater, ballot] : clips[i]->by_rater) {
       std::vector<RaterCounts::Said>& of_rater = said[rater];
       const std::size_t category = CategoryOf(ballot.label);
       if (category < 2) of_rater.push_back({static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(category)});
@@ -43,7 +42,7 @@ Number DawidSkeneRate(std::span<const RatedClip> clips) {
   double rate = 0;
   std::int64_t with_votes = 0;
   for (std::size_t i = 0; i < clips.size(); ++i) {
-    if (clips[i].resolution.majority.valid == 0) continue;
+    if (clips[i]->resolution.majority.valid == 0) continue;
     rate += fit.posterior(static_cast<Eigen::Index>(i), 1);
     ++with_votes;
   }
@@ -135,39 +134,37 @@ Resolution Resolve(const std::vector<Vote>& votes, const std::optional<std::stri
   return resolution;
 }
 
-std::vector<RatedClip> RatedClips(const StudyStore& store) { return RatedClips(store, store.Ballots()); }
+Resolution ResolutionOf(const RatedClip& clip, int raters_per_clip) {
+  return Resolve(VotesOf(clip), clip.adjudicated, std::min(2, raters_per_clip));
+}
 
-std::vector<RatedClip> RatedClips(const StudyStore& store, const std::vector<StudyStore::Ballot>& ballots) {
-  const std::int64_t wanted_valid = std::min(2, store.info().raters_per_clip);
-  std::vector<RatedClip> clips;
-  std::map<std::int64_t, std::size_t> index;
-  for (StudyClip& clip : store.Clips()) {
-    if (clip.use == Showing::kPractice || clip.use == Showing::kExample) continue;
-    index[clip.id] = clips.size();
-    clips.push_back({.clip = std::move(clip)});
-  }
-  for (const StudyStore::Ballot& ballot : ballots) {
-    const auto found = index.find(ballot.clip);
-    if (found == index.end() || ballot.showing == Showing::kRepeat || ballot.showing == Showing::kPractice) continue;
-    RatedClip& clip = clips[found->second];
-    if (ballot.showing != Showing::kAdjudication)
-      clip.by_rater[ballot.rater] = ballot;
-    else if (ballot.is_final)
-      clip.adjudicated = ballot.label;
-  }
-  for (RatedClip& clip : clips) clip.resolution = Resolve(VotesOf(clip), clip.adjudicated, wanted_valid);
-  return clips;
+bool IsDisputed(const RatedClip& clip, int raters_per_clip) {
+  if (static_cast<int>(clip.by_rater.size()) < raters_per_clip || clip.adjudicated) return false;
+  const std::int64_t successes = clip.resolution.majority.successes;
+  const std::int64_t failures = clip.resolution.majority.valid - successes;
+  const auto with_flags =
+      std::ranges::count_if(clip.by_rater, [](const auto& vote) { return vote.second.has_flags; });
+  const std::optional<Label>& known = clip.clip.reference;
+  return (successes > 0 && failures > 0) || successes + failures < std::min(2, raters_per_clip) || with_flags >= 2 ||
+         (known == Label::kFailure && successes > failures) || (known == Label::kSuccess && failures > successes);
 }
 
 LabelRates RatesOf(std::span<const RatedClip> clips) {
+  std::vector<const RatedClip*> all;
+  all.reserve(clips.size());
+  for (const RatedClip& clip : clips) all.push_back(&clip);
+  return RatesOf(all);
+}
+
+LabelRates RatesOf(std::span<const RatedClip* const> clips) {
   LabelRates rates;
   std::int64_t successes = 0, unanimous = 0, unanimous_successes = 0, with_votes = 0;
   double soft = 0;
-  for (const RatedClip& clip : clips) {
-    const Majority& majority = clip.resolution.majority;
+  for (const RatedClip* clip : clips) {
+    const Majority& majority = clip->resolution.majority;
     ++rates.clips;
-    if (clip.resolution.label) ++rates.decided;
-    if (clip.resolution.label == Label::kSuccess) ++successes;
+    if (clip->resolution.label) ++rates.decided;
+    if (clip->resolution.label == Label::kSuccess) ++successes;
     if (majority.valid == 0) continue;
     soft += *majority.soft;
     ++with_votes;
@@ -220,11 +217,12 @@ RatingAgreement RatersAgreement(const std::vector<RatedClip>& clips, int raters_
 }
 
 RaterQuality QualityOfRater(const std::vector<StudyStore::Ballot>& ballots,
-                            const std::map<std::int64_t, StudyClip>& clips, double period_s) {
+                            const std::unordered_map<std::int64_t, StudyClip>& clips, double period_s) {
   RaterQuality quality;
   std::int64_t successes = 0, too_fast = 0;
-  std::set<std::string> labels;
-  std::map<std::int64_t, std::string> first;
+  const std::string* answer = nullptr;
+  bool is_one_answer = true;
+  std::unordered_map<std::int64_t, const std::string*> first;
   std::vector<double> rt_ms;
   for (const StudyStore::Ballot& ballot : ballots) {
     const StudyClip& clip = clips.at(ballot.clip);
@@ -232,16 +230,17 @@ RaterQuality QualityOfRater(const std::vector<StudyStore::Ballot>& ballots,
     if (ballot.showing == Showing::kRepeat) {
       ++quality.repeats_seen;
       const auto before = first.find(ballot.clip);
-      if (before != first.end() && before->second == ballot.label) ++quality.repeats_same;
+      if (before != first.end() && *before->second == ballot.label) ++quality.repeats_same;
     } else {
-      first[ballot.clip] = ballot.label;
+      first[ballot.clip] = &ballot.label;
     }
     if (ballot.showing == Showing::kGold && clip.reference) {
       ++quality.gold_seen;
       if (ballot.label == Name(*clip.reference)) ++quality.gold_right;
     }
     ++quality.verdicts;
-    labels.insert(ballot.label);
+    if (!answer) answer = &ballot.label;
+    if (*answer != ballot.label) is_one_answer = false;
     if (ballot.label == "success") ++successes;
     if (IsTooFast(ballot, clip, period_s)) ++too_fast;
     rt_ms.push_back(ballot.rt_ms);
@@ -252,8 +251,8 @@ RaterQuality QualityOfRater(const std::vector<StudyStore::Ballot>& ballots,
   if (too_fast * 20 >= quality.verdicts)
     quality.concerns.push_back(
         fmt::format("{} of {} verdicts came too fast to have seen the clip", too_fast, quality.verdicts));
-  if (quality.verdicts >= 30 && labels.size() == 1)
-    quality.concerns.push_back(fmt::format("all {} verdicts are {}", quality.verdicts, *labels.begin()));
+  if (quality.verdicts >= 30 && is_one_answer)
+    quality.concerns.push_back(fmt::format("all {} verdicts are {}", quality.verdicts, *answer));
   if (quality.gold_seen >= 12 && quality.gold_right * 12 < quality.gold_seen * 10)
     quality.concerns.push_back(fmt::format("{} of {} known clips right", quality.gold_right, quality.gold_seen));
   return quality;

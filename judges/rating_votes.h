@@ -5,6 +5,7 @@
 #include <optional>
 #include <span>
 #include <string>
+#include <unordered_map>
 #include <vector>
 
 #include "core/statistics/votes.h"
@@ -31,11 +32,11 @@ struct RatedClip {
   std::optional<std::string> adjudicated{};
   Resolution resolution{};
 };
-
-/// Every clip of the study but practice, in its order, with its votes.
-std::vector<RatedClip> RatedClips(const StudyStore& store);
-/// The same of votes that were read already.
-std::vector<RatedClip> RatedClips(const StudyStore& store, const std::vector<StudyStore::Ballot>& ballots);
+/// @param raters_per_clip  that the study wants.
+Resolution ResolutionOf(const RatedClip& clip, int raters_per_clip);
+/// Whether an adjudicator is asked for: all its votes are there and nobody decided, and they are split, too few could
+/// tell, two of them have flags, or the majority is against what is known of the clip.
+bool IsDisputed(const RatedClip& clip, int raters_per_clip);
 
 /// The rates of some clips side by side; where they are far apart, a majority hides something.
 struct LabelRates {
@@ -48,6 +49,7 @@ struct LabelRates {
   bool far_apart = false;                                            ///< the first four differ by more than 3 points
 };
 LabelRates RatesOf(std::span<const RatedClip> clips);
+LabelRates RatesOf(std::span<const RatedClip* const> clips);
 
 struct RatingAgreement {
   Number alpha = Undefined{"no votes"};                ///< Krippendorff's, nominal, of success, failure and cannot tell
@@ -67,8 +69,8 @@ struct RaterQuality {
   std::int64_t repeats_same = 0, repeats_seen = 0;
   std::vector<std::string> concerns{};  ///< sentences
 };
-/// @param ballots  of one rater. @param period_s  of a frame.
+/// @param ballots  the current ones of one rater, oldest first. @param clips  by id. @param period_s  of a frame.
 RaterQuality QualityOfRater(const std::vector<StudyStore::Ballot>& ballots,
-                            const std::map<std::int64_t, StudyClip>& clips, double period_s);
+                            const std::unordered_map<std::int64_t, StudyClip>& clips, double period_s);
 
 }  // namespace evac

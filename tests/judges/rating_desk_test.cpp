@@ -8,7 +8,7 @@
 #include "core/error.h"
 #include "core/store_sqlite.h"
 #include "judges/rating_board.h"
-#include "judges/rating_votes.h"
+#include "judges/rating_tally.h"
 #include "tests/judges/rating_support.h"
 
 /// Every row of rating.md 1.5 that is the server's.
@@ -249,7 +249,9 @@ TEST_F(RatingDeskTest, AdjudicatorsSayWhatTheySeeBeforeTheySeeTheOthers) {
   changed.is_final = true;
   EXPECT_EQ(judge.Say(changed).status, 200);
   const std::int64_t decided = store.FindPresentation(clip)->clip;
-  for (const RatedClip& rated : RatedClips(store)) {
+  RatingTally tally;
+  tally.Read(store);
+  for (const RatedClip& rated : tally.rated()) {
     if (rated.clip.id != decided) continue;
     EXPECT_EQ(rated.resolution.how, "adjudicated");
     EXPECT_EQ(rated.resolution.label, Label::kFailure);

@@ -94,7 +94,7 @@ TEST(Quality, FastHandsAndOneAnswerAreSaidAloud) {
   StudyClip clip;
   clip.id = 1;
   clip.frames = 100;
-  std::map<std::int64_t, StudyClip> clips = {{1, clip}};
+  const std::unordered_map<std::int64_t, StudyClip> clips = {{1, clip}};
   std::vector<StudyStore::Ballot> ballots(30,
                                           {.rater = 1, .clip = 1, .label = "success", .rt_ms = 9000, .max_speed = 1});
   EXPECT_THAT(QualityOfRater(ballots, clips, 0.1).concerns, ElementsAre(HasSubstr("all 30 verdicts are success")));
@@ -113,7 +113,7 @@ TEST(Quality, KnownClipsAndRepeatsAreCounted) {
   clip.id = 1;
   clip.frames = 10;
   clip.reference = Label::kFailure;
-  const std::map<std::int64_t, StudyClip> clips = {{1, clip}};
+  const std::unordered_map<std::int64_t, StudyClip> clips = {{1, clip}};
   const RaterQuality quality =
       QualityOfRater({{.rater = 1, .clip = 1, .label = "failure", .showing = Showing::kGold, .rt_ms = 5000},
                       {.rater = 1, .clip = 1, .label = "success", .showing = Showing::kRepeat, .rt_ms = 5000}},

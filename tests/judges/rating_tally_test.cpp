@@ -1,0 +1,124 @@
+#include "judges/rating_tally.h"
+
+#include <gtest/gtest.h>
+
+#include "core/seed.h"
+#include "judges/rating_board.h"
+#include "tests/judges/rating_support.h"
+
+namespace evac {
+namespace {
+
+/// Everything a board shows, as text: two that are equal were counted alike.
+std::string Shown(const StudyStore& store, RatingTally& tally) { return RatingBoard(store, tally, 0).dump(); }
+
+/// Raters and an adjudicator who do whatever may be done, in an order drawn by a seed.
+class Crowd {
+ public:
+  Crowd(StudyStore& store, RatingDesk& desk, std::uint64_t seed) : store_(store), desk_(desk), draws_(seed) {
+    for (int i = 0; i < 3; ++i) raters_.emplace_back(store, desk);
+    judge_.emplace(store, desk, RaterRole::kAdjudicator);
+  }
+
+  void DoSomething() {
+    AtTheDesk& rater = raters_[draws_.Below(raters_.size())];
+    switch (draws_.Below(8)) {
+      case 0:
+        return Undo(rater);
+      case 1:
+        return Replace(rater);
+      case 2:
+        return Adjudicate();
+      default:
+        return RateNext(rater);
+    }
+  }
+
+  void SomebodyLeaves(bool keep) { store_.Withdraw(raters_.front().id, keep, false, 0), raters_.erase(raters_.begin()); }
+
+ private:
+  std::string Label() {
+    constexpr const char* kLabels[] = {"success", "success", "failure", "cannot_tell"};
+    return kLabels[draws_.Below(4)];
+  }
+
+  void RateNext(AtTheDesk& rater) {
+    const DeskAnswer next = rater.Next();
+    if (!next.body.contains("presentation")) return;
+    HumanVerdict verdict = rater.Watched(next.body.at("presentation"), Label());
+    if (draws_.Below(4) == 0) verdict.flags = "blur_hides";
+    rater.Say(verdict);
+  }
+
+  std::optional<HumanVerdict> OneOf(const AtTheDesk& rater) {
+    const auto said = store_.CurrentBy(rater.id);
+    if (said.empty()) return std::nullopt;
+    return said[draws_.Below(said.size())].verdict;
+  }
+
+  void Undo(AtTheDesk& rater) {
+    if (const auto verdict = OneOf(rater)) desk_.Retract(rater.Me(), {rater.epoch, NewSecret(), verdict->client_uuid}, 0);
+  }
+
+  void Replace(AtTheDesk& rater) {
+    const auto old = OneOf(rater);
+    if (!old) return;
+    HumanVerdict verdict = rater.Watched(old->presentation, Label());
+    verdict.supersedes = old->id;
+    rater.Say(verdict);
+  }
+
+  void Adjudicate() {
+    const DeskAnswer next = judge_->Next();
+    if (!next.body.contains("presentation")) return;
+    const std::string clip = next.body.at("presentation");
+    judge_->Say(clip, Label());
+    HumanVerdict last = judge_->Watched(clip, Label());
+    last.supersedes = store_.CurrentVerdict(clip)->id;
+    last.is_final = true;
+    judge_->Say(last);
+  }
+
+  StudyStore& store_;
+  RatingDesk& desk_;
+  SplitMix64 draws_;
+  std::vector<AtTheDesk> raters_;
+  std::optional<AtTheDesk> judge_;
+};
+
+TEST(RatingTally, WhatWasReadBitByBitIsWhatIsReadAtOnce) {
+  for (const std::uint64_t seed : {1, 2, 3}) {
+    SmallStudy study(16, {.raters_per_clip = 2, .gold_from = "oracle"});
+    StudyStore store = study.Open();
+    RatingDesk desk(store, {});
+    Crowd crowd(store, desk, seed);
+    RatingTally tally;
+    std::size_t most_disputes = 0;
+    for (int step = 0; step < 160; ++step) {
+      crowd.DoSomething();
+      if (step == 80) crowd.SomebodyLeaves(seed == 2);
+      if (step % 5 != 0) continue;
+      RatingTally fresh;
+      ASSERT_EQ(Shown(store, tally), Shown(store, fresh)) << "seed " << seed << ", step " << step;
+      ASSERT_EQ(tally.Disputes(), store.Disputes()) << "seed " << seed << ", step " << step;
+      most_disputes = std::max(most_disputes, tally.Disputes().size());
+    }
+    EXPECT_GT(most_disputes, 2u) << "nothing was disputed: the test tests nothing";
+  }
+}
+
+TEST(RatingTally, ClipsThatWereAddedAreThere) {
+  SmallStudy study(4, {.raters_per_clip = 2});
+  StudyStore store = study.Open();
+  RatingTally tally;
+  tally.Read(store);
+  EXPECT_EQ(tally.rated().size(), 8u);
+  study.run().Add("41-0004", 's', 'f');
+  MakeStudy(study.folder(), {.runs = {study.run().folder()}, .raters_per_clip = 2, .height_px = 64},
+            [](std::size_t, std::size_t) {});
+  tally.Read(store);
+  EXPECT_EQ(tally.rated().size(), 10u);
+}
+
+}  // namespace
+}  // namespace evac
