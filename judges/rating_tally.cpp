@@ -60,9 +60,8 @@ void RatingTally::Take(StudyStore::Ballot ballot) {
   last_ = ballot.id;
   std::vector<StudyStore::Ballot>& own = by_rater_[ballot.rater];
   if (ballot.supersedes != 0) {
-    const auto replaced = std::find_if(own.rbegin(), own.rend(), [&](const StudyStore::Ballot& said) {
-      return said.id == ballot.supersedes;
-    });
+    const auto replaced = std::find_if(own.rbegin(), own.rend(),
+                                       [&](const StudyStore::Ballot& said) { return said.id == ballot.supersedes; });
     if (replaced != own.rend()) {  // a "retracted" row was taken away when it came
       Discount(*replaced);
       own.erase(std::next(replaced).base());

@@ -37,9 +37,9 @@ class RatingTally {
   RatedClip* RatedOf(std::int64_t clip);
 
   int raters_per_clip_ = 0, waves_ = 0;
-  std::int64_t last_ = 0;                                            // verdict that was read
-  std::set<std::int64_t> left_out_;                                  // raters who do not count
-  std::unordered_map<std::int64_t, StudyClip> clips_;                // by id
+  std::int64_t last_ = 0;                                             // verdict that was read
+  std::set<std::int64_t> left_out_;                                   // raters who do not count
+  std::unordered_map<std::int64_t, StudyClip> clips_;                 // by id
   std::map<std::int64_t, std::vector<StudyStore::Ballot>> by_rater_;  // what each says now
   std::vector<RatedClip> rated_;
   std::unordered_map<std::int64_t, std::size_t> place_;  // of a clip in rated_

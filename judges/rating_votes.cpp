@@ -142,8 +142,7 @@ bool IsDisputed(const RatedClip& clip, int raters_per_clip) {
   if (static_cast<int>(clip.by_rater.size()) < raters_per_clip || clip.adjudicated) return false;
   const std::int64_t successes = clip.resolution.majority.successes;
   const std::int64_t failures = clip.resolution.majority.valid - successes;
-  const auto with_flags =
-      std::ranges::count_if(clip.by_rater, [](const auto& vote) { return vote.second.has_flags; });
+  const auto with_flags = std::ranges::count_if(clip.by_rater, [](const auto& vote) { return vote.second.has_flags; });
   const std::optional<Label>& known = clip.clip.reference;
   return (successes > 0 && failures > 0) || successes + failures < std::min(2, raters_per_clip) || with_flags >= 2 ||
          (known == Label::kFailure && successes > failures) || (known == Label::kSuccess && failures > successes);

@@ -58,7 +58,8 @@ std::string CallsByStatus(const CallTotals& totals) {
 std::string Calls(const std::vector<CallTotals>& all) {
   if (all.empty()) return "";
   std::string html =
-      "<h3>Calls to model servers</h3><div class=\"wide\"><table class=\"points\"><thead><tr><th scope=\"col\">judge</th>"
+      "<h3>Calls to model servers</h3><div class=\"wide\"><table class=\"points\"><thead><tr><th "
+      "scope=\"col\">judge</th>"
       "<th scope=\"col\">calls by how they ended</th><th scope=\"col\" class=\"num\" title=\"tries again "
       "included\">requests</th><th scope=\"col\" class=\"num\">prompt tokens</th><th scope=\"col\" "
       "class=\"num\">completion tokens</th><th scope=\"col\" class=\"num\" title=\"the sum; calls may have run "

@@ -123,9 +123,16 @@ std::vector<WorldComparison> ComparisonsOf(const RunSummary& summary) {
 }  // namespace
 
 RunData ReadRun(const Store& store) {
-  return {store.run(),        store.Tasks(),           store.Worlds(),           store.Policies(),
-          store.Episodes(),   store.CurrentVerdicts(), store.CountersByPolicy(), store.RealTrials(),
-          store.GateRecords(), TotalsOfCalls(store.folder())};
+  return {store.run(),
+          store.Tasks(),
+          store.Worlds(),
+          store.Policies(),
+          store.Episodes(),
+          store.CurrentVerdicts(),
+          store.CountersByPolicy(),
+          store.RealTrials(),
+          store.GateRecords(),
+          TotalsOfCalls(store.folder())};
 }
 
 std::int64_t RateCell::Apart() const {

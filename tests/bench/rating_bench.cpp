@@ -85,8 +85,17 @@ void Board(benchmark::State& state, bool seen_before) {
   for (auto _ : state) bytes = RatingBoard(store, tally, kNow_ms, {.from = 0, .count = 200}).dump().size();
   state.counters["MB"] = static_cast<double>(bytes) / 1e6;
 }
-BENCHMARK_CAPTURE(Board, first, false)->Arg(100'000)->Unit(benchmark::kMillisecond)->Iterations(1)->Name("LeadBoard/first/votes");
-BENCHMARK_CAPTURE(Board, again, true)->Arg(1'000)->Arg(10'000)->Arg(100'000)->Unit(benchmark::kMillisecond)->Name("LeadBoard/again/votes");
+BENCHMARK_CAPTURE(Board, first, false)
+    ->Arg(100'000)
+    ->Unit(benchmark::kMillisecond)
+    ->Iterations(1)
+    ->Name("LeadBoard/first/votes");
+BENCHMARK_CAPTURE(Board, again, true)
+    ->Arg(1'000)
+    ->Arg(10'000)
+    ->Arg(100'000)
+    ->Unit(benchmark::kMillisecond)
+    ->Name("LeadBoard/again/votes");
 
 }  // namespace
 }  // namespace evac

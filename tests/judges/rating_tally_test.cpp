@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <memory>
+
 #include "core/seed.h"
 #include "judges/rating_board.h"
 #include "tests/judges/rating_support.h"
@@ -16,12 +18,12 @@ std::string Shown(const StudyStore& store, RatingTally& tally) { return RatingBo
 class Crowd {
  public:
   Crowd(StudyStore& store, RatingDesk& desk, std::uint64_t seed) : store_(store), desk_(desk), draws_(seed) {
-    for (int i = 0; i < 3; ++i) raters_.emplace_back(store, desk);
+    for (int i = 0; i < 3; ++i) raters_.push_back(std::make_unique<AtTheDesk>(store, desk));
     judge_.emplace(store, desk, RaterRole::kAdjudicator);
   }
 
   void DoSomething() {
-    AtTheDesk& rater = raters_[draws_.Below(raters_.size())];
+    AtTheDesk& rater = *raters_[draws_.Below(raters_.size())];
     switch (draws_.Below(8)) {
       case 0:
         return Undo(rater);
@@ -34,7 +36,10 @@ class Crowd {
     }
   }
 
-  void SomebodyLeaves(bool keep) { store_.Withdraw(raters_.front().id, keep, false, 0), raters_.erase(raters_.begin()); }
+  void SomebodyLeaves(bool keep) {
+    store_.Withdraw(raters_.front()->id, keep, false, 0);
+    raters_.erase(raters_.begin());
+  }
 
  private:
   std::string Label() {
@@ -57,7 +62,8 @@ class Crowd {
   }
 
   void Undo(AtTheDesk& rater) {
-    if (const auto verdict = OneOf(rater)) desk_.Retract(rater.Me(), {rater.epoch, NewSecret(), verdict->client_uuid}, 0);
+    if (const auto verdict = OneOf(rater))
+      desk_.Retract(rater.Me(), {rater.epoch, NewSecret(), verdict->client_uuid}, 0);
   }
 
   void Replace(AtTheDesk& rater) {
@@ -82,7 +88,7 @@ class Crowd {
   StudyStore& store_;
   RatingDesk& desk_;
   SplitMix64 draws_;
-  std::vector<AtTheDesk> raters_;
+  std::vector<std::unique_ptr<AtTheDesk>> raters_;
   std::optional<AtTheDesk> judge_;
 };
 

@@ -81,7 +81,8 @@ TEST(RatingWords, WhereAListBeginsIsAWholeNumberOrNothing) {
   EXPECT_EQ(ParseFrom(""), 0u);
   EXPECT_EQ(ParseFrom("from=0"), 0u);
   EXPECT_EQ(ParseFrom("from=200"), 200u);
-  for (const char* wrong : {"from=", "from=-1", "from=1&from=2", "from=1.5", "from=99999999999999999999", "From=1", "x"})
+  for (const char* wrong :
+       {"from=", "from=-1", "from=1&from=2", "from=1.5", "from=99999999999999999999", "From=1", "x"})
     EXPECT_FALSE(ParseFrom(wrong)) << wrong;
 }
 

@@ -271,8 +271,13 @@ TEST(Page, SaysWhatAskingModelServersTook) {
   {
     CallCache cache(run.folder() / CallCache::kFile);
     for (const char* status : {"ok", "ok", "timeout"})
-      cache.Add({.key = "k", .judge = "vlm:<b>", .status = status, .prompt_tokens = 1000, .completion_tokens = 70,
-                 .latency_ms = 1500, .attempts = 2});
+      cache.Add({.key = "k",
+                 .judge = "vlm:<b>",
+                 .status = status,
+                 .prompt_tokens = 1000,
+                 .completion_tokens = 70,
+                 .latency_ms = 1500,
+                 .attempts = 2});
   }
   const std::string page = ReportPage(Summarise(ReadRun(run.store()), {}), kBeside);
   EXPECT_THAT(page, HasSubstr("Calls to model servers"));
