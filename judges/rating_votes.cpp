@@ -38,7 +38,7 @@ Number DawidSkeneRate(std::span<const RatedClip* const> clips) {
   if (said.empty()) return Undefined{"no votes"};
   RaterCounts counts{.items = static_cast<Eigen::Index>(clips.size()), .labels = 2};
   for (auto& [rater, of_rater] : said) counts.of_rater.push_back(std::move(of_rater));
-  const DawidSkene fit = FitDawidSkene(counts, {.smoothing = 0.5, .max_iterations = 200, .tolerance = 1e-8});
+  const DawidSkene fit = FitDawidSkene(counts, {.smoothing = 0.5, .max_iterations = 200, .tolerance = 1e-6});
   double rate = 0;
   std::int64_t with_votes = 0;
   for (std::size_t i = 0; i < clips.size(); ++i) {
