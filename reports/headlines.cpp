@@ -183,9 +183,9 @@ void AddTrustToDecide(const TrustReport& trust, std::vector<HeadlineItem>& items
   std::ranges::stable_sort(open, {}, [](const TaskTrust* task) { return *task->more; });
   std::string text = fmt::format("To decide whether {} may be trusted: about {} at {}", trust.world,
                                  Counted(*open[0]->more, "more pair"), open[0]->task);
-  for (std::size_t i = 1; i < std::min(open.size(), kMostNamed); ++i)
-    text += fmt::format(", {} at {}", *open[i]->more, open[i]->task);
-  if (open.size() > kMostNamed) text += fmt::format("; {} further tasks", open.size() - kMostNamed);
+  const std::size_t named = std::min(open.size(), kMostItems);
+  for (std::size_t i = 1; i < named; ++i) text += fmt::format(", {} at {}", *open[i]->more, open[i]->task);
+  if (open.size() > named) text += "; " + Counted(static_cast<std::int64_t>(open.size() - named), "further task");
   items.push_back({"", std::move(text), "#trust"});
 }
 

@@ -55,7 +55,7 @@ void AddKappa(const Confusion& confusion, double confidence, ConfusionStatistics
   if (variance * n < 1e-12) return;
   const double se = std::sqrt(variance), z = TwoSidedZ(confidence);
   result.kappa_se = se;
-  result.kappa.interval = Interval{kappa - z * se, kappa + z * se};
+  result.kappa.interval = Interval{std::max(-1.0, kappa - z * se), std::min(1.0, kappa + z * se)};
 }
 
 void RequireShare(double share, const char* name) {

@@ -21,7 +21,7 @@ struct Confusion {
 struct ConfusionStatistics {
   Number accuracy = Undefined{"no items"};
   Number chance = Undefined{"no items"};  ///< agreement by chance, p_e
-  Estimate kappa;  ///< Cohen's; interval from the SE of Fleiss, Cohen & Everitt 1969, not clipped
+  Estimate kappa;  ///< Cohen's; interval from the SE of Fleiss, Cohen & Everitt 1969, cut to -1 … 1
   Number kappa_se =
       Undefined{"no items"};             ///< undefined where it comes out as 0: kappa has no spread to estimate there
   Number pabak = Undefined{"no items"};  ///< prevalence- and bias-adjusted: 2 accuracy - 1

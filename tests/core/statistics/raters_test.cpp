@@ -78,6 +78,15 @@ TEST(ConfusionTable, AnEmptyOrConstantOneLeavesUndefinedWhatItMust) {
   EXPECT_THROW(StatisticsOf({.both_success = -1}), Error);
 }
 
+TEST(ConfusionTable, NoKappaIsSaidToBeAboveOne) {
+  const ConfusionStatistics nearly_equal = StatisticsOf({39, 3, 0, 37});
+  EXPECT_GT(*nearly_equal.kappa.value + 1.96 * *nearly_equal.kappa_se, 1) << "the sample does not show it";
+  EXPECT_EQ(nearly_equal.kappa.interval->high, 1);
+  EXPECT_LT(nearly_equal.kappa.interval->low, 0.9);
+  const ConfusionStatistics opposite = StatisticsOf({0, 37, 39, 2});
+  EXPECT_EQ(opposite.kappa.interval->low, -1);
+}
+
 TEST(ConfusionTable, SwappingJudgeAndHumanKeepsTheAgreementAndTurnsTheBias) {
   const ConfusionStatistics one = StatisticsOf({25, 4, 3, 8}), other = StatisticsOf({25, 3, 4, 8});
   EXPECT_NEAR(*one.kappa.value, *other.kappa.value, 1e-12);
