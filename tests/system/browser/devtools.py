@@ -19,6 +19,10 @@ FLAGS = [
 ]
 
 
+class Refused(RuntimeError):
+    """What the browser would not do."""
+
+
 class Browser:
     """One browser with one page. `requests` and `complaints` (console errors, exceptions) grow while it lives."""
 
@@ -88,7 +92,7 @@ class Browser:
             self._receive()
         answer = self.answers.pop(wanted)
         if "error" in answer:
-            raise RuntimeError(f"{method}: {answer['error']}")
+            raise Refused(f"{method}: {answer['error']}")
         return answer["result"]
 
     def js(self, expression):
@@ -98,10 +102,19 @@ class Browser:
             raise RuntimeError(f"{expression}: {result['exceptionDetails'].get('exception', {}).get('description')}")
         return result["result"].get("value")
 
+    def is_true(self, expression):
+        """False too while the page is on its way to another one."""
+        try:
+            return self.js(f"Boolean({expression})")
+        except Refused as refused:
+            if "navigated" in str(refused) or "context" in str(refused):
+                return False
+            raise
+
     def wait(self, expression, patience_s=30):
         """Until the expression is true."""
         end = time.time() + patience_s
-        while not self.js(f"Boolean({expression})"):
+        while not self.is_true(expression):
             if time.time() > end:
                 raise RuntimeError(f"never came true: {expression}")
             time.sleep(0.05)
