@@ -30,32 +30,39 @@ CommandResult Merge(const std::vector<fs::path>& shards, const fs::path& out) {
   return RunCommand(words);
 }
 
-/// One whole run and its two halves, made once.
-struct Runs {
-  Runs() {
-    EXPECT_EQ(RunCommand(RunWords(kFaults, folder / "whole", kFive)).exit_code, 0);
-    for (const char* shard : {"1", "2"}) EXPECT_EQ(RunShard(folder / shard, std::string(shard) + "/2").exit_code, 0);
-  }
-  TempFolder folder;
-};
+/// One run, whole and in two halves, each made once, when it is first wanted.
+const TempFolder& RunsFolder() {
+  static const TempFolder folder;
+  return folder;
+}
 
-const Runs& TheRuns() {
-  static const Runs runs;
-  return runs;
+const fs::path& Whole() {
+  static const fs::path run = [] {
+    EXPECT_EQ(RunCommand(RunWords(kFaults, RunsFolder() / "whole", kFive)).exit_code, 0);
+    return RunsFolder() / "whole";
+  }();
+  return run;
+}
+
+fs::path Half(const std::string& number) {
+  const fs::path run = RunsFolder() / number;
+  if (!fs::exists(run)) {
+    EXPECT_EQ(RunShard(run, number + "/2").exit_code, 0);
+  }
+  return run;
 }
 
 TEST(Merge, ShardsJoinedAreTheRunThatWasNeverSplit) {
-  const TempFolder& runs = TheRuns().folder;
-  const std::size_t one = Store::Open(runs / "1", Store::Mode::kReadOnly).Episodes().size(),
-                    two = Store::Open(runs / "2", Store::Mode::kReadOnly).Episodes().size();
+  const std::size_t one = Store::Open(Half("1"), Store::Mode::kReadOnly).Episodes().size(),
+                    two = Store::Open(Half("2"), Store::Mode::kReadOnly).Episodes().size();
   EXPECT_EQ(one + two, 5u);
   const TempFolder folder;
-  const CommandResult merged = Merge({runs / "1", runs / "2"}, folder / "merged");
+  const CommandResult merged = Merge({Half("1"), Half("2")}, folder / "merged");
   ASSERT_EQ(merged.exit_code, 0) << merged.err;
-  EXPECT_EQ(List(folder / "merged"), List(runs / "whole"));
+  EXPECT_EQ(List(folder / "merged"), List(Whole()));
   EXPECT_EQ(RunCommand({Binary("evac"), "report", (folder / "merged").string()}).exit_code, 0);
   const Store store = Store::Open(folder / "merged", Store::Mode::kReadOnly),
-              whole = Store::Open(runs / "whole", Store::Mode::kReadOnly);
+              whole = Store::Open(Whole(), Store::Mode::kReadOnly);
   EXPECT_EQ(store.InitialScenes(), whole.InitialScenes());
   for (Episode episode : store.Episodes()) {
     EXPECT_TRUE(fs::exists(folder / "merged" / episode.video));
@@ -67,21 +74,19 @@ TEST(Merge, ShardsJoinedAreTheRunThatWasNeverSplit) {
 }
 
 TEST(Merge, DuplicatesThatAgreeAreTakenOnceAndNothingIsOverwritten) {
-  const TempFolder& runs = TheRuns().folder;
   const TempFolder folder;
-  const CommandResult merged = Merge({runs / "1", runs / "whole"}, folder / "merged");
+  const CommandResult merged = Merge({Half("1"), Whole()}, folder / "merged");
   ASSERT_EQ(merged.exit_code, 0) << merged.err;
-  EXPECT_EQ(List(folder / "merged"), List(runs / "whole"));
-  EXPECT_EQ(Merge({runs / "1", runs / "2"}, folder / "merged").exit_code, 2);
-  EXPECT_EQ(Merge({runs / "1", folder / "nothing"}, folder / "again").exit_code, 2);
+  EXPECT_EQ(List(folder / "merged"), List(Whole()));
+  EXPECT_EQ(Merge({Half("1")}, folder / "merged").exit_code, 2);
+  EXPECT_EQ(Merge({Half("1"), folder / "nothing"}, folder / "again").exit_code, 2);
   EXPECT_FALSE(fs::exists(folder / "again"));
 }
 
 TEST(Merge, RunsOfAnotherSuiteAreRefused) {
-  const TempFolder& runs = TheRuns().folder;
   const TempFolder folder;
   ASSERT_EQ(RunCommand(RunWords(kFaults, folder / "other", {"initial_states.count=1"})).exit_code, 0);
-  const CommandResult merged = Merge({runs / "1", folder / "other"}, folder / "merged");
+  const CommandResult merged = Merge({Half("1"), folder / "other"}, folder / "merged");
   EXPECT_EQ(merged.exit_code, 2);
   EXPECT_THAT(merged.err, AllOf(HasSubstr("different suites"), HasSubstr((folder / "other").string())));
   EXPECT_FALSE(fs::exists(folder / "merged"));
@@ -102,27 +107,25 @@ void AddOther(const fs::path& from, const fs::path& to, bool as_failure) {
 }
 
 TEST(Merge, DuplicatesThatDisagreeAreNamedAndAFailedOneYields) {
-  const TempFolder& runs = TheRuns().folder;
   const TempFolder folder;
-  AddOther(runs / "whole", folder / "other", false);
-  const CommandResult refused = Merge({runs / "whole", folder / "other"}, folder / "merged");
+  AddOther(Whole(), folder / "other", false);
+  const CommandResult refused = Merge({Whole(), folder / "other"}, folder / "merged");
   EXPECT_EQ(refused.exit_code, 2);
   EXPECT_THAT(refused.err, AllOf(HasSubstr("real/take_bottle/faulty@default/3-0001-s1 in "),
                                  HasSubstr((folder / "other").string())));
   EXPECT_FALSE(fs::exists(folder / "merged"));
 
-  AddOther(runs / "whole", folder / "failed", true);
-  ASSERT_EQ(Merge({folder / "failed", runs / "whole"}, folder / "merged").exit_code, 0);
-  EXPECT_EQ(List(folder / "merged"), List(runs / "whole"));
+  AddOther(Whole(), folder / "failed", true);
+  ASSERT_EQ(Merge({folder / "failed", Whole()}, folder / "merged").exit_code, 0);
+  EXPECT_EQ(List(folder / "merged"), List(Whole()));
 }
 
 TEST(Merge, AVideoThatIsNotTheStoredOneIsRefused) {
-  const TempFolder& runs = TheRuns().folder;
   const TempFolder folder;
-  fs::copy(runs / "1", folder / "spoiled", fs::copy_options::recursive);
+  fs::copy(Half("1"), folder / "spoiled", fs::copy_options::recursive);
   const std::string video = Store::Open(folder / "spoiled", Store::Mode::kReadOnly).Episodes().at(0).video;
   WriteText(folder / "spoiled" / video, "other bytes");
-  const CommandResult merged = Merge({folder / "spoiled", runs / "2"}, folder / "merged");
+  const CommandResult merged = Merge({folder / "spoiled"}, folder / "merged");
   EXPECT_EQ(merged.exit_code, 2);
   EXPECT_THAT(merged.err, HasSubstr(video));
   EXPECT_FALSE(fs::exists(folder / "merged"));

@@ -108,11 +108,8 @@ TEST(Resume, AfterThePolicyOrBothWereKilledTheTablesAndVideosAreThoseOfAnUninter
 TEST(Resume, ARunIsNotContinuedWithAnotherSuite) {
   const TempFolder folder;
   const fs::path run = folder / "run";
-  ASSERT_EQ(
-      RunCommand({Binary("evac"), "run", kSuite, "--out", run.string(), "--set", "initial_states.count=1"}).exit_code,
-      0);
-  const CommandResult other = RunCommand(
-      {Binary("evac"), "run", kSuite, "--out", run.string(), "--set", "initial_states.count=1", "--set", "seeds=[5]"});
+  ASSERT_EQ(RunCommand(RunWords(kFaults, run, {"initial_states.count=1"})).exit_code, 0);
+  const CommandResult other = RunCommand(RunWords(kFaults, run, {"initial_states.count=1", "seeds=[5]"}));
   EXPECT_EQ(other.exit_code, 2);
   EXPECT_NE(other.err.find("suite"), std::string::npos) << other.err;
 }
