@@ -1,14 +1,14 @@
-#include <fmt/core.h>
+#include <unistd.h>
 
-#include <CLI/CLI.hpp>
-#include <cstdio>
+#include <cerrno>
+#include <cstring>
+#include <filesystem>
 #include <memory>
 
-#include "core/error.h"
+#include "apps/policy_program.h"
 #include "core/recording.h"
 #include "core/version.h"
 #include "policies/hold_policy.h"
-#include "policies/learned_policy.h"
 #include "policies/policy_server.h"
 #include "policies/replay_policy.h"
 #include "policies/visual_pick.h"
@@ -34,18 +34,19 @@ struct Command {
   std::shared_ptr<Common> common = std::make_shared<Common>();
 };
 
-void AddAddress(CLI::App& app, Common& common) {
-  app.add_option("--url", common.address.url, "where to listen")->envname("EVAC_LCM_URL")->capture_default_str();
-  app.add_option("--token", common.address.token, "word inside the channels' names")->envname("EVAC_TOKEN")->capture_default_str();
-}
-
 Command AddPolicy(CLI::App& app, const std::string& name, const std::string& description) {
   const Command command{app.add_subcommand(name, description)};
   Common& common = *command.common;
-  command.app->add_option("--checkpoint", common.checkpoint, "name that tells apart two of this policy in a run")->capture_default_str();
-  command.app->add_option("--chunk-size", common.chunk_size, "targets per chunk")->envname("EVAC_CHUNK_SIZE")->check(CLI::Range(1, 1000))->capture_default_str();
-  command.app->add_option("--period-s", common.period_s, "seconds between two targets; 0: any")->check(CLI::Range(0.0, 60.0))->capture_default_str();
-  AddAddress(*command.app, common);
+  command.app->add_option("--checkpoint", common.checkpoint, "name that tells apart two of this policy in a run")
+      ->capture_default_str();
+  command.app->add_option("--chunk-size", common.chunk_size, "targets per chunk")
+      ->envname("EVAC_CHUNK_SIZE")
+      ->check(CLI::Range(1, 1000))
+      ->capture_default_str();
+  command.app->add_option("--period-s", common.period_s, "seconds between two targets; 0: any")
+      ->check(CLI::Range(0.0, 60.0))
+      ->capture_default_str();
+  AddAddressOptions(*command.app, common.address);
   return command;
 }
 
@@ -65,7 +66,9 @@ void AddReplay(CLI::App& app, int& exit_code) {
   auto folder = std::make_shared<std::string>();
   auto every_nth = std::make_shared<int>(1);
   command.app->add_option("--recording", *folder, "folder of the recording (docs/formats/recording.md)")->required();
-  command.app->add_option("--every-nth", *every_nth, "keep every nth recorded step")->check(CLI::Range(1, 1000))->capture_default_str();
+  command.app->add_option("--every-nth", *every_nth, "keep every nth recorded step")
+      ->check(CLI::Range(1, 1000))
+      ->capture_default_str();
   command.app->footer("Example:\n  evac-policy replay --recording agibot_examples/example0 --chunk-size 16");
   command.app->callback([&exit_code, common = command.common, folder, every_nth] {
     Recording recording = ReadRecording(*folder, {.every_nth = *every_nth, .cameras = {}, .count_video_frames = false});
@@ -79,20 +82,36 @@ void AddReplay(CLI::App& app, int& exit_code) {
 }
 
 void AddVisualPick(CLI::App& app, int& exit_code) {
-  const Command command = AddPolicy(app, "visual_pick", "Finds a thing of known colour and shape in the images, takes it and places it.");
+  const Command command =
+      AddPolicy(app, "visual_pick", "Finds a thing of known colour and shape in the images, takes it and places it.");
   auto options = std::make_shared<VisualPickOptions>();
   auto bias_m = std::make_shared<std::vector<double>>(2, 0.0);
-  command.app->add_option("--bias-m", *bias_m, "X,Y: how far off it takes the thing to be, base frame")->delimiter(',')->expected(2)->capture_default_str();
-  command.app->add_option("--noise-m", options->noise_m, "the same, random per episode: standard deviation")->capture_default_str();
-  command.app->add_option("--request-noise-m", options->request_noise_m, "the same, random each time it looks")->capture_default_str();
-  command.app->add_option("--place-noise-m", options->place_noise_m, "how far off it takes the place to put it to be: standard deviation, per episode")->capture_default_str();
-  command.app->add_option("--late-close-s", options->late_close_s, "closes the hand this late, the arm does not wait")->capture_default_str();
-  command.app->add_option("--early-release-s", options->early_release_s, "opens the hand this early")->capture_default_str();
-  command.app->add_option("--blindness", options->blindness, "probability to see nothing in an episode")->capture_default_str();
-  command.app->add_option("--request-blindness", options->request_blindness, "probability to see nothing in a request")->capture_default_str();
+  command.app->add_option("--bias-m", *bias_m, "X,Y: how far off it takes the thing to be, base frame")
+      ->delimiter(',')
+      ->expected(2)
+      ->capture_default_str();
+  command.app->add_option("--noise-m", options->noise_m, "the same, random per episode: standard deviation")
+      ->capture_default_str();
+  command.app->add_option("--request-noise-m", options->request_noise_m, "the same, random each time it looks")
+      ->capture_default_str();
+  command.app
+      ->add_option("--place-noise-m", options->place_noise_m,
+                   "how far off it takes the place to put it to be: standard deviation, per episode")
+      ->capture_default_str();
+  command.app->add_option("--late-close-s", options->late_close_s, "closes the hand this late, the arm does not wait")
+      ->capture_default_str();
+  command.app->add_option("--early-release-s", options->early_release_s, "opens the hand this early")
+      ->capture_default_str();
+  command.app->add_option("--blindness", options->blindness, "probability to see nothing in an episode")
+      ->capture_default_str();
+  command.app->add_option("--request-blindness", options->request_blindness, "probability to see nothing in a request")
+      ->capture_default_str();
   command.app->add_option("--speed", options->speed, "of all motion; 1: at most 0.38 m/s")->capture_default_str();
-  command.app->add_option("--retries", options->retries, "how often it goes back when its hand came up empty")->capture_default_str();
-  command.app->footer("Example:\n  evac-policy visual_pick --checkpoint fair --noise-m 0.02\nWhat it does and how good it is: docs/visual_pick.md");
+  command.app->add_option("--retries", options->retries, "how often it goes back when its hand came up empty")
+      ->capture_default_str();
+  command.app->footer(
+      "Example:\n  evac-policy visual_pick --checkpoint fair --noise-m 0.02\nWhat it does and how good it is: "
+      "docs/visual_pick.md");
   command.app->callback([&exit_code, common = command.common, options, bias_m] {
     options->chunk_size = common->chunk_size;
     options->bias_m = {bias_m->at(0), bias_m->at(1)};
@@ -104,18 +123,22 @@ void AddVisualPick(CLI::App& app, int& exit_code) {
   });
 }
 
-void AddLearned(CLI::App& app, int& exit_code) {
+/// Becomes the program beside this one whose policy is a network: loading libtorch takes half a second of a core, which
+/// the others need not wait for.
+void AddLearned(CLI::App& app) {
   CLI::App* command = app.add_subcommand("learned", "Does what it learned by imitation (evac train policy).");
-  const auto weights = std::make_shared<std::string>();
-  const auto common = std::make_shared<Common>();
-  common->chunk_size = 8;
-  command->add_option("--checkpoint", *weights, "weights with their card, as `evac train policy` writes them")->required();
-  command->add_option("--chunk-size", common->chunk_size, "targets per chunk, of the 16 that it says at once")->envname("EVAC_CHUNK_SIZE")->capture_default_str();
-  AddAddress(*command, *common);
-  command->footer("Example:\n  evac-policy learned --checkpoint out/policy/policy.safetensors\nHow it is trained and how good it is: docs/learned_policy.md");
-  command->callback([&exit_code, common, weights] {
-    LearnedPolicy policy(*weights, common->chunk_size);
-    exit_code = ServePolicy(policy, policy.Spec(), common->address);
+  command->set_help_flag();  // -h and all else is for that program
+  command->prefix_command();
+  command->callback([command] {
+    const std::string program =
+        (std::filesystem::read_symlink("/proc/self/exe").parent_path() / "evac-policy-learned").string();
+    std::vector<std::string> words = command->remaining();
+    words.insert(words.begin(), program);
+    std::vector<char*> arguments;
+    for (std::string& word : words) arguments.push_back(word.data());
+    arguments.push_back(nullptr);
+    ::execv(program.c_str(), arguments.data());
+    throw InternalError("cannot start {}: {}", program, std::strerror(errno));
   });
 }
 
@@ -126,22 +149,12 @@ int main(int argc, char** argv) {
   CLI::App app("evac-policy: the policies that come with evac, each served over LCM until SIGTERM.", "evac-policy");
   app.set_version_flag("--version", EVAC_VERSION);
   app.require_subcommand(1);
-  app.footer("A policy of your own: docs/write_a_policy.md.\nExit codes: 0 stopped, 2 invalid input, 4 internal error.");
+  app.footer(
+      "A policy of your own: docs/write_a_policy.md.\nExit codes: 0 stopped, 2 invalid input, 4 internal error.");
   int exit_code = 0;
-  try {
-    evac::AddHold(app, exit_code);
-    evac::AddReplay(app, exit_code);
-    evac::AddVisualPick(app, exit_code);
-    evac::AddLearned(app, exit_code);
-    app.parse(argc, argv);
-  } catch (const CLI::ParseError& error) {
-    return app.exit(error) == 0 ? 0 : static_cast<int>(evac::ExitCode::kInvalidInput);
-  } catch (const evac::Error& error) {
-    fmt::print(stderr, "evac-policy: {}\n", error.what());
-    return static_cast<int>(error.exit_code());
-  } catch (const std::exception& error) {
-    fmt::print(stderr, "evac-policy: internal error: {}\n", error.what());
-    return static_cast<int>(evac::ExitCode::kInternal);
-  }
-  return exit_code;
+  evac::AddHold(app, exit_code);
+  evac::AddReplay(app, exit_code);
+  evac::AddVisualPick(app, exit_code);
+  evac::AddLearned(app);
+  return evac::RunPolicyProgram(app, argc, argv, exit_code);
 }
