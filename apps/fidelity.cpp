@@ -40,6 +40,8 @@ class Measuring {
                                                             .suite_hash = suite_.hash,
                                                             .suite_path = fs::absolute(suite_.path).lexically_normal().string(),
                                                             .evac_version = EVAC_VERSION});
+    StateReality(out_, suite_);
+    TakeRealityOf(store);
     const ExitCode exit_code = Evaluate(suite_, store, {});
     if (exit_code != ExitCode::kOk) return exit_code;
     judge_.Rate(store);
@@ -81,7 +83,8 @@ class Measuring {
     for (evac::Counterfactual& kind : kinds) {
       PointAt(kind.tasks, kind.replays);
       const std::string folder = "counterfactual_" + kind.name;
-      Store store = RunReplays({suite_, out_ / folder, folder, kind.tasks, {worlds_.real, worlds_.model}, {}}, kind.replays);
+      Store store = RunReplays(
+          {suite_, out_ / folder, folder, kind.tasks, {worlds_.real, worlds_.model}, {}, Earlier(folder)}, kind.replays);
       judge_.Rate(store);
       const OutcomesOf found(store, judge_.name());
       for (const Replay& replay : kind.replays) {
@@ -104,7 +107,7 @@ class Measuring {
         LongRollouts(ReplaysOf(closed, worlds_.real.name, suite_), {arguments_.horizon_states, frames});
     PointAt(tasks, replays);
     const Store store =
-        RunReplays({suite_, out_ / "horizon", "horizon", tasks, {worlds_.real, worlds_.model}, {}}, replays);
+        RunReplays({suite_, out_ / "horizon", "horizon", tasks, {worlds_.real, worlds_.model}, {}, Earlier("horizon")}, replays);
     const OutcomesOf found(store, judge_.name());
     DriftMeter drift(chunk_);
     for (const Replay& replay : replays)
@@ -126,6 +129,24 @@ class Measuring {
   }
 
  private:
+  /// That part's run in the folder of `--reality`; empty: none was given.
+  fs::path Earlier(const std::string& part) const {
+    return arguments_.reality.empty() ? fs::path() : fs::path(arguments_.reality) / part;
+  }
+
+  void TakeRealityOf(Store& store) const {
+    if (arguments_.reality.empty()) return;
+    RequireSameReality(arguments_.reality, suite_);
+    Declare(suite_, store);
+    std::set<EpisodeKey> wanted;
+    for (const SuiteWorld& world : {worlds_.real, worlds_.again}) {
+      for (const SuitePolicy& policy : suite_.policies) {
+        for (const Job& job : AllJobs(suite_, world, policy)) wanted.insert(job.key);
+      }
+    }
+    TakeReality(Earlier("closed"), wanted, store);
+  }
+
   /// Replays are of `suite_.tasks`; here are others of the same names.
   static void PointAt(const std::vector<Task>& tasks, std::vector<Replay>& replays) {
     for (Replay& replay : replays)

@@ -24,6 +24,7 @@ struct FidelityArguments {
   std::vector<std::string> assignments;
   std::vector<std::string> parts = {"closed", "open", "counterfactual", "horizon"};
   std::string classifier;       ///< weights of the judge of imagined clips
+  std::string reality;          ///< an earlier OUT whose episodes in the simulated worlds are taken over; empty: none
   int counterfactual_states = 10;  ///< successes per task that are made to fail
   int horizon_states = 3;          ///< long rollouts per task
   int horizon_chunks = 30;         ///< of the network's K frames
@@ -62,6 +63,7 @@ struct ReplayRun {
   std::vector<Task> tasks;        ///< as they are declared in the store
   std::vector<SuiteWorld> worlds; ///< in the order they run
   std::filesystem::path scenes = {};  ///< the run whose first frames imagined episodes start from; empty: this one
+  std::filesystem::path reality = {}; ///< an earlier run whose simulated episodes are taken over; empty: none
   /// Makes a world in the place of apps/factory.h; null, or an answer that is null: the factory does.
   std::function<std::unique_ptr<World>(const SuiteWorld& world)> make = {};
 };
@@ -74,6 +76,14 @@ Store RunReplays(const ReplayRun& run, const std::vector<Replay>& replays);
 /// @returns undefined if no replay is a chunk long
 Number SecondsPerChunk(const SuiteWorld& model, const Suite& suite, const Store& scenes, std::vector<Replay> replays,
                        int chunk);
+
+/// Says in OUT which reality it is about: the suite without its world model.
+void StateReality(const std::filesystem::path& out, const Suite& suite);
+/// @throws InvalidInput unless `earlier` is an OUT about this suite's reality.
+void RequireSameReality(const std::filesystem::path& earlier, const Suite& suite);
+/// Copies what a run that ended earlier holds of those episodes. No such run: nothing.
+/// @throws InvalidInput if another evac made it.
+void TakeReality(const std::filesystem::path& earlier_run, const std::set<EpisodeKey>& wanted, Store& store);
 
 /// Writes episodes.csv, fidelity.json and index.html, and says the numbers.
 void FinishFidelity(const std::filesystem::path& out, FidelityInput input);

@@ -78,6 +78,15 @@ std::vector<Job> JobsIn(const SuiteWorld& world, const std::vector<Replay>& repl
   return jobs;
 }
 
+std::set<EpisodeKey> SimulatedKeys(const ReplayRun& run, const std::vector<Replay>& replays) {
+  std::set<EpisodeKey> keys;
+  for (const SuiteWorld& world : run.worlds) {
+    if (world.evac) continue;
+    for (const Replay& replay : replays) keys.insert({replay.pair, world.name});
+  }
+  return keys;
+}
+
 }  // namespace
 
 std::vector<Replay> ReplaysOf(const Store& store, const std::string& world, const Suite& suite) {
@@ -99,6 +108,7 @@ Store RunReplays(const ReplayRun& run, const std::vector<Replay>& replays) {
   Store store = Store::CreateOrContinue(run.folder, InfoOf(run));
   store.RemoveOrphans();
   DeclareReplays(run, replays, store);
+  if (!run.reality.empty()) TakeReality(run.reality, SimulatedKeys(run, replays), store);
   std::optional<Store> scenes;
   if (!run.scenes.empty()) scenes = Store::Open(run.scenes, Store::Mode::kReadOnly);
   int total = 0, missing = 0;

@@ -171,4 +171,23 @@ MergeSummary MergeRuns(const std::vector<fs::path>& shards, const fs::path& out)
   return {.episodes = static_cast<int>(choice.shard.size()), .duplicates = choice.duplicates};
 }
 
+int TakeEpisodes(const Store& from, const std::function<bool(const EpisodeKey&)>& wanted, Store& to) {
+  std::vector<Episode> episodes = from.Episodes();
+  std::erase_if(episodes, [&](const Episode& episode) {
+    return IsFailure(episode.stop) || !wanted(episode.key) || to.Has(episode.key);
+  });
+  std::set<std::string> taken;
+  std::set<PairKey> pairs;
+  for (const Episode& episode : episodes) {
+    taken.insert(episode.key.Id());
+    pairs.insert(episode.key.pair);
+  }
+  for (const PairKey& pair : from.InitialScenes()) {
+    if (pairs.contains(pair)) to.AddInitialScene(pair, from.LoadInitialScene(pair.task, pair.initial_state).value());
+  }
+  CopyEpisodes(episodes, from, to);
+  CopyVerdicts(from, taken, to);
+  return static_cast<int>(episodes.size());
+}
+
 }  // namespace evac

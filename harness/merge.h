@@ -1,7 +1,10 @@
 #pragma once
 
 #include <filesystem>
+#include <functional>
 #include <vector>
+
+#include "core/store.h"
 
 namespace evac {
 
@@ -18,5 +21,11 @@ struct MergeSummary {
 /// that did not fail. `out` is there whole or not at all.
 /// @throws InvalidInput if `out` exists, a shard is of another suite, or duplicates disagree (all are named).
 MergeSummary MergeRuns(const std::vector<std::filesystem::path>& shards, const std::filesystem::path& out);
+
+/// Copies from one run into another the episodes that `wanted` names, that did not fail, and that are not there yet:
+/// their videos (checked against their hashes), verdicts, initial scenes. The caller knows that they would come out the
+/// same, and has declared tasks, worlds and policies.
+/// @returns how many. @throws InvalidInput if a video is not the one that was stored.
+int TakeEpisodes(const Store& from, const std::function<bool(const EpisodeKey&)>& wanted, Store& to);
 
 }  // namespace evac

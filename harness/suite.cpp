@@ -224,6 +224,7 @@ Suite Build(const Config& page) {
   ReadPolicySection(page, suite);
   CheckWhole(suite, page);
   suite.hash = SuiteHash(page, suite);
+  suite.reality_hash = RealityHash(page, suite);
   return suite;
 }
 

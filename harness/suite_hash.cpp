@@ -20,7 +20,8 @@ std::string HashOfTree(const fs::path& path) {
   if (!fs::is_directory(path)) return Sha256HexOfFile(path);
   std::vector<std::string> lines;
   for (const auto& entry : fs::recursive_directory_iterator(path)) {
-    if (entry.is_regular_file()) lines.push_back(fs::relative(entry.path(), path).string() + " " + Sha256HexOfFile(entry.path()));
+    if (entry.is_regular_file())
+      lines.push_back(fs::relative(entry.path(), path).string() + " " + Sha256HexOfFile(entry.path()));
   }
   std::sort(lines.begin(), lines.end());
   std::string text;
@@ -37,30 +38,46 @@ std::string HashOfPage(const fs::path& path) {
     const std::string value = line.substr(line.find('=') + 1);
     const fs::path named = path.parent_path() / value;
     std::error_code ignored;
-    if (value.find('.') != std::string::npos && fs::is_regular_file(named, ignored)) text += value + " " + Sha256HexOfFile(named) + "\n";
+    if (value.find('.') != std::string::npos && fs::is_regular_file(named, ignored))
+      text += value + " " + Sha256HexOfFile(named) + "\n";
   }
   return Sha256Hex(text);
 }
 
-}  // namespace
+/// Whether a line of the page says something of a world model: ".worlds.2.weights=…", and world 2 is of type evac.
+bool IsOfModel(const std::string& line, const Suite& suite) {
+  for (std::size_t i = 0; i < suite.worlds.size(); ++i) {
+    if (suite.worlds[i].evac && line.starts_with(".worlds." + std::to_string(i) + ".")) return true;
+  }
+  return false;
+}
 
-std::string SuiteHash(const Config& page, const Suite& suite) {
+std::string HashOf(const Config& page, const Suite& suite, bool with_models) {
   std::ostringstream text;
   std::istringstream lines(page.Canonical());
   for (std::string line; std::getline(lines, line);) {
+    if (!with_models && IsOfModel(line, suite)) continue;
     const bool by_content = StartsWithAny(line, {".recording=", ".tasks."}) || IsHashedByContent(line);
-    if (!by_content && !StartsWithAny(line, {".lanes=", ".threads=", ".error_budget=", ".description=", ".transport.deadline_s=",
-                                          ".transport.repeat_after_s=", ".transport.start_s=", ".policy.start_probe="})) text << line << "\n";
+    if (!by_content &&
+        !StartsWithAny(line, {".lanes=", ".threads=", ".error_budget=", ".description=", ".transport.deadline_s=",
+                              ".transport.repeat_after_s=", ".transport.start_s=", ".policy.start_probe="}))
+      text << line << "\n";
   }
   for (const Task& task : suite.tasks) text << "task " << task.id << " " << HashOfPage(task.page_path) << "\n";
   for (const SuiteWorld& world : suite.worlds) {
     if (!world.profile.empty()) text << "profile " << world.name << " " << HashOfPage(world.profile) << "\n";
   }
   for (const SuiteWorld& world : suite.worlds) {
-    if (world.evac) text << "evac " << world.name << " " << world.evac->hash << "\n";
+    if (world.evac && with_models) text << "evac " << world.name << " " << world.evac->hash << "\n";
   }
   if (suite.recording) text << "recording " << HashOfTree(*suite.recording) << "\n";
   return Sha256Hex(text.str());
 }
+
+}  // namespace
+
+std::string SuiteHash(const Config& page, const Suite& suite) { return HashOf(page, suite, true); }
+
+std::string RealityHash(const Config& page, const Suite& suite) { return HashOf(page, suite, false); }
 
 }  // namespace evac

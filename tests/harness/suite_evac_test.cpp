@@ -78,6 +78,16 @@ TEST_F(EvacSuite, ItsHashIsOfTheFilesContentAndOfAllThatDecidesAFrame) {
   EXPECT_NE(Read().hash, hash);
 }
 
+TEST_F(EvacSuite, RealityIsTheSameWhateverTheModelAndAnotherWithAnotherWorldPolicyOrState) {
+  const Suite suite = Read();
+  EXPECT_NE(suite.reality_hash, suite.hash);
+  EXPECT_EQ(Read({"worlds.0.steps=9"}).reality_hash, suite.reality_hash);
+  for (const char* change : {"chunk_size=5", "seeds=[2]", "policies.0.checkpoint=other"})
+    EXPECT_NE(Read({change}).reality_hash, suite.reality_hash) << change;
+  Write("w.safetensors", "other weights");
+  EXPECT_EQ(Read().reality_hash, suite.reality_hash);
+}
+
 TEST_F(EvacSuite, WhatIsWrongIsNamedWithItsField) {
   EXPECT_THAT(Complaint({"worlds.0.weight=w"}), AllOf(HasSubstr("weight"), HasSubstr("'weights'")));
   EXPECT_THAT(Complaint({"worlds.0.weights=/nowhere"}), AllOf(HasSubstr("weights"), HasSubstr("/nowhere")));

@@ -31,9 +31,19 @@ class FidelityRun : public testing::Test {
   }
 
   std::vector<std::string> Words(const fs::path& out) const {
-    return {Binary("evac"), "fidelity", EVAC_SOURCE_DIR "/tests/system/fidelity.yaml", "--out", out.string(),
-            "--set", "worlds.2.weights=" + weights_.string(), "--counterfactual-states", "1", "--horizon-states", "1",
-            "--horizon-chunks", "3"};
+    return {Binary("evac"),
+            "fidelity",
+            EVAC_SOURCE_DIR "/tests/system/fidelity.yaml",
+            "--out",
+            out.string(),
+            "--set",
+            "worlds.2.weights=" + weights_.string(),
+            "--counterfactual-states",
+            "1",
+            "--horizon-states",
+            "1",
+            "--horizon-chunks",
+            "3"};
   }
 
   const TempFolder folder_;
@@ -78,6 +88,28 @@ TEST_F(FidelityRun, AsksEveryPartAndEndsInTheSameNumbersWhenItWasKilled) {
   ASSERT_EQ(last.exit_code, 0) << last.err;
   EXPECT_EQ(Numbers(killed), numbers);
   EXPECT_EQ(ReadFile(killed / "episodes.csv"), ReadFile(whole / "episodes.csv"));
+
+  // Asked about the same reality again, it does not wait for that again, and ends in the same numbers.
+  const fs::path again = folder_ / "again";
+  std::vector<std::string> words = Words(again);
+  words.insert(words.end(), {"--reality", whole.string()});
+  const CommandResult taken = RunCommand(words);
+  ASSERT_EQ(taken.exit_code, 0) << taken.err;
+  for (const std::string part : {"/closed: 2 ", "/counterfactual_shifted: 1 ", "/horizon: 1 "})
+    EXPECT_THAT(taken.err, HasSubstr(part + "episodes taken over"));
+  EXPECT_EQ(Numbers(again), numbers);
+  EXPECT_EQ(ReadFile(again / "episodes.csv"), ReadFile(whole / "episodes.csv"));
+}
+
+TEST_F(FidelityRun, TakesOverNoOtherReality) {
+  const fs::path earlier = folder_ / "earlier";
+  fs::create_directories(earlier);
+  WriteFileAtomically(earlier / "reality.sha256", std::string(64, '0') + "\n");
+  std::vector<std::string> words = Words(folder_ / "out");
+  words.insert(words.end(), {"--reality", earlier.string()});
+  const CommandResult result = RunCommand(words);
+  EXPECT_EQ(result.exit_code, 2) << result.err;
+  EXPECT_THAT(result.err, HasSubstr("is about another reality (000000000000…"));
 }
 
 TEST_F(FidelityRun, SaysWhichWorldTheSuiteLacks) {
@@ -104,8 +136,8 @@ TEST_F(FidelityRun, OfRecordingsComparesPicturesAndSaysWhatWasLeftOut) {
   WriteRecordings(folder_ / "mine");
   const fs::path out = folder_ / "out";
   const CommandResult result = RunCommand(
-      {Binary("evac"), "fidelity", EVAC_SOURCE_DIR "/apps/configs/fidelity_recordings.yaml", "--out", out.string(), "--set",
-       "recording=" + (folder_ / "mine").string(), "--set", "worlds.1.weights=" + weights_.string(), "--set",
+      {Binary("evac"), "fidelity", EVAC_SOURCE_DIR "/apps/configs/fidelity_recordings.yaml", "--out", out.string(),
+       "--set", "recording=" + (folder_ / "mine").string(), "--set", "worlds.1.weights=" + weights_.string(), "--set",
        "worlds.1.config=" EVAC_SOURCE_DIR "/tests/system/evac_small.yaml", "--set",
        "worlds.1.statistics=" EVAC_SOURCE_DIR "/apps/configs/robots/agibotworld.yaml"});
   ASSERT_EQ(result.exit_code, 0) << result.err;
