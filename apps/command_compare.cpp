@@ -13,6 +13,7 @@
 #include "apps/commands.h"
 #include "core/statistics/sequential.h"
 #include "core/store.h"
+#include "reports/counted_judges.h"
 #include "reports/policy_comparison_output.h"
 #include "reports/summary.h"
 
@@ -59,7 +60,8 @@ JudgedRun Read(const std::string& folder, const CompareArguments& arguments) {
   options.confidence = arguments.options.confidence();
   options.bootstrap_replicates = 1;  // no correlation is shown
   JudgedRun run{folder, Summarise(ReadRun(Store::Open(folder, Store::Mode::kReadOnly)), options)};
-  if (std::ranges::find(run.summary.judges, arguments.judge) == run.summary.judges.end()) {
+  const auto counts = [&](const std::string& judge) { return IsCounted(judge, run.summary.options.judge); };
+  if (std::ranges::none_of(run.summary.judges, counts)) {
     throw InvalidInput("{}: no verdict of judge '{}', found: {}", folder, arguments.judge,
                        fmt::join(run.summary.judges, ", "));
   }

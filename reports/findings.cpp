@@ -6,6 +6,7 @@
 #include <map>
 
 #include "core/statistics/mcnemar.h"
+#include "reports/counted_judges.h"
 #include "reports/wording.h"
 
 namespace evac {
@@ -134,7 +135,7 @@ Finding Completeness(const RunSummary& summary) {
   if (counted == all) {
     finding.decision = Decision::kYes;
     finding.answer =
-        fmt::format("All {} ran to their end and were judged by {}.", Counted(all, "episode"), summary.options.judge);
+        fmt::format("All {} ran to their end and were judged by {}.", Counted(all, "episode"), JudgeWords(summary.options.judge));
     return finding;
   }
   finding.decision = Decision::kNo;

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 
+#include "reports/counted_judges.h"
 #include "reports/wording.h"
 
 namespace evac {
@@ -149,7 +150,7 @@ void AddMissing(const RunSummary& summary, std::vector<HeadlineItem>& items) {
   if (const auto unjudged = summary.Count(Outcome::kUnjudged); unjudged > 0) {
     items.push_back({"",
                      fmt::format("{} not judged yet: evac judge RUN --judge {}",
-                                 Counted(unjudged, "episode is", "episodes are"), summary.options.judge),
+                                 Counted(unjudged, "episode is", "episodes are"), LastJudge(summary.options.judge)),
                      "#clips"});
   }
   if (const auto errors = summary.Count(Outcome::kError); errors > 0)

@@ -6,6 +6,7 @@
 
 #include "core/statistics/rate_difference.h"
 #include "core/statistics/rater_agreement.h"
+#include "reports/counted_judges.h"
 
 namespace evac {
 namespace {
@@ -19,7 +20,7 @@ std::string TruthOf(const RunSummary& summary) {
   for (const char* name : {"human", "oracle"}) {
     if (Says(summary.judges, name)) return name;
   }
-  return summary.options.judge;
+  return LastJudge(summary.options.judge);
 }
 
 bool Decides(const Verdict& verdict) { return verdict.label == Label::kSuccess || verdict.label == Label::kFailure; }

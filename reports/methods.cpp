@@ -4,6 +4,7 @@
 
 #include <set>
 
+#include "reports/counted_judges.h"
 #include "reports/wording.h"
 
 namespace evac {
@@ -32,7 +33,7 @@ std::string What(const ReportData& report) {
       "We evaluated {} on {} in {} ({}) from {} with {} each: {} in all, judged by {}{}. ",
       Counted(Size(summary.policies.size()), "policy", "policies"), Counted(Size(summary.data.tasks.size()), "task"),
       Counted(Size(summary.data.worlds.size()), "world"), worlds, Counted(Size(states.size()), "initial state"),
-      Counted(Size(seeds.size()), "seed"), Counted(Size(summary.episodes.size()), "episode"), summary.options.judge,
+      Counted(Size(seeds.size()), "seed"), Counted(Size(summary.episodes.size()), "episode"), JudgeWords(summary.options.judge),
       summary.options.judge == "oracle" ? ", which reads the simulators’ physics" : "");
 }
 

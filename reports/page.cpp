@@ -8,6 +8,7 @@
 #include "core/base64.h"
 #include "core/hash.h"
 #include "reports/charts.h"
+#include "reports/counted_judges.h"
 #include "reports/html.h"
 #include "reports/page_assets.h"
 #include "reports/page_parts.h"
@@ -25,7 +26,7 @@ std::string Subtitle(const RunSummary& summary) {
       Counted(static_cast<std::int64_t>(summary.policies.size()), "policy", "policies"),
       Counted(static_cast<std::int64_t>(summary.data.worlds.size()), "world"),
       Counted(static_cast<std::int64_t>(states.size()), "initial state"),
-      Counted(static_cast<std::int64_t>(summary.episodes.size()), "episode"), Escaped(summary.options.judge));
+      Counted(static_cast<std::int64_t>(summary.episodes.size()), "episode"), Escaped(JudgeWords(summary.options.judge)));
 }
 
 std::string Navigation(const ReportData& report) {
@@ -57,13 +58,13 @@ std::string MissingVerdicts(const RunSummary& summary) {
   if (unjudged == 0) return "";
   std::string others;
   for (const std::string& judge : summary.judges) {
-    if (judge != summary.options.judge) others += (others.empty() ? "" : ", ") + Escaped(judge);
+    if (!IsCounted(judge, summary.options.judge)) others += (others.empty() ? "" : ", ") + Escaped(judge);
   }
   return fmt::format(
       "<p class=\"notice\" role=\"note\"><strong>{} no verdict by {}.</strong> No rate counts such. "
       "<code>evac judge RUN --judge {}</code>, then <code>evac report RUN</code>, adds them.{}</p>",
-      unjudged == 1 ? "1 episode has" : fmt::format("{} episodes have", unjudged), Escaped(summary.options.judge),
-      Escaped(summary.options.judge), others.empty() ? "" : " Other judges have spoken: " + others + ".");
+      unjudged == 1 ? "1 episode has" : fmt::format("{} episodes have", unjudged), Escaped(JudgeWords(summary.options.judge)),
+      Escaped(LastJudge(summary.options.judge)), others.empty() ? "" : " Other judges have spoken: " + others + ".");
 }
 
 /// "sha256-…" of a script, as a policy names it: base64 of the hash's bytes.

@@ -1,6 +1,7 @@
 #include <algorithm>
 
 #include "core/base64.h"
+#include "reports/counted_judges.h"
 #include "reports/html.h"
 #include "reports/page_columns.h"
 #include "reports/page_parts.h"
@@ -34,7 +35,7 @@ class EpisodeColumns {
   EpisodeColumns(const RunSummary& summary, const PageOptions& options) : summary_(summary), options_(options) {
     for (const Task& task : summary.data.tasks) tasks_by_id_[task.id] = &task;
     for (const std::string& judge : summary.judges) {
-      if (judge != summary.options.judge) others_.push_back({judge, {}, {}});
+      if (!IsCounted(judge, summary.options.judge)) others_.push_back({judge, {}, {}});
     }
     for (std::size_t i = 0; i < summary.episodes.size(); ++i) Add(summary.episodes[i], i);
   }

@@ -1,5 +1,6 @@
 #include <fmt/format.h>
 
+#include "reports/counted_judges.h"
 #include "reports/html.h"
 #include "reports/page_parts.h"
 #include "reports/wording.h"
@@ -79,11 +80,11 @@ std::string Calls(const std::vector<CallTotals>& all) {
 std::string JudgesPart(const ReportData& report) {
   const JudgeReport& judges = report.judges;
   std::string html = fmt::format("<section id=\"judges\"><h2>Judges</h2><p>Counted on this page: <b>{}</b>.</p>",
-                                 Escaped(report.summary.options.judge));
+                                 Escaped(JudgeWords(report.summary.options.judge)));
   if (judges.judges.empty()) {
     return html +
            fmt::format("<p>{} No other judge has spoken, so nothing says how often {} errs.{}</p>", Tag("uncalibrated"),
-                       Escaped(report.summary.options.judge),
+                       Escaped(JudgeWords(report.summary.options.judge)),
                        report.summary.options.judge == "oracle"
                            ? " It reads the simulator’s physics against the rubric; whether people would call the same "
                              "episodes a success is not measured."

@@ -5,6 +5,7 @@
 #include <set>
 
 #include "core/config.h"
+#include "reports/counted_judges.h"
 #include "reports/findings.h"
 #include "reports/html.h"
 #include "reports/page_parts.h"
@@ -77,7 +78,7 @@ std::string Latency(const RunSummary& summary) try {
 }
 
 std::string Judges(const RunSummary& summary) {
-  std::string html = fmt::format("<p>Counted: <b>{}</b>.</p>", Escaped(summary.options.judge));
+  std::string html = fmt::format("<p>Counted: <b>{}</b>.</p>", Escaped(JudgeWords(summary.options.judge)));
   std::map<std::string, std::int64_t> rubrics;
   for (const JudgedEpisode& judged : summary.episodes) {
     if (judged.verdict) ++rubrics[judged.verdict->rubric_version];
@@ -85,7 +86,7 @@ std::string Judges(const RunSummary& summary) {
   for (const auto& [rubric, count] : rubrics)
     html += fmt::format("<p>{} by rubric {}.</p>", Counted(count, "verdict"), Code(rubric));
   for (const std::string& judge : summary.judges) {
-    if (judge != summary.options.judge)
+    if (!IsCounted(judge, summary.options.judge))
       html += fmt::format("<p>Also in the store, not counted here: {}.</p>", Escaped(judge));
   }
   return html;

@@ -4,6 +4,7 @@
 #include <map>
 
 #include "reports/charts.h"
+#include "reports/counted_judges.h"
 #include "reports/html.h"
 #include "reports/page_parts.h"
 #include "reports/wording.h"
@@ -106,14 +107,14 @@ std::string TablesByJudge(const ReportData& report) {
   if (report.by_judge.empty()) return own;
   std::string html = "<div class=\"tabs\" role=\"group\" aria-label=\"Whose verdicts are counted\"><span "
                      "class=\"quiet\">Verdicts of</span>" +
-                     JudgeTab(0, summary.options.judge, own);
+                     JudgeTab(0, JudgeWords(summary.options.judge), own);
   for (std::size_t i = 0; i < report.by_judge.size(); ++i) {
     const auto& [judge, rates] = report.by_judge[i];
     html += JudgeTab(i + 1, judge,
                      fmt::format("<p class=\"quiet\">As <b>{}</b> sees the same episodes. All else on this page counts "
                                  "the verdicts of <b>{}</b>; how far the two agree stands under <a "
                                  "href=\"#judges\">Judges</a>.</p>",
-                                 Escaped(judge), Escaped(summary.options.judge)) +
+                                 Escaped(judge), Escaped(JudgeWords(summary.options.judge))) +
                          TaskTables(summary, rates));
   }
   return html + "</div>";

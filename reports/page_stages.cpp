@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "reports/charts.h"
+#include "reports/counted_judges.h"
 #include "reports/findings.h"
 #include "reports/html.h"
 #include "reports/page_parts.h"
@@ -80,7 +81,7 @@ std::string StagesPart(const ReportData& report) {
       "<section id=\"stages\"><h2>Stages</h2><p class=\"quiet\">The share of episodes that reached a stage and all "
       "before it, with Wilson intervals. Where the worlds’ lines part is where one of them lies.</p>";
   if (report.stages.funnels.empty())
-    return html + "<p>" + Escaped(report.summary.options.judge) + " tells no stages.</p></section>";
+    return html + "<p>" + Escaped(JudgeWords(report.summary.options.judge)) + " tells no stages.</p></section>";
   for (const WorldComparison& comparison : report.summary.comparisons) html += Statement(report, comparison.other);
   for (const Task& task : report.summary.data.tasks) html += TaskFunnels(report.stages, task.id);
   for (const WorldComparison& comparison : report.summary.comparisons) html += Partings(report, comparison.other);

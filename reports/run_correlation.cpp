@@ -8,6 +8,7 @@
 #include <set>
 
 #include "core/error.h"
+#include "reports/counted_judges.h"
 #include "reports/outcome.h"
 
 namespace evac {
@@ -22,29 +23,36 @@ struct Counted {
   std::set<EpisodeKey> there;            ///< all episodes
 };
 
-std::string Verdictless(const std::string& judge, const std::set<std::string>& judges) {
-  if (judges.empty())
-    return fmt::format("judge {}: found no verdicts at all, wanted those that `evac judge` gives", judge);
-  return fmt::format("judge {}: found verdicts of {}, wanted one of these", judge, fmt::join(judges, ", "));
+using VerdictsByEpisode = std::map<std::string, std::map<std::string, Verdict>>;
+
+/// The full names of the judges that count. @throws InvalidInput if none of them gave a verdict.
+std::string Judges(const std::string& wanted, const VerdictsByEpisode& verdicts, const std::string& run) {
+  std::set<std::string> names;
+  for (const auto& [episode, of_episode] : verdicts) {
+    for (const auto& [judge, verdict] : of_episode) names.insert(judge);
+  }
+  const std::string full = FullJudgeNames(wanted, {names.begin(), names.end()});
+  if (std::ranges::any_of(names, [&](const std::string& name) { return IsCounted(name, full); })) return full;
+  if (names.empty())
+    throw InvalidInput("{}: judge {}: found no verdicts at all, wanted those that `evac judge` gives", run, wanted);
+  throw InvalidInput("{}: judge {}: found verdicts of {}, wanted one of these", run, wanted, fmt::join(names, ", "));
 }
 
-Counted Read(const Store& store, const std::string& judge) {
+Counted Read(const Store& store, const std::string& wanted) {
   Counted counted{store.Worlds(), {}, store.Policies(), {}, {}};
   for (const Task& task : store.Tasks()) counted.tasks.push_back(task.id);
-  const auto verdicts = store.CurrentVerdicts();
-  std::set<std::string> judges;
+  const VerdictsByEpisode verdicts = store.CurrentVerdicts();
+  const std::string judges = Judges(wanted, verdicts, store.folder().string());
   for (const Episode& episode : store.Episodes()) {
     counted.there.insert(episode.key);
     const auto of_episode = verdicts.find(episode.key.Id());
     if (of_episode == verdicts.end()) continue;
-    for (const auto& [name, verdict] : of_episode->second) judges.insert(name);
-    const auto verdict = of_episode->second.find(judge);
-    if (verdict == of_episode->second.end()) continue;
-    const Outcome outcome = OutcomeOf(episode, verdict->second);
+    const Verdict* verdict = CountedVerdict(of_episode->second, judges);
+    if (verdict == nullptr) continue;
+    const Outcome outcome = OutcomeOf(episode, *verdict);
     if (outcome == Outcome::kSuccess || outcome == Outcome::kFailure)
       counted.succeeded[episode.key] = outcome == Outcome::kSuccess;
   }
-  if (!judges.contains(judge)) throw InvalidInput("{}: {}", store.folder().string(), Verdictless(judge, judges));
   return counted;
 }
 

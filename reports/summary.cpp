@@ -7,6 +7,7 @@
 
 #include "core/config.h"
 #include "core/error.h"
+#include "reports/counted_judges.h"
 #include "reports/letters.h"
 
 namespace evac {
@@ -17,7 +18,7 @@ std::vector<JudgedEpisode> Judged(const RunData& data, const std::string& judge)
   for (const Episode& episode : data.episodes) {
     std::optional<Verdict> verdict;
     if (const auto all = data.verdicts.find(episode.key.Id()); all != data.verdicts.end()) {
-      if (const auto own = all->second.find(judge); own != all->second.end()) verdict = own->second;
+      if (const Verdict* counted = CountedVerdict(all->second, judge)) verdict = *counted;
     }
     const Outcome outcome = OutcomeOf(episode, verdict);
     judged.push_back({episode, outcome, std::move(verdict)});
@@ -153,7 +154,8 @@ RunSummary Summarise(RunData data, const SummaryOptions& options) {
   RunSummary summary;
   summary.options = options;
   summary.judges = JudgesOf(data);
-  summary.episodes = Judged(data, options.judge);
+  summary.options.judge = FullJudgeNames(options.judge, summary.judges);
+  summary.episodes = Judged(data, summary.options.judge);
   summary.policies = PoliciesOf(data);
   for (const WorldInfo& world : data.worlds) {
     if (world.is_real && summary.reference.empty()) summary.reference = world.name;
@@ -167,7 +169,7 @@ RunSummary Summarise(RunData data, const SummaryOptions& options) {
 std::vector<JudgeRates> RatesOfOtherJudges(const RunSummary& summary) {
   std::vector<JudgeRates> others;
   for (const std::string& judge : summary.judges) {
-    if (judge == summary.options.judge || judge.starts_with("human:")) continue;
+    if (IsCounted(judge, summary.options.judge) || judge.starts_with("human:")) continue;
     const std::vector<JudgedEpisode> episodes = Judged(summary.data, judge);
     JudgeRates& other = others.emplace_back(JudgeRates{judge, AllCells(summary, episodes)});
     GiveLetters(episodes, 1 - summary.options.confidence, other.rates);

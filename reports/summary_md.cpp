@@ -4,6 +4,7 @@
 
 #include <cctype>
 
+#include "reports/counted_judges.h"
 #include "reports/findings.h"
 #include "reports/html.h"
 #include "reports/wording.h"
@@ -62,7 +63,7 @@ void AddRates(const RunSummary& summary, Bounded& page) {
   page.Add(
       fmt::format("\n{:g} % intervals, clustered by initial state; judge {}. *Apart*: errors, cannot tell, invalid, "
                   "not judged; in no rate.\n\n",
-                  100 * summary.options.confidence, MarkdownText(summary.options.judge)));
+                  100 * summary.options.confidence, MarkdownText(JudgeWords(summary.options.judge))));
 }
 
 void AddFindings(const RunSummary& summary, Bounded& page) {

@@ -5,6 +5,7 @@
 
 #include "core/error.h"
 #include "core/statistics/rates.h"
+#include "reports/counted_judges.h"
 #include "reports/page.h"
 #include "reports/run_correlation.h"
 #include "tests/reports/sample_run.h"
@@ -49,6 +50,52 @@ TEST(Summary, AnErrorStaysAnErrorWhateverAJudgeSays) {
   verdict.label = Label::kSuccess;
   run.store().AddVerdict(verdict);
   EXPECT_EQ(CellOf(run.Summary(), "pick@good", "real").Of(Outcome::kError), 1);
+}
+
+void Say(Store& store, const std::string& world, const std::string& judge, Label label) {
+  for (const Episode& episode : store.Episodes()) {
+    if (episode.key.world != world) continue;
+    Verdict verdict;
+    verdict.episode_id = episode.key.Id();
+    verdict.judge = judge;
+    verdict.label = label;
+    store.AddVerdict(verdict);
+  }
+}
+
+TEST(Summary, OfSeveralJudgesTheFirstThatSpokeCountsEpisodeByEpisode) {
+  SampleRun run({{"take_bottle", "pick", "good", "ssf", "uuu"}});
+  Say(run.store(), "real", "classifier:abc", Label::kFailure);
+  Say(run.store(), "sim", "classifier:abc", Label::kSuccess);
+  SummaryOptions options;
+  options.judge = "oracle,classifier";
+  const RunSummary summary = Summarise(ReadRun(run.store()), options);
+  EXPECT_EQ(summary.options.judge, "oracle,classifier:abc");
+  EXPECT_EQ(CellOf(summary, "pick@good", "real").Of(Outcome::kSuccess), 2);
+  EXPECT_EQ(CellOf(summary, "pick@good", "sim").Of(Outcome::kSuccess), 3);
+  EXPECT_TRUE(RatesOfOtherJudges(summary).empty()) << "both are counted already";
+
+  RunCorrelationOptions correlation;
+  correlation.judge = options.judge;
+  const CorrelationGroup group = CorrelateRun(run.store(), correlation).at(0);
+  ASSERT_EQ(group.points.size(), 1u);
+  EXPECT_NEAR(group.points[0].real_sr, 2.0 / 3, 1e-12);
+  EXPECT_EQ(group.points[0].sim_sr, 1);
+
+  const RunSummary oracle = Summarise(ReadRun(run.store()), {});
+  EXPECT_EQ(CellOf(oracle, "pick@good", "sim").Of(Outcome::kUnjudged), 3);
+  EXPECT_EQ(RatesOfOtherJudges(oracle).size(), 1u);
+}
+
+TEST(Summary, AJudgesShortNameStandsForOneOrIsRefused) {
+  const std::vector<std::string> there = {"classifier:abc", "classifier:def", "oracle", "vlm:x"};
+  EXPECT_EQ(FullJudgeNames("vlm", there), "vlm:x");
+  EXPECT_EQ(FullJudgeNames("classifier:def,oracle", there), "classifier:def,oracle");
+  EXPECT_EQ(FullJudgeNames("nobody", there), "nobody");
+  EXPECT_THROW(FullJudgeNames("oracle,classifier", there), Error);
+  EXPECT_THROW(FullJudgeNames("oracle,", there), Error);
+  EXPECT_EQ(JudgeWords("oracle,vlm:x"), "oracle, else vlm:x");
+  EXPECT_EQ(LastJudge("oracle,vlm:x"), "vlm:x");
 }
 
 TEST(Summary, OtherJudgesCountTheSameEpisodesWithTheirOwnVerdicts) {

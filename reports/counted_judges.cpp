@@ -1,0 +1,59 @@
+#include "reports/counted_judges.h"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <sstream>
+
+#include "core/error.h"
+
+namespace evac {
+namespace {
+
+std::vector<std::string> Names(const std::string& text) {
+  std::vector<std::string> names;
+  std::istringstream parts(text + ",");
+  for (std::string name; std::getline(parts, name, ',');) names.push_back(name);
+  return names;
+}
+
+std::string FullName(const std::string& name, const std::vector<std::string>& there) {
+  std::vector<std::string> meant;
+  for (const std::string& judge : there) {
+    if (judge == name) return name;
+    if (judge.starts_with(name + ":")) meant.push_back(judge);
+  }
+  if (meant.size() > 1)
+    throw InvalidInput("judge '{}': stands for {}, wanted the name of one", name, fmt::join(meant, " and "));
+  return meant.empty() ? name : meant.front();
+}
+
+}  // namespace
+
+std::string FullJudgeNames(const std::string& wanted, const std::vector<std::string>& there) {
+  std::string full;
+  for (const std::string& name : Names(wanted)) {
+    if (name.empty()) throw InvalidInput("judge '{}': found an empty name, wanted judges with commas between", wanted);
+    full += (full.empty() ? "" : ",") + FullName(name, there);
+  }
+  return full;
+}
+
+const Verdict* CountedVerdict(const std::map<std::string, Verdict>& verdicts, const std::string& counted) {
+  for (const std::string& name : Names(counted)) {
+    if (const auto own = verdicts.find(name); own != verdicts.end()) return &own->second;
+  }
+  return nullptr;
+}
+
+bool IsCounted(const std::string& judge, const std::string& counted) {
+  const std::vector<std::string> names = Names(counted);
+  return std::ranges::find(names, judge) != names.end();
+}
+
+std::string LastJudge(const std::string& counted) { return Names(counted).back(); }
+
+std::string JudgeWords(const std::string& counted) { return fmt::format("{}", fmt::join(Names(counted), ", else ")); }
+
+}  // namespace evac

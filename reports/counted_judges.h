@@ -1,0 +1,30 @@
+#pragma once
+
+#include <map>
+#include <string>
+#include <vector>
+
+#include "core/types.h"
+
+/// Whose verdicts a report counts: one judge's, or, as "oracle,classifier", of each episode the first one's that gave
+/// any. A simulated world has an oracle; an imagined one has none, and is judged by who can read its clips.
+namespace evac {
+
+/// @param wanted  names, best first, with commas. "classifier" stands for the one judge "classifier:…" if there is one.
+/// @param there   judges that gave verdicts
+/// @returns       the same with full names; a name that nobody bears stays as it is
+/// @throws InvalidInput if an empty name is among them, or one stands for several judges.
+std::string FullJudgeNames(const std::string& wanted, const std::vector<std::string>& there);
+
+/// @param counted  as FullJudgeNames gives it. @returns null if none of them gave a verdict
+const Verdict* CountedVerdict(const std::map<std::string, Verdict>& verdicts, const std::string& counted);
+
+bool IsCounted(const std::string& judge, const std::string& counted);
+
+/// Who could still judge what nobody judged yet: the last of them, which the others leave it to.
+std::string LastJudge(const std::string& counted);
+
+/// For people: "oracle", "oracle, else classifier:0123456789ab".
+std::string JudgeWords(const std::string& counted);
+
+}  // namespace evac
