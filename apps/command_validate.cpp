@@ -1,5 +1,6 @@
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <memory>
 
 #include "apps/commands.h"
@@ -32,8 +33,9 @@ ExitCode Validate(const ValidateArguments& arguments) {
       episodes += static_cast<int>(AllJobs(suite, world, policy).size());
     }
   }
-  fmt::print("{}: valid. {} worlds x {} tasks x {} policies x {} initial states x {} seeds = {} episodes. Suite hash {}\n", arguments.suite,
-             suite.worlds.size(), suite.tasks.size(), suite.policies.size(), suite.initial_states.size(), suite.seeds.size(), episodes, suite.hash);
+  const bool all_states = std::ranges::all_of(suite.worlds, [](const SuiteWorld& world) { return world.initial_states == 0; });
+  fmt::print("{}: valid. {} worlds x {} tasks x {} policies x {}{} initial states x {} seeds = {} episodes. Suite hash {}\n", arguments.suite,
+             suite.worlds.size(), suite.tasks.size(), suite.policies.size(), all_states ? "" : "up to ", suite.initial_states.size(), suite.seeds.size(), episodes, suite.hash);
   return ExitCode::kOk;
 }
 

@@ -9,7 +9,7 @@ namespace evac {
 std::vector<Job> AllJobs(const Suite& suite, const SuiteWorld& world, const SuitePolicy& policy) {
   std::vector<Job> jobs;
   for (const Task& task : suite.tasks) {
-    for (const InitialState& state : suite.initial_states) {
+    for (const InitialState& state : StatesOf(suite, world)) {
       for (const std::uint64_t seed : suite.seeds) {
         jobs.push_back({.task = &task,
                         .initial = {state.id, SeedFor(state.seed, task.id)},

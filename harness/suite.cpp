@@ -32,9 +32,9 @@ std::string NameField(const Config& page, const std::string& key) {
 void AllowOnlyFieldsOf(const std::string& type, const Config& page) {
   if (type == "evac") {
     return page.AllowOnly({"name", "type", "role", "weights", "config", "statistics", "solver", "steps", "eta", "cfg",
-                           "cfg_rescale", "period_s", "pose_map", "threads_per_scene", "quirks", "cache"});
+                           "cfg_rescale", "period_s", "pose_map", "threads_per_scene", "quirks", "cache", "initial_states"});
   }
-  page.AllowOnly({"name", "type", "role", "profile"});
+  page.AllowOnly({"name", "type", "role", "profile", "initial_states"});
 }
 
 SuiteWorld ReadWorld(const Config& page) {
@@ -51,6 +51,8 @@ SuiteWorld ReadWorld(const Config& page) {
   if (world.type == "mujoco") world.profile = page.Path("profile");
   if (world.type == "echo") page.Require(!page.Has("profile"), "profile", "none: a recording has no physics");
   if (world.type == "evac") world.evac = ReadSuiteEvac(page);
+  world.initial_states = page.Get<int>("initial_states", 0);
+  page.Require(!page.Has("initial_states") || world.initial_states >= 1, "initial_states", "at least 1");
   return world;
 }
 
@@ -169,6 +171,23 @@ void RequireDistinct(const std::vector<Item>& items, const Config& suite, const 
   }
 }
 
+/// A world may try fewer initial states than the suite has; the real one no fewer than what starts from its frames.
+void CheckStates(const Suite& suite, const Config& page) {
+  const auto tried = [&](const SuiteWorld& world) { return std::ssize(StatesOf(suite, world)); };
+  const std::vector<Config> fields = page.List("worlds");
+  for (std::size_t i = 0; i < fields.size(); ++i) {
+    const SuiteWorld& world = suite.worlds[i];
+    const Config& field = fields[i];
+    field.Require(world.initial_states <= std::ssize(suite.initial_states), "initial_states",
+                  fmt::format("at most the suite's {}", suite.initial_states.size()));
+    for (const SuiteWorld& real : suite.worlds) {
+      if (real.is_real && world.evac)
+        field.Require(tried(world) <= tried(real), "initial_states",
+                      fmt::format("at most the {} of {}, from whose first frames it starts", tried(real), real.name));
+    }
+  }
+}
+
 void CheckWhole(const Suite& suite, const Config& page) {
   page.Require(!suite.worlds.empty(), "worlds", "at least one world");
   page.Require(!suite.policies.empty(), "policies", "at least one policy");
@@ -184,6 +203,7 @@ void CheckWhole(const Suite& suite, const Config& page) {
   const auto reals =
       std::count_if(suite.worlds.begin(), suite.worlds.end(), [](const SuiteWorld& world) { return world.is_real; });
   page.Require(reals <= 1, "worlds", "at most one world with role: real");
+  CheckStates(suite, page);
   for (const SuiteWorld& world : suite.worlds) {
     if (world.type == "evac") {
       page.Require(
@@ -248,6 +268,11 @@ std::string WithPathsFromHere(const std::string& assignment) {
 }
 
 }  // namespace
+
+std::span<const InitialState> StatesOf(const Suite& suite, const SuiteWorld& world) {
+  const std::span<const InitialState> all = suite.initial_states;
+  return world.initial_states == 0 ? all : all.first(std::min<std::size_t>(all.size(), static_cast<std::size_t>(world.initial_states)));
+}
 
 Suite ReadSuite(const fs::path& path, const std::vector<std::string>& assignments) {
   Config page = Config::FromFile(path);

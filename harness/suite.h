@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -15,10 +16,12 @@ namespace evac {
 
 struct SuiteWorld {
   std::string name;
-  std::string type;                ///< mujoco, echo, evac
-  bool is_real = false;            ///< `role: real`
-  std::filesystem::path profile;   ///< mujoco: the page of its physical truth; absolute or relative to the working directory
+  std::string type;      ///< mujoco, echo, evac
+  bool is_real = false;  ///< `role: real`
+  std::filesystem::path
+      profile;  ///< mujoco: the page of its physical truth; absolute or relative to the working directory
   std::optional<SuiteEvac> evac = {};  ///< evac: its network
+  int initial_states = 0;              ///< only the first so many of the suite's; 0: all of them
 };
 
 struct SuitePolicy {
@@ -28,10 +31,10 @@ struct SuitePolicy {
 };
 
 struct Transport {
-  double deadline_s = 10;      ///< a policy that has not answered by then has failed the episode
-  double repeat_after_s = 1;   ///< an unanswered request is sent again after this
-  double start_s = 30;         ///< how long a policy may take to declare itself
-  std::string images = "jpeg"; ///< jpeg or raw
+  double deadline_s = 10;       ///< a policy that has not answered by then has failed the episode
+  double repeat_after_s = 1;    ///< an unanswered request is sent again after this
+  double start_s = 30;          ///< how long a policy may take to declare itself
+  std::string images = "jpeg";  ///< jpeg or raw
 };
 
 /// What is done about a policy whose first chunk does not look like its declared conventions (harness/start_probe.h).
@@ -51,8 +54,8 @@ struct Suite {
   std::vector<InitialState> initial_states;  ///< per task; their seeds mix in the task's id when used
   int chunk_size = 8;
   int lanes = 4;
-  int threads = 0;            ///< 0: one per core
-  double error_budget = .1;   ///< share of episodes that may fail before the run gives up
+  int threads = 0;           ///< 0: one per core
+  double error_budget = .1;  ///< share of episodes that may fail before the run gives up
   std::vector<std::string> judges;
   VideoOptions video;
   Transport transport;
@@ -60,6 +63,9 @@ struct Suite {
   StartProbe start_probe = StartProbe::kRefuse;
   std::optional<std::filesystem::path> recording;
 };
+
+/// The initial states that a world tries.
+std::span<const InitialState> StatesOf(const Suite& suite, const SuiteWorld& world);
 
 /// Reads and checks a suite.
 /// @param assignments  `--set` values, in order; paths in them are relative to the working directory.

@@ -88,6 +88,26 @@ TEST_F(EvacSuite, RealityIsTheSameWhateverTheModelAndAnotherWithAnotherWorldPoli
   EXPECT_EQ(Read().reality_hash, suite.reality_hash);
 }
 
+TEST_F(EvacSuite, ItTriesNoMoreStatesThanTheRealWorldFromWhoseFramesItStarts) {
+  const std::string source = EVAC_SOURCE_DIR "/worldmodel/sim/";
+  Write("both.yaml",
+        "suite: both\nworlds:\n  - {name: real, type: mujoco, role: real, initial_states: 4, profile: " + source +
+            "profiles/real.yaml}\n  - {name: evac, type: evac, weights: w.safetensors, config: c.yaml, initial_states: "
+            "4}\n"
+            "tasks: [" +
+            source +
+            "scenes/take_bottle.yaml]\npolicies: [{name: hold, command: [evac-policy, hold]}]\n"
+            "initial_states: {seed: 1, count: 9}\n");
+  const Suite suite = ReadSuite(folder_ / "both.yaml", {});
+  EXPECT_EQ(StatesOf(suite, suite.worlds[1]).size(), 4u);
+  try {
+    ReadSuite(folder_ / "both.yaml", {"worlds.1.initial_states=5"});
+    FAIL() << "no complaint";
+  } catch (const Error& error) {
+    EXPECT_THAT(error.what(), AllOf(HasSubstr("worlds.1.initial_states"), HasSubstr("at most the 4 of real")));
+  }
+}
+
 TEST_F(EvacSuite, WhatIsWrongIsNamedWithItsField) {
   EXPECT_THAT(Complaint({"worlds.0.weight=w"}), AllOf(HasSubstr("weight"), HasSubstr("'weights'")));
   EXPECT_THAT(Complaint({"worlds.0.weights=/nowhere"}), AllOf(HasSubstr("weights"), HasSubstr("/nowhere")));
