@@ -84,7 +84,7 @@ void AddCorrelate(CLI::App& app, ExitCode& exit_code) {
           "<=")
       ->type_name("code|sign|leq")
       ->default_str("code");
-  command->add_option("--judge", options.judge, "whose verdicts are counted; with commas, of each episode the first that gave one: oracle,classifier")->capture_default_str();
+  command->add_option("--judge", options.judge, "whose verdicts are counted; with commas, of each episode the first who can tell: oracle,classifier")->capture_default_str();
   command->add_option("--world", options.world, "compare only this world with the real one")->type_name("NAME");
   command->add_option("--seed", options.correlation.bootstrap.seed, "of the bootstrap")->capture_default_str();
   command->add_flag("--json", arguments->json, "for programs: docs/formats/correlation_json.md");

@@ -95,7 +95,7 @@ void AddReport(CLI::App& app, ExitCode& exit_code) {
       ->add_option("--pairs", arguments->pairs,
                    "instead of a run: a CSV of rates, group,task,policy,real_sr,sim_sr (docs/formats/pairs_csv.md)")
       ->type_name("FILE.csv");
-  command->add_option("--judge", arguments->options.judge, "whose verdicts are counted; with commas, of each episode the first that gave one: oracle,classifier")->capture_default_str();
+  command->add_option("--judge", arguments->options.judge, "whose verdicts are counted; with commas, of each episode the first who can tell: oracle,classifier")->capture_default_str();
   command->add_option("--out", arguments->out, "into this folder (default: RUN/report)")->type_name("FOLDER");
   command
       ->add_option("--baseline", arguments->baseline,

@@ -41,10 +41,15 @@ std::string FullJudgeNames(const std::string& wanted, const std::vector<std::str
 }
 
 const Verdict* CountedVerdict(const std::map<std::string, Verdict>& verdicts, const std::string& counted) {
+  const Verdict* first = nullptr;
   for (const std::string& name : Names(counted)) {
-    if (const auto own = verdicts.find(name); own != verdicts.end()) return &own->second;
+    const auto own = verdicts.find(name);
+    if (own == verdicts.end()) continue;
+    const Label label = own->second.label;
+    if (label == Label::kSuccess || label == Label::kFailure) return &own->second;
+    if (first == nullptr) first = &own->second;
   }
-  return nullptr;
+  return first;
 }
 
 bool IsCounted(const std::string& judge, const std::string& counted) {

@@ -6,8 +6,8 @@
 
 #include "core/types.h"
 
-/// Whose verdicts a report counts: one judge's, or, as "oracle,classifier", of each episode the first one's that gave
-/// any. A simulated world has an oracle; an imagined one has none, and is judged by who can read its clips.
+/// Whose verdicts a report counts: one judge's, or, as "oracle,classifier", of each episode the first one's who could
+/// tell. The oracle reads a simulated world's physics; of an imagined one it cannot tell, and who reads clips is asked.
 namespace evac {
 
 /// @param wanted  names, best first, with commas. "classifier" stands for the one judge "classifier:…" if there is one.
@@ -16,7 +16,9 @@ namespace evac {
 /// @throws InvalidInput if an empty name is among them, or one stands for several judges.
 std::string FullJudgeNames(const std::string& wanted, const std::vector<std::string>& there);
 
-/// @param counted  as FullJudgeNames gives it. @returns null if none of them gave a verdict
+/// The first that says success or failure; if none does, the first there is.
+/// @param counted  as FullJudgeNames gives it
+/// @returns null if none of them gave a verdict
 const Verdict* CountedVerdict(const std::map<std::string, Verdict>& verdicts, const std::string& counted);
 
 bool IsCounted(const std::string& judge, const std::string& counted);
