@@ -44,6 +44,8 @@ Settings SettingsOf(TrainerOptions& t) {
           {"learning_rate", &t.learning_rate},
           {"warmup_steps", &t.warmup_steps},
           {"decay_from", &t.decay_from},
+          {"optimiser", &t.optimiser},
+          {"momentum", &t.momentum},
           {"beta1", &t.adamw.beta1},
           {"beta2", &t.adamw.beta2},
           {"epsilon", &t.adamw.epsilon},

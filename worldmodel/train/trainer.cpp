@@ -31,6 +31,9 @@ void Check(const TrainerOptions& o) {
   Require(o.average_decay >= 0 && o.average_decay < 1, "average_decay", o.average_decay, "0 to below 1");
   Require(o.accumulate > 0, "accumulate", static_cast<double>(o.accumulate), "at least 1");
   Require(o.adamw.beta1 >= 0 && o.adamw.beta1 < 1, "beta1", o.adamw.beta1, "0 to below 1");
+  Require(o.momentum >= 0 && o.momentum < 1, "momentum", o.momentum, "0 to below 1");
+  if (o.optimiser != "adamw" && o.optimiser != "muon")
+    throw TensorError("training: optimiser is '" + o.optimiser + "', wanted adamw or muon");
   Require(o.adamw.beta2 >= 0 && o.adamw.beta2 < 1, "beta2", o.adamw.beta2, "0 to below 1");
 }
 
@@ -75,6 +78,7 @@ std::string TrainerProgress::Line() const {
 Trainer::Trainer(std::vector<NamedTensor> parameters, const TrainerOptions& options, std::filesystem::path folder)
     : parameters_(std::move(parameters)), options_(options), folder_(std::move(folder)), steps_(options.steps) {
   Check(options_);
+  if (options_.optimiser == "muon") matrices_ = MatricesOf(parameters_.parameters());
   const auto zeros = [&] { return at::zeros_like(parameters_.values()); };
   state_ = {parameters_.values(), parameters_.gradients(), zeros(), zeros(), {}};
   if (options_.average_decay > 0) state_.average = parameters_.values().clone();
@@ -137,9 +141,9 @@ Trainer::StepOutcome Trainer::Step(const TrainerCallbacks& callbacks) {
   not_finite_ = 0;
   const bool too_long = options_.clip_norm > 0 && outcome.gradient_norm > options_.clip_norm;
   const auto n = static_cast<double>(step_);
-  StepAdamW(state_, options_.adamw,
-            {step_, outcome.learning_rate, too_long ? options_.clip_norm / outcome.gradient_norm : 1.0,
-             std::min(options_.average_decay, (1 + n) / (10 + n))});
+  StepMuon(state_, matrices_, options_.momentum, options_.adamw,
+           {step_, outcome.learning_rate, too_long ? options_.clip_norm / outcome.gradient_norm : 1.0,
+            std::min(options_.average_decay, (1 + n) / (10 + n))});
   return outcome;
 }
 

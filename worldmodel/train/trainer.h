@@ -10,6 +10,7 @@
 #include "worldmodel/train/adamw.h"
 #include "worldmodel/train/dice.h"
 #include "worldmodel/train/flat_parameters.h"
+#include "worldmodel/train/muon.h"
 
 /// Gradient descent on anything: parameters by name, and a function that says the loss at a step. It knows no network
 /// and no data; codec, world model, policies and judges are trained by it alike.
@@ -24,6 +25,8 @@ struct TrainerOptions {
   double learning_rate = 5e-5;
   std::int64_t warmup_steps = 0;  ///< the rate rises from 0
   double decay_from = 1;          ///< after this part of the steps the rate falls to 0 in a straight line; 1: never
+  std::string optimiser = "adamw";  ///< or "muon": matrices by it, all else by AdamW (muon.h)
+  double momentum = 0.95;           ///< Muon's
   AdamWOptions adamw;
   double clip_norm = 0.5;          ///< longer gradients are shortened to it; 0: never
   double average_decay = 0;        ///< of the moving average of the weights (EMA); 0: there is none
@@ -126,6 +129,7 @@ class Trainer {
   };
 
   FlatParameters parameters_;
+  std::vector<MatrixPlace> matrices_;  ///< of the parameters, Muon's; none if it is not asked for
   std::vector<Worker> replicas_;
   TrainerOptions options_;
   std::filesystem::path folder_;

@@ -50,6 +50,7 @@ std::string Trainer::Identity() const {
                               o.adamw.weight_decay, o.clip_norm, o.average_decay, static_cast<double>(o.warmup_steps),
                               static_cast<double>(o.accumulate)})
     text += Exact(number) + " ";
+  if (o.optimiser != "adamw") text += o.optimiser + " " + Exact(o.momentum) + " ";
   return text + "seed " + std::to_string(o.seed) + " " + o.identity;
 }
 
