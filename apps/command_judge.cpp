@@ -4,14 +4,13 @@
 
 #include "apps/commands.h"
 #include "apps/judge_with_vlm.h"
-#include "judges/classifier_judge.h"
+#include "apps/network_parts.h"
 #include "judges/judge_episodes.h"
 #include "judges/oracle_judge.h"
 
 namespace evac {
 
 void AddCalibrate(CLI::App& judge, ExitCode& exit_code);  // command_calibrate.cpp: a subcommand of this one
-void AddJudgeTrain(CLI::App& judge, ExitCode& exit_code);  // command_train_learners.cpp: another
 
 namespace {
 
@@ -39,14 +38,13 @@ std::unique_ptr<Judge> MakeJudge(const JudgeArguments& arguments, const Store& s
     throw InvalidInput("--judge: found '{}', wanted oracle, classifier or vlm", arguments.judge);
   if (arguments.weights.empty())
     throw InvalidInput("--judge classifier: wanted --weights, a file of `evac judge train` or `evac train judge`");
-  auto judge = std::make_unique<ClassifierJudge>(arguments.weights, store.folder());
-  judge->CheckKnows(store.Tasks());
-  return judge;
+  return MakeClassifier(arguments.weights, store);
 }
 
 ExitCode Rate(const JudgeArguments& arguments) {
   if (arguments.run.empty()) throw InvalidInput("wanted the run's folder: evac judge RUN --judge NAME");
   if (arguments.judge == "vlm") return RateWithVlm(arguments);
+  if (arguments.judge == "classifier") NeedNetworks();
   Store store = Store::Open(arguments.run, Store::Mode::kReadWrite);
   const std::unique_ptr<Judge> judge = MakeJudge(arguments, store);
   fmt::print("{}: {}\n", judge->Name(), Sentence(JudgeEpisodes(*judge, store, {.again = arguments.again})));

@@ -6,6 +6,7 @@
 #include "apps/commands.h"
 #include "apps/evaluate.h"
 #include "apps/factory.h"
+#include "apps/network_parts.h"
 #include "core/version.h"
 
 namespace evac {
@@ -42,6 +43,7 @@ Shard ShardNamed(const std::string& text) {
 ExitCode Run(const RunArguments& arguments) {
   Suite suite = ReadSuite(arguments.suite, arguments.assignments);
   const Shard shard = ShardNamed(arguments.shard);
+  NeedNetworksFor(suite);
   Store store = Store::CreateOrContinue(arguments.out, InfoOf(suite));
   FillInRecordedTask(suite);
   return Evaluate(suite, store, {.shard = shard});
@@ -54,6 +56,7 @@ ExitCode Resume(const ResumeArguments& arguments) {
     throw InvalidInput("{}: a file that the suite {} names has changed since the run began (suite hash {:.12}…, was {:.12}…); "
                        "start a new run with `evac run`", arguments.run, info.suite_path, suite.hash, info.suite_hash);
   }
+  NeedNetworksFor(suite);
   if (arguments.lanes > 0) suite.lanes = arguments.lanes;
   Store store = Store::CreateOrContinue(arguments.run, info);
   FillInRecordedTask(suite);

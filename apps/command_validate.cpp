@@ -5,6 +5,7 @@
 
 #include "apps/commands.h"
 #include "apps/factory.h"
+#include "apps/network_parts.h"
 #include "core/error.h"
 #include "harness/scheduler.h"
 
@@ -19,6 +20,7 @@ struct ValidateArguments {
 /// Everything that can be known to be wrong before the first episode, short of starting the policies.
 ExitCode Validate(const ValidateArguments& arguments) {
   Suite suite = ReadSuite(arguments.suite, arguments.assignments);
+  NeedNetworksFor(suite);
   FillInRecordedTask(suite);
   CheckRubrics(suite);
   int episodes = 0;

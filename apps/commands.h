@@ -29,6 +29,8 @@ void AddImagine(CLI::App& app, ExitCode& exit_code);
 void AddTrain(CLI::App& app, ExitCode& exit_code);
 void AddTrainJudge(CLI::App& group, ExitCode& exit_code);
 void AddTrainPolicy(CLI::App& group, ExitCode& exit_code);
+/// Its second `train`, of the judge: `evac judge train`.
+void AddJudgeTrain(CLI::App& judge, ExitCode& exit_code);
 void AddEncode(CLI::App& app, ExitCode& exit_code);
 void AddCollect(CLI::App& app, ExitCode& exit_code);
 void AddPack(CLI::App& app, ExitCode& exit_code);

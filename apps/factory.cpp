@@ -6,8 +6,9 @@
 #include <cstdlib>
 #include <random>
 #include <sstream>
+#include <thread>
 
-#include "apps/evac_factory.h"
+#include "apps/network_parts.h"
 #include "core/config.h"
 #include "core/recording.h"
 #include "judges/oracle_judge.h"
@@ -101,6 +102,14 @@ void Declare(const Suite& suite, Store& store) {
     }
     store.AddWorld({.name = world.name, .type = world.type, .is_real = world.is_real, .profile_hash = profile_hash});
   }
+}
+
+int Threads(const Suite& suite) {
+  return suite.threads > 0 ? suite.threads : std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
+}
+
+void NeedNetworksFor(const Suite& suite) {
+  if (std::ranges::any_of(suite.worlds, [](const SuiteWorld& world) { return world.evac.has_value(); })) NeedNetworks();
 }
 
 std::unique_ptr<World> MakeWorld(const SuiteWorld& world, const Suite& suite, const Store* store) {

@@ -30,6 +30,9 @@ void CheckStart(World& world, const Task& task, const InitialState& initial);
 /// Tasks and worlds, as the store keeps them; checks rubrics and networks first.
 void Declare(const Suite& suite, Store& store);
 
+/// As many as the suite says, or one per core.
+int Threads(const Suite& suite);
+
 /// @param store  of the run, where imagined episodes find the real ones' first frames; null: there is none yet
 std::unique_ptr<World> MakeWorld(const SuiteWorld& world, const Suite& suite, const Store* store);
 

@@ -1,11 +1,7 @@
-#include <unistd.h>
-
-#include <cerrno>
-#include <cstring>
-#include <filesystem>
 #include <memory>
 
 #include "apps/policy_program.h"
+#include "apps/program_beside.h"
 #include "core/recording.h"
 #include "core/version.h"
 #include "policies/hold_policy.h"
@@ -130,15 +126,7 @@ void AddLearned(CLI::App& app) {
   command->set_help_flag();  // -h and all else is for that program
   command->prefix_command();
   command->callback([command] {
-    const std::string program =
-        (std::filesystem::read_symlink("/proc/self/exe").parent_path() / "evac-policy-learned").string();
-    std::vector<std::string> words = command->remaining();
-    words.insert(words.begin(), program);
-    std::vector<char*> arguments;
-    for (std::string& word : words) arguments.push_back(word.data());
-    arguments.push_back(nullptr);
-    ::execv(program.c_str(), arguments.data());
-    throw InternalError("cannot start {}: {}", program, std::strerror(errno));
+    BecomeProgramBeside("evac-policy-learned", command->remaining());
   });
 }
 

@@ -1,4 +1,4 @@
-#include "apps/judge_run_clips.h"
+#include "apps/networks/judge_run_clips.h"
 
 #include <fmt/format.h>
 #include <gmock/gmock.h>
@@ -6,7 +6,7 @@
 
 #include <set>
 
-#include "apps/train_judge.h"
+#include "apps/networks/train_judge.h"
 #include "core/store.h"
 #include "core/video.h"
 #include "core/weight_file.h"

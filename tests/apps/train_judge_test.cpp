@@ -1,12 +1,12 @@
-#include "apps/train_judge.h"
+#include "apps/networks/train_judge.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <fstream>
 
-#include "apps/judge_quality.h"
-#include "apps/judge_shard_clips.h"
+#include "apps/networks/judge_quality.h"
+#include "apps/networks/judge_shard_clips.h"
 #include "core/error.h"
 #include "core/file.h"
 #include "core/hash.h"

@@ -1,4 +1,4 @@
-#include "apps/train_policy.h"
+#include "apps/networks/train_policy.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

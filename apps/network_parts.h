@@ -1,0 +1,54 @@
+#pragma once
+
+#include <filesystem>
+#include <memory>
+
+#include "core/judge.h"
+#include "core/store.h"
+#include "core/world.h"
+#include "harness/suite.h"
+
+/// The parts of `evac` that are networks, and with them libtorch, which takes half a second of a core to load. There are
+/// two of each, and the linker chooses: the program `evac-networks` has them (apps/networks); the program `evac` becomes
+/// evac-networks, with the same command line, where one is asked for (apps/networks_beside.cpp), and starts at once
+/// where none is. docs/decisions/0042.
+namespace evac {
+
+/// For what is known to need a network, before anything was opened or written. Returns in evac-networks alone.
+void NeedNetworks();
+
+/// NeedNetworks() if a world of the suite is one.
+void NeedNetworksFor(const Suite& suite);
+
+/// The world of a suite's entry of type `evac`: its network loaded, its chunk cache opened.
+/// @param store  where the real run's first frames are; null: nobody has run it, and only a recording can be started
+/// from
+/// @throws InvalidInput if page and weights are not of one network, or either is broken.
+std::unique_ptr<World> MakeEvacWorld(const SuiteWorld& world, const Suite& suite, const Store* store);
+
+/// The same without loading it: what is wrong with page and weights is known before the first episode of any world.
+void CheckNetwork(const SuiteEvac& evac);
+
+/// The classifier judge of a run. @throws InvalidInput if the weights are none of its, or do not know the run's tasks.
+std::unique_ptr<Judge> MakeClassifier(const std::filesystem::path& weights, const Store& store);
+
+/// A subcommand as `evac -h` lists it; declared in commands.h, defined with the networks.
+struct NetworkCommand {
+  const char* name;
+  const char* what;
+};
+
+inline constexpr NetworkCommand kFidelityCommand{"fidelity",
+                                                 "Say how true a world model is: outcomes and pictures against reality"};
+inline constexpr NetworkCommand kWeightsCommand{"weights", "Look at, convert and make weights of the EVAC network."};
+inline constexpr NetworkCommand kImagineCommand{"imagine",
+                                                "Imagine what a camera sees when the arms do what was recorded"};
+inline constexpr NetworkCommand kTrainCommand{"train",
+                                              "Train the codec, the world model, the classifier judge, a policy."};
+inline constexpr NetworkCommand kEncodeCommand{"encode",
+                                               "Write the latents of shards beside them, as training reads them"};
+inline constexpr NetworkCommand kPackCommand{"pack", "Turns recordings into the shards that networks are trained from."};
+inline constexpr NetworkCommand kJudgeTrainCommand{
+    "train", "Train a classifier for your own tasks, from clips that somebody has judged."};
+
+}  // namespace evac

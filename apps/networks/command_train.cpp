@@ -1,0 +1,112 @@
+#include <fmt/format.h>
+
+#include <memory>
+#include <opencv2/imgcodecs.hpp>
+#include <opencv2/imgproc.hpp>
+
+#include "apps/commands.h"
+#include "apps/network_parts.h"
+#include "apps/interrupts.h"
+#include "apps/networks/train_arguments.h"
+#include "apps/networks/training_page.h"
+#include "core/file.h"
+#include "core/hash.h"
+#include "worldmodel/nn/memory.h"
+#include "worldmodel/nn/threads.h"
+#include "worldmodel/train/train_world.h"
+
+namespace evac {
+namespace {
+
+namespace fs = std::filesystem;
+
+using Arguments = std::shared_ptr<TrainArguments>;
+
+ExitCode RunCodec(const TrainArguments& arguments) {
+  train::CodecOptions options;
+  ReadTrainingPage(arguments.training, "codec", arguments.settings, SettingsOf(options));
+  Override(arguments, options.job.trainer);
+  const CatchInterrupts catch_interrupts;
+  TrainingProgress progress(stderr);
+  const train::JobPlace place = PlaceOf(arguments, progress);
+  nn::KeepFreedMemory();
+  const nn::LibraryThreads threads(LibraryThreadsOf(place, options.job));
+  return End(TrainCodec(place, options), arguments.out, "codec.safetensors");
+}
+
+/// OUT/strips/step_00001200.png
+void WriteStrips(const fs::path& out, std::int64_t step, const train::Strips& strips) {
+  const auto rows = static_cast<int>(strips.picture.size(0)), columns = static_cast<int>(strips.picture.size(1));
+  const cv::Mat rgb(rows, columns, CV_8UC3, strips.picture.data_ptr());
+  cv::Mat bgr;
+  cv::cvtColor(rgb, bgr, cv::COLOR_RGB2BGR);
+  std::vector<unsigned char> png;
+  cv::imencode(".png", bgr, png);
+  MakeFolders(out / "strips");
+  WriteFileAtomically(out / "strips" / fmt::format("step_{:08}.png", step),
+                      {reinterpret_cast<const char*>(png.data()), png.size()});
+}
+
+ExitCode RunWorld(const TrainArguments& arguments) {
+  train::WorldOptions options;
+  ReadTrainingPage(arguments.training, "world", arguments.settings, SettingsOf(options));
+  Override(arguments, options.job.trainer);
+  const train::WorldStart start{arguments.codec, arguments.init, arguments.init_except, Sha256HexOfFile(arguments.codec)};
+  const CatchInterrupts catch_interrupts;
+  TrainingProgress progress(stderr);
+  const train::JobPlace place = PlaceOf(arguments, progress);
+  nn::KeepFreedMemory();
+  const nn::LibraryThreads threads(LibraryThreadsOf(place, options.job));
+  const auto look = [&](std::int64_t step, const train::Strips& strips) { WriteStrips(arguments.out, step, strips); };
+  return End(TrainWorld(place, options, start, look), arguments.out, "weights.safetensors");
+}
+
+void AddCodec(CLI::App& group, ExitCode& exit_code) {
+  const auto arguments = std::make_shared<TrainArguments>();
+  CLI::App* command = group.add_subcommand("codec", "Train the latent codec on pictures and pose maps.");
+  AddShared(*command, arguments);
+  AddConfig(*command, arguments)->required();
+  command->footer(
+      "Example:\n"
+      "  evac train codec out/shards --config apps/configs/desk_model.yaml --training apps/configs/desk_training.yaml \\\n"
+      "                   --minutes 8 --out out/codec\n"
+      "Then: evac encode out/shards --config … --codec out/codec/codec.safetensors. More: docs/train.md");
+  command->callback([arguments, &exit_code] { exit_code = RunCodec(*arguments); });
+}
+
+void AddWorld(CLI::App& group, ExitCode& exit_code) {
+  const auto arguments = std::make_shared<TrainArguments>();
+  CLI::App* command = group.add_subcommand("world", "Train the world model on encoded shards.");
+  AddShared(*command, arguments);
+  AddConfig(*command, arguments)->required();
+  command->add_option("--codec", arguments->codec, "the codec's weights, which encoded the shards")
+      ->required()
+      ->check(CLI::ExistingFile);
+  command->add_option("--init", arguments->init, "a checkpoint to go on from: fine-tuning; every key must fit")
+      ->check(CLI::ExistingFile);
+  command
+      ->add_option("--init-except", arguments->init_except,
+                   "keys that begin so are drawn anew instead, with commas between them")
+      ->delimiter(',');
+  command->footer(
+      "Examples:\n"
+      "  evac train world out/shards --config apps/configs/desk_model.yaml --training apps/configs/desk_training.yaml \\\n"
+      "                   --codec out/codec/codec.safetensors --minutes 40 --out out/world\n"
+      "  evac train world mine/shards --config my_model.yaml --codec codec.safetensors --init evac.safetensors \\\n"
+      "                   --init-except model.diffusion_model.input_blocks.0 --steps 2000 --out out/mine\n"
+      "OUT: weights.safetensors, metrics.csv, holdout.csv, strips/ (truth above, imagined below). More: docs/train.md");
+  command->callback([arguments, &exit_code] { exit_code = RunWorld(*arguments); });
+}
+
+}  // namespace
+
+void AddTrain(CLI::App& app, ExitCode& exit_code) {
+  CLI::App* group = app.add_subcommand(kTrainCommand.name, kTrainCommand.what);
+  group->require_subcommand(1);
+  AddCodec(*group, exit_code);
+  AddWorld(*group, exit_code);
+  AddTrainJudge(*group, exit_code);
+  AddTrainPolicy(*group, exit_code);
+}
+
+}  // namespace evac

@@ -1,0 +1,135 @@
+#include <memory>
+#include <optional>
+
+#include "apps/commands.h"
+#include "apps/interrupts.h"
+#include "apps/network_parts.h"
+#include "apps/networks/judge_run_clips.h"
+#include "apps/networks/judge_shard_clips.h"
+#include "apps/networks/train_arguments.h"
+#include "apps/networks/train_judge.h"
+#include "apps/networks/train_policy.h"
+#include "apps/networks/training_page.h"
+#include "worldmodel/nn/memory.h"
+#include "worldmodel/nn/threads.h"
+
+/// evac train judge, evac train policy: the small networks beside the world model.
+namespace evac {
+namespace {
+
+/// What both commands do around their training. @param section  of the training page
+/// @param train  (place, options) → the summary
+template <class Options, class Train>
+ExitCode RunLearner(const TrainArguments& arguments, const std::string& section, const Train& train) {
+  Options options;
+  ReadTrainingPage(arguments.training, section, arguments.settings, SettingsOf(options));
+  Override(arguments, options.job.trainer);
+  const CatchInterrupts catch_interrupts;
+  TrainingProgress progress(stderr);
+  const train::JobPlace place = PlaceOf(arguments, progress);
+  nn::KeepFreedMemory();
+  const nn::LibraryThreads threads(1);
+  return End(train(place, options), arguments.out, (section + ".safetensors").c_str());
+}
+
+ExitCode RunJudge(const TrainArguments& arguments) {
+  return RunLearner<JudgeTrainingOptions>(arguments, "judge", [&](const train::JobPlace& place, const JudgeTrainingOptions& options) {
+    std::optional<JudgeCodec> codec;
+    if (!arguments.codec.empty()) codec.emplace(arguments.codec, place.config.vae);
+    const ShardClips learn(place.shards, train::Split::kTrain, codec ? &*codec : nullptr),
+        holdout(place.shards, train::Split::kHoldout, codec ? &*codec : nullptr);
+    return TrainJudge(place, options, {learn, holdout});
+  });
+}
+
+struct LabelledArguments {
+  LabelledRuns runs;
+  TrainArguments training;
+};
+
+ExitCode RunJudgeFromLabels(const LabelledArguments& arguments) {
+  return RunLearner<JudgeTrainingOptions>(
+      arguments.training, "judge", [&](const train::JobPlace& place, const JudgeTrainingOptions& options) {
+        LabelledRuns runs = arguments.runs;
+        runs.seed = options.job.trainer.seed;
+        const LabelledClips clips = ReadLabelledClips(runs, place.say);
+        return TrainJudge(place, options, {*clips.learn, *clips.holdout});
+      });
+}
+
+ExitCode RunPolicy(const TrainArguments& arguments) {
+  return RunLearner<PolicyOptions>(arguments, "policy",
+                                   [&](const train::JobPlace& place, const PolicyOptions& options) {
+                                     return TrainPolicy(place, options, arguments.keep_steps);
+                                   });
+}
+
+}  // namespace
+
+void AddTrainJudge(CLI::App& group, ExitCode& exit_code) {
+  const auto arguments = std::make_shared<TrainArguments>();
+  CLI::App* command = group.add_subcommand("judge", "Train the classifier judge on clips with a known outcome.");
+  AddShared(*command, arguments);
+  CLI::Option* codec = command->add_option("--codec", arguments->codec,
+                                           "half of the clips are shown as this codec, which encoded the shards, gives "
+                                           "them back: how a world model's clips look");
+  codec->check(CLI::ExistingFile)->needs(AddConfig(*command, arguments));
+  command->footer(
+      "Example:\n"
+      "  evac train judge out/shards --training apps/configs/desk_training.yaml --config apps/configs/desk_model.yaml \\\n"
+      "                   --codec out/codec/codec.safetensors --out out/judge\n"
+      "OUT: judge.safetensors with its card (docs/classifier_judge.md), metrics.csv, holdout.csv");
+  command->callback([arguments, &exit_code] { exit_code = RunJudge(*arguments); });
+}
+
+void AddJudgeTrain(CLI::App& judge, ExitCode& exit_code) {
+  const auto arguments = std::make_shared<LabelledArguments>();
+  LabelledRuns& runs = arguments->runs;
+  CLI::App* command =
+      judge.add_subcommand(kJudgeTrainCommand.name, kJudgeTrainCommand.what);
+  command->add_option("RUNS", runs.runs, "folders of runs; their clips are what it learns from")
+      ->required()
+      ->check(CLI::ExistingDirectory);
+  command->add_option("--truth", runs.truth, "whose verdicts: a judge's name, human:STUDY say (evac ls shows them)")
+      ->capture_default_str();
+  command->add_option("--worlds", runs.worlds, "clips of these worlds alone, with commas between them")->delimiter(',');
+  command->add_option("--holdout", runs.holdout, "share of initial states that are kept apart to measure with")
+      ->check(CLI::Range(0.05, 0.9))
+      ->capture_default_str();
+  command->add_option("--least", runs.least, "labels of each kind that a task must have")
+      ->check(CLI::Range(1, 1000000))
+      ->capture_default_str();
+  const auto side = CLI::Range(8, 1024) & CLI::Validator(
+                                              [](const std::string& text) {
+                                                return std::stoi(text) % 8 == 0 ? "" : "wanted a multiple of 8";
+                                              },
+                                              "multiple of 8");
+  command->add_option("--height-px", runs.height_px, "of a picture as the judge sees it")->check(side)->capture_default_str();
+  command->add_option("--width-px", runs.width_px, "likewise")->check(side)->capture_default_str();
+  AddTraining(*command, std::shared_ptr<TrainArguments>(arguments, &arguments->training));
+  command->footer(
+      "Example:\n"
+      "  evac judge train out/mine --truth human:study --training apps/configs/desk_training.yaml --out out/judge\n"
+      "  evac judge out/next --judge classifier --weights out/judge/judge.safetensors\n"
+      "It does not judge clips that it learned from. OUT: judge.safetensors with its card, metrics.csv, holdout.csv,\n"
+      "curves.svg (docs/classifier_judge.md)");
+  command->callback([arguments, &exit_code] { exit_code = RunJudgeFromLabels(*arguments); });
+}
+
+void AddTrainPolicy(CLI::App& group, ExitCode& exit_code) {
+  const auto arguments = std::make_shared<TrainArguments>();
+  CLI::App* command = group.add_subcommand("policy", "Train a policy to imitate recordings that succeeded.");
+  AddShared(*command, arguments);
+  command
+      ->add_option("--keep-steps", arguments->keep_steps,
+                   "steps after which a checkpoint is kept beside the last, with commas between them")
+      ->delimiter(',');
+  command->footer(
+      "Example:\n"
+      "  evac train policy out/shards --training apps/configs/desk_training.yaml --keep-steps 500,1000,2000 --out out/policy\n"
+      "OUT: policy.safetensors and policy_<step>.safetensors, each with its card (docs/learned_policy.md)\n"
+      "Then: evac-policy learned --checkpoint out/policy/policy.safetensors");
+  command->callback([arguments, &exit_code] { exit_code = RunPolicy(*arguments); });
+}
+
+}  // namespace evac

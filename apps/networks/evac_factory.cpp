@@ -1,0 +1,89 @@
+#include <algorithm>
+#include <cstdio>
+
+#include "apps/factory.h"
+#include "apps/network_parts.h"
+#include "core/recording.h"
+#include "worldmodel/evac_config.h"
+#include "worldmodel/evac_world.h"
+#include "worldmodel/nn/memory.h"
+#include "worldmodel/nn/weights.h"
+
+namespace evac {
+namespace {
+
+constexpr double kRawFrames_hz = 30;  ///< of the statistics
+
+ImaginerOptions OptionsOf(const SuiteEvac& evac, nn::ModelConfig config, int threads_per_scene) {
+  const auto has = [&](const char* quirk) {
+    return std::find(evac.quirks.begin(), evac.quirks.end(), quirk) != evac.quirks.end();
+  };
+  ImaginerOptions options;
+  options.sampler.solver = evac.solver == "dpm" ? nn::Solver::kDpmSolver : nn::Solver::kDdim;
+  options.sampler.steps = evac.steps;
+  options.sampler.eta = evac.eta;
+  options.sampler.guidance = evac.cfg;
+  options.sampler.guidance_rescale = evac.cfg_rescale;
+  options.sampler.memory_not_scaled = has("memory_not_scaled");
+  options.sampler.residual_noise = has("residual_noise");
+  if (evac.statistics) options.conditioning.statistics = ReadActionStatistics(*evac.statistics);
+  options.conditioning.stride = evac.period_s * kRawFrames_hz;
+  config.pose_map.scaled |= evac.pose_map_scales;
+  options.conditioning.pose_map = PoseMapOptions::Of(config);
+  options.conditioning.pose_map.draw_behind_camera = has("draw_behind_camera");
+  options.decoded_start = has("decoded_start");
+  options.identity = fmt::format("{} threads {}", evac.hash, threads_per_scene);
+  if (evac.cache_folder) options.cache = ChunkCacheOptions{*evac.cache_folder, evac.cache_limit_gb};
+  return options;
+}
+
+/// The paper's way: each imagined episode starts from the real run's first frame of the same initial state.
+InitialScene SeenInRealRun(const Store* store, const std::string& world, const Task& task,
+                           const InitialState& initial) {
+  std::optional<InitialScene> scene;
+  if (store != nullptr) scene = store->LoadInitialScene(task.id, initial.id);
+  if (scene) return *std::move(scene);
+  throw InvalidInput("world {}: nobody has seen task {}, initial state {}: run the real world first, into the same run",
+                     world, task.id, initial.id);
+}
+
+FirstScene FirstSceneOf(const Suite& suite, const Store* store, const std::string& world) {
+  if (suite.recording) {
+    return
+        [scene = InitialSceneOf(ReadRecording(*suite.recording))](const Task&, const InitialState&) { return scene; };
+  }
+  return [store, world](const Task& task, const InitialState& initial) {
+    return SeenInRealRun(store, world, task, initial);
+  };
+}
+
+std::unique_ptr<const nn::EvacModel> Load(const SuiteEvac& evac, const nn::ModelConfig& config) try {
+  nn::LoadReport report;
+  auto model = std::make_unique<const nn::EvacModel>(nn::LoadModel(evac.weights, config, {}, &report));
+  if (!report.schedule.empty())
+    std::fprintf(stderr, "evac: warning: %s: %s\n", evac.weights.c_str(), report.schedule.c_str());
+  return model;
+} catch (const TensorError& error) {
+  throw InvalidInput("{}", error.what());
+}
+
+}  // namespace
+
+void CheckNetwork(const SuiteEvac& evac) try {
+  nn::FileWeights(evac.weights, ReadEvacConfig(evac.config));
+} catch (const TensorError& error) {
+  throw InvalidInput("{}", error.what());
+}
+
+std::unique_ptr<World> MakeEvacWorld(const SuiteWorld& world, const Suite& suite, const Store* store) {
+  const SuiteEvac& evac = *world.evac;
+  const nn::ModelConfig config = ReadEvacConfig(evac.config);
+  const int threads = Threads(suite);
+  const ImaginerOptions options =
+      OptionsOf(evac, config, evac.all_threads_per_scene ? threads : 1);
+  nn::KeepFreedMemory();
+  return std::make_unique<EvacWorld>(Imaginer(Load(evac, config), options), FirstSceneOf(suite, store, world.name),
+                                     EvacWorldOptions{world.name, threads, evac.all_threads_per_scene});
+}
+
+}  // namespace evac

@@ -1,0 +1,42 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <chrono>
+
+#include "apps/factory.h"
+#include "apps/networks/fidelity.h"
+#include "core/file.h"
+
+namespace evac {
+
+Number SecondsPerChunk(const SuiteWorld& model, const Suite& suite, const Store& scenes, std::vector<Replay> replays,
+                       int chunk) {
+  std::erase_if(replays, [&](const Replay& replay) { return replay.actions.size() < static_cast<std::size_t>(chunk); });
+  replays.resize(std::min<std::size_t>(replays.size(), static_cast<std::size_t>(suite.lanes)));
+  if (replays.empty()) return Undefined{"no replay is a chunk long"};
+  SuiteWorld uncached = model;
+  uncached.evac->cache_folder.reset();
+  const std::unique_ptr<World> world = MakeWorld(uncached, suite, &scenes);
+  std::vector<ActionChunk> chunks;
+  for (std::size_t i = 0; i < replays.size(); ++i) {
+    world->Reset(static_cast<SceneId>(i), *replays[i].task, replays[i].initial, 0);
+    chunks.push_back({{replays[i].actions.begin(), replays[i].actions.begin() + chunk}, false, 0});
+  }
+  std::vector<SceneChunk> batch;
+  for (std::size_t i = 0; i < chunks.size(); ++i) batch.push_back({static_cast<SceneId>(i), &chunks[i]});
+  world->Advance(batch);  // pages are touched, kernels compiled
+  const auto begin = std::chrono::steady_clock::now();
+  world->Advance(batch);
+  const std::chrono::duration<double> spent = std::chrono::steady_clock::now() - begin;
+  return spent.count() / static_cast<double>(batch.size());
+}
+
+void FinishFidelity(const std::filesystem::path& out, FidelityInput input) {
+  const Fidelity fidelity = FidelityOf(std::move(input));
+  WriteFileAtomically(out / "episodes.csv", FidelityCsv(fidelity.input.rows));
+  WriteFileAtomically(out / "fidelity.json", FidelityJson(fidelity));
+  WriteFileAtomically(out / "index.html", FidelityPage(fidelity));
+  fmt::print("{}\n{}\n", FidelityText(fidelity), (out / "index.html").string());
+}
+
+}  // namespace evac

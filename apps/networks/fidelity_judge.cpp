@@ -1,0 +1,125 @@
+#include "apps/networks/fidelity_judge.h"
+
+#include <algorithm>
+#include <opencv2/imgproc.hpp>
+
+#include "core/file.h"
+#include "core/statistics/confusion.h"
+#include "core/statistics/roc.h"
+#include "core/video.h"
+#include "judges/classifier_judge.h"
+#include "judges/judge_episodes.h"
+#include "policies/visual_things.h"
+
+namespace evac {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr double kCovered = 0.15;  ///< share of a pixel that shows the object, from which it is painted over
+
+/// The picture with the masked pixels filled in from what is around them.
+cv::Mat Filled(const cv::Mat& rgb, const cv::Mat& mask) {
+  constexpr int kAround_px = 31;
+  cv::Mat seen, picture, sum, weight;
+  cv::Mat(mask == 0).convertTo(seen, CV_32F, 1.0 / 255);
+  cv::cvtColor(seen, seen, cv::COLOR_GRAY2BGR);
+  rgb.convertTo(picture, CV_32F);
+  cv::boxFilter(picture.mul(seen), sum, CV_32F, {kAround_px, kAround_px});
+  cv::boxFilter(seen, weight, CV_32F, {kAround_px, kAround_px});
+  cv::Mat around, filled = rgb.clone();
+  cv::divide(sum, weight + 1e-3, around);
+  around.convertTo(around, CV_8U);
+  around.copyTo(filled, mask);
+  return filled;
+}
+
+/// The same clip with the object painted over.
+void WriteWithoutObject(const fs::path& from, const ColourModel& colour, const fs::path& to) {
+  VideoWriter writer(to, {.period_s = 0.1, .crf = 10, .preset = "veryfast", .scale = 1});
+  VideoReader reader(from);
+  for (cv::Mat frame = reader.Next(); !frame.empty(); frame = reader.Next()) {
+    cv::Mat mask = Cover(frame, colour) > kCovered;
+    cv::dilate(mask, mask, cv::Mat::ones(5, 5, CV_8U));
+    writer.Append(Filled(frame, mask));
+  }
+  writer.Finish();
+}
+
+std::optional<bool> OutcomeOf(Label label) {
+  if (label == Label::kSuccess) return true;
+  if (label == Label::kFailure) return false;
+  return std::nullopt;
+}
+
+}  // namespace
+
+void FidelityJudge::Rate(Store& store) {
+  if (classifier_.empty()) return;
+  ClassifierJudge judge(classifier_, store.folder());
+  judge.CheckKnows(store.Tasks());
+  JudgeEpisodes(judge, store, {});
+  name_ = judge.Name();
+}
+
+JudgeQualityOnReal FidelityJudge::QualityOn(const Store& store, const std::string& world, const fs::path& scratch) {
+  JudgeQualityOnReal quality;
+  quality.name = name_;
+  if (name_.empty()) return quality;
+  ClassifierJudge judge(classifier_, scratch);
+  std::map<std::string, Task> tasks;
+  for (const Task& task : store.Tasks()) tasks[task.id] = task;
+  const auto verdicts = store.CurrentVerdicts();
+  std::vector<double> probabilities;
+  std::vector<int> truths;
+  Confusion plain, masked;
+  const auto count = [](std::optional<bool> said, bool truth, Confusion& confusion) {
+    if (!said) return;
+    ++(*said ? truth ? confusion.both_success : confusion.only_judge_success
+             : truth ? confusion.only_human_success : confusion.both_failure);
+  };
+  MakeFolders(scratch);
+  for (Episode& episode : store.Episodes()) {
+    if (episode.key.world != world || IsFailure(episode.stop)) continue;
+    const auto& of_episode = verdicts.at(episode.key.Id());
+    const auto truth = OutcomeOf(of_episode.at("oracle").label);
+    const Verdict& said = of_episode.at(name_);
+    if (!truth || !said.probability) continue;
+    probabilities.push_back(*said.probability);
+    truths.push_back(*truth);
+    count(OutcomeOf(said.label), *truth, plain);
+    const Task& task = tasks.at(episode.key.pair.task);
+    const fs::path painted = scratch / "clip.mp4";
+    WriteWithoutObject(store.folder() / episode.video, KnowledgeOf(task.id).thing.colour, painted);
+    episode.video = painted.filename();
+    count(OutcomeOf(judge.Rate(task, episode).label), *truth, masked);
+  }
+  fs::remove_all(scratch);
+  quality.auroc = AreaUnderRoc(probabilities, truths);
+  quality.ece = CalibrationOf(probabilities, truths).ece;
+  quality.kappa = StatisticsOf(plain).kappa;
+  quality.kappa_masked = StatisticsOf(masked).kappa.value;
+  return quality;
+}
+
+OutcomesOf::OutcomesOf(const Store& store, std::string judge)
+    : judge_(std::move(judge)), folder_(store.folder().filename().string()), verdicts_(store.CurrentVerdicts()) {
+  for (const Episode& episode : store.Episodes()) {
+    if (!IsFailure(episode.stop)) clips_[episode.key.Id()] = episode.video;
+  }
+}
+
+std::string OutcomesOf::Clip(const EpisodeKey& key) const {
+  const auto found = clips_.find(key.Id());
+  return found == clips_.end() ? "" : folder_ + "/" + found->second;
+}
+
+std::optional<bool> OutcomesOf::By(const std::string& judge, const EpisodeKey& key) const {
+  if (!clips_.contains(key.Id())) return std::nullopt;
+  const auto episode = verdicts_.find(key.Id());
+  if (episode == verdicts_.end()) return std::nullopt;
+  const auto verdict = episode->second.find(judge);
+  return verdict == episode->second.end() ? std::nullopt : OutcomeOf(verdict->second.label);
+}
+
+}  // namespace evac

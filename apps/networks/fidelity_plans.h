@@ -1,0 +1,30 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "apps/networks/fidelity.h"
+
+namespace evac {
+
+/// Actions that succeeded, changed so that they must fail, and the tasks they are replayed in.
+struct Counterfactual {
+  std::string name;         ///< shifted, never_closes, object_away
+  std::vector<Task> tasks;  ///< object_away: with the object taken away
+  std::vector<Replay> replays;
+};
+
+/// `shifted`: 6 cm beside, in a direction that task and state decide; `never_closes`: the hand stays open; `object_away`:
+/// nothing is there. What becomes of them in reality is found out, not assumed.
+/// @param successes  replays of real episodes that succeeded
+/// @param per_task   of them at most so many, drawn evenly over policies
+std::vector<Counterfactual> Counterfactuals(std::vector<Replay> successes, const std::vector<Task>& tasks, int per_task);
+
+struct LongRollout {
+  int per_task = 3;
+  std::size_t frames = 480;
+};
+/// Recorded actions there and back again, until they are so long.
+std::vector<Replay> LongRollouts(std::vector<Replay> replays, const LongRollout& how);
+
+}  // namespace evac

@@ -1,0 +1,145 @@
+#include <fmt/format.h>
+
+#include <map>
+#include <utility>
+
+#include "apps/factory.h"
+#include "apps/networks/fidelity.h"
+#include "apps/interrupts.h"
+#include "apps/progress_display.h"
+#include "core/hash.h"
+#include "core/policy.h"
+#include "core/version.h"
+#include "harness/rollout.h"
+#include "harness/scheduler.h"
+#include "judges/judge_episodes.h"
+#include "judges/oracle_judge.h"
+
+namespace evac {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// Plays to each episode what was chosen for it before, in chunks, whatever it observes; the last chunk ends it.
+class GivenActions final : public Policy {
+ public:
+  GivenActions(const std::vector<Replay>& replays, int chunk_size) : chunk_size_(static_cast<std::size_t>(chunk_size)) {
+    for (const Replay& replay : replays) {
+      const Job job{replay.task, replay.initial, {replay.pair, ""}};
+      by_episode_[{replay.pair.task, job.PolicySeed()}] = &replay.actions;
+    }
+  }
+
+  std::string Name() const override { return "given actions"; }
+
+  void Reset(SceneId scene, const Task& task, std::uint64_t seed) override {
+    const auto found = by_episode_.find({task.id, seed});
+    if (found == by_episode_.end()) throw InternalError("nobody chose actions for this episode of {}", task.id);
+    playing_[scene] = {found->second, 0};
+  }
+
+  std::vector<Acted> Act(std::span<const SceneObservation> batch) override {
+    std::vector<Acted> answers;
+    for (const SceneObservation& asked : batch) {
+      auto& [actions, next] = playing_.at(asked.scene);
+      const std::size_t count = std::min(chunk_size_, actions->size() - next);
+      const auto from = actions->begin() + static_cast<std::ptrdiff_t>(next);
+      next += count;
+      answers.push_back(ActionChunk{{from, from + static_cast<std::ptrdiff_t>(count)}, next == actions->size(), 0});
+    }
+    return answers;
+  }
+
+ private:
+  std::size_t chunk_size_;
+  std::map<std::pair<std::string, std::uint64_t>, const std::vector<Arms>*> by_episode_;
+  std::map<SceneId, std::pair<const std::vector<Arms>*, std::size_t>> playing_;
+};
+
+RunInfo InfoOf(const ReplayRun& run) {
+  return {.suite_text = run.suite.text,
+          .suite_hash = Sha256Hex(run.name + " of " + run.suite.hash),
+          .suite_path = fs::absolute(run.suite.path).lexically_normal().string(),
+          .evac_version = EVAC_VERSION};
+}
+
+void DeclareReplays(const ReplayRun& run, const std::vector<Replay>& replays, Store& store) {
+  Suite declared = run.suite;
+  declared.tasks = run.tasks;
+  declared.worlds = run.worlds;
+  Declare(declared, store);
+  for (const Replay& replay : replays)
+    store.AddPolicy({replay.pair.policy, replay.pair.checkpoint, R"({"replays":"recorded actions"})"});
+}
+
+std::vector<Job> JobsIn(const SuiteWorld& world, const std::vector<Replay>& replays) {
+  std::vector<Job> jobs;
+  for (const Replay& replay : replays) jobs.push_back({replay.task, replay.initial, {replay.pair, world.name}});
+  return jobs;
+}
+
+std::set<EpisodeKey> SimulatedKeys(const ReplayRun& run, const std::vector<Replay>& replays) {
+  std::set<EpisodeKey> keys;
+  for (const SuiteWorld& world : run.worlds) {
+    if (world.evac) continue;
+    for (const Replay& replay : replays) keys.insert({replay.pair, world.name});
+  }
+  return keys;
+}
+
+}  // namespace
+
+std::vector<Replay> ReplaysOf(const Store& store, const std::string& world, const Suite& suite) {
+  std::map<std::string, InitialState> states;
+  for (const InitialState& state : suite.initial_states) states[state.id] = state;
+  std::map<std::string, const Task*> tasks;
+  for (const Task& task : suite.tasks) tasks[task.id] = &task;
+  std::vector<Replay> replays;
+  for (Episode& episode : store.Episodes()) {
+    if (episode.key.world != world || IsFailure(episode.stop)) continue;
+    store.LoadSteps(episode);
+    const PairKey& pair = episode.key.pair;
+    replays.push_back({pair, tasks.at(pair.task), states.at(pair.initial_state), std::move(episode.commands)});
+  }
+  return replays;
+}
+
+Store RunReplays(const ReplayRun& run, const std::vector<Replay>& replays) {
+  Store store = Store::CreateOrContinue(run.folder, InfoOf(run));
+  store.RemoveOrphans();
+  DeclareReplays(run, replays, store);
+  if (!run.reality.empty()) TakeReality(run.reality, SimulatedKeys(run, replays), store);
+  std::optional<Store> scenes;
+  if (!run.scenes.empty()) scenes = Store::Open(run.scenes, Store::Mode::kReadOnly);
+  int total = 0, missing = 0;
+  for (const SuiteWorld& world : run.worlds) {
+    total += static_cast<int>(replays.size());
+    missing += static_cast<int>(MissingJobs(JobsIn(world, replays), store).size());
+  }
+  ProgressDisplay display(total, total - missing, stderr);
+  GivenActions actions(replays, run.suite.chunk_size);
+  for (const SuiteWorld& world : run.worlds) {
+    JobQueue jobs(MissingJobs(JobsIn(world, replays), store));
+    if (jobs.size() == 0) continue;
+    display.Begin(run.name + " · " + world.name);
+    std::unique_ptr<World> made = run.make ? run.make(world) : nullptr;
+    if (!made) made = MakeWorld(world, run.suite, scenes ? &*scenes : &store);
+    RolloutOptions options;
+    options.lanes = run.suite.lanes;
+    options.lane = {.chunk_size = run.suite.chunk_size,
+                    .policy_chunk_size = run.suite.chunk_size,
+                    .latency = {},
+                    .video = run.suite.video,
+                    .keep_initial_scene = world.is_real};
+    options.failures_left = total;  // a failed replay is a row without an outcome
+    options.on_progress = [&](const Progress& progress) { display.Show(progress, ProgressDisplay::Clock::now()); };
+    options.interrupted = IsInterrupted;
+    if (RunEpisodes(actions, *made, jobs, store, options).interrupted)
+      throw InternalError("interrupted; the same command goes on");
+  }
+  OracleJudge oracle(store);
+  JudgeEpisodes(oracle, store, {});
+  return store;
+}
+
+}  // namespace evac

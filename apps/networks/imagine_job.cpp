@@ -1,0 +1,142 @@
+#include "apps/networks/imagine_job.h"
+
+#include "core/config.h"
+#include "core/file.h"
+#include "core/hash.h"
+#include "core/version.h"
+#include "worldmodel/action_statistics.h"
+#include "worldmodel/nn/library.h"
+
+namespace evac {
+namespace {
+
+namespace fs = std::filesystem;
+using Json = nlohmann::json;
+
+/// The words that say the same again, from anywhere. @param extra  those that stand only where they are not the default
+std::vector<std::string> CommandWords(const ImagineArguments& arguments, const ImagineStart& start) {
+  std::vector<std::string> words = {"evac", "imagine"};
+  const auto say = [&](const char* option, const std::string& value) {
+    if (!value.empty()) words.insert(words.end(), {option, value});
+  };
+  const auto path = [&](const char* option, const fs::path& value) {
+    if (!value.empty()) say(option, fs::absolute(value).lexically_normal().string());
+  };
+  const ImagineInputs& inputs = arguments.inputs;
+  path("--recording", inputs.recording);
+  path("--frame", inputs.files.frame);
+  path("--actions", inputs.files.actions);
+  path("--extrinsics", inputs.files.extrinsics);
+  path("--intrinsics", inputs.files.intrinsics);
+  say("--cameras", fmt::format("{}", fmt::join(inputs.cameras, ",")));
+  say("--stride", std::to_string(start.stride));
+  path("--config", arguments.config);
+  path("--statistics", arguments.statistics);
+  path("--weights", arguments.weights);
+  if (arguments.chunks > 0) say("--chunks", std::to_string(arguments.chunks));
+  const SamplerArguments& sampler = arguments.sampler;
+  say("--solver", sampler.solver);
+  say("--steps", std::to_string(sampler.steps));
+  say("--eta", fmt::format("{}", sampler.eta));
+  say("--cfg", fmt::format("{}", sampler.cfg));
+  say("--cfg-rescale", fmt::format("{}", sampler.cfg_rescale));
+  say("--seed", std::to_string(sampler.seed));
+  say("--dtype", sampler.dtype);
+  say("--device", sampler.device);
+  say("--threads", std::to_string(sampler.threads));
+  say("--reference-quirks", arguments.quirks);
+  if (arguments.scaled_maps) words.push_back("--scaled-maps");
+  return words;
+}
+
+Json QuirksOf(const std::string& names) {
+  const ReferenceQuirks quirks = ReferenceQuirks::Named(names);
+  return {{"residual_noise", quirks.residual_noise},
+          {"memory_not_scaled", quirks.memory_not_scaled},
+          {"delta_window", quirks.delta_window},
+          {"draw_behind_camera", quirks.draw_behind_camera},
+          {"decoded_start", quirks.decoded_start}};
+}
+
+Json FilesOf(const std::vector<fs::path>& paths) {
+  Json files = Json::array();
+  for (const fs::path& path : paths)
+    files.push_back({{"path", fs::absolute(path).lexically_normal().string()}, {"sha256", Sha256HexOfFile(path)}});
+  return files;
+}
+
+}  // namespace
+
+Json JobOf(const ImagineArguments& arguments, const ImagineStart& start) {
+  const SamplerArguments& sampler = arguments.sampler;
+  const ActionStatistics statistics = StatisticsOf(arguments);
+  return {{"evac", EVAC_VERSION},
+          {"libtorch", nn::LibtorchVersion()},
+          {"weights", Sha256HexOfFile(arguments.weights)},
+          {"config", arguments.config.empty() ? "published" : Config::FromFile(arguments.config).Canonical()},
+          {"statistics", {{"mean", statistics.mean}, {"deviation", statistics.deviation}}},
+          {"first_frame", HashOf(start.scene)},
+          {"actions", HashOf(start.arms)},
+          {"stride", start.stride},
+          {"solver", sampler.solver},
+          {"steps", sampler.steps},
+          {"eta", sampler.eta},
+          {"cfg", sampler.cfg},
+          {"cfg_rescale", sampler.cfg_rescale},
+          {"seed", sampler.seed},
+          {"dtype", sampler.dtype},
+          {"device", sampler.device},
+          {"threads", sampler.threads},
+          {"scaled_maps", arguments.scaled_maps},
+          {"reference_quirks", QuirksOf(arguments.quirks)}};
+}
+
+Sidecar::Sidecar(const ImagineArguments& arguments, const ImagineStart& start, Json job)
+    : out_(arguments.out), hash_(Sha256Hex(job.dump())) {
+  page_ = {{"job", std::move(job)},
+           {"source", start.source},
+           {"inputs", FilesOf(start.files)},
+           {"command", CommandWords(arguments, start)},
+           {"period_s", start.period_s}};
+  const fs::path path = out_ / "imagined.json";
+  if (!fs::exists(path)) return;
+  if (!arguments.restart) {
+    Refuse(Json::parse(ReadFile(path), nullptr, /*allow_exceptions=*/false));
+  } else {
+    for (const char* part : {"chunks", "frames", "maps", "imagined.mp4", "imagined.json"}) fs::remove_all(out_ / part);
+  }
+}
+
+void Sidecar::Refuse(const Json& before) const {
+  const Json job = before.is_object() ? before.value("job", Json::object()) : Json::object();
+  std::string differences;
+  for (const auto& [name, value] : page_.at("job").items()) {
+    const Json found = job.is_object() ? job.value(name, Json()) : Json();
+    if (found == value) continue;
+    const std::string there = found.dump(), here = value.dump();
+    differences += there.size() + here.size() > 60 ? fmt::format("; {} is another", name)
+                                                   : fmt::format("; {} is {} there, {} here", name, there, here);
+  }
+  if (differences.empty()) return;
+  throw InvalidInput("{}: another job's frames are there{}; choose another --out, or --restart to throw them away",
+                     out_.string(), differences);
+}
+
+void Sidecar::Write(const Json& page) const { WriteFileAtomically(out_ / "imagined.json", page.dump(2) + "\n"); }
+
+void Sidecar::WriteBegun() const {
+  Json page = page_;
+  page["finished"] = false;
+  Write(page);
+}
+
+void Sidecar::WriteFinished(const FinishedVideo& video, double seconds) const {
+  Json page = page_;
+  page["finished"] = true;
+  page["frames"] = video.frames;
+  page["video"] = {{"file", video.path.filename().string()}, {"sha256", video.sha256}};
+  page["seconds"] = seconds;
+  Write(page);
+}
+
+}  // namespace evac

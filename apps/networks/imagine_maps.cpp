@@ -1,0 +1,90 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <sstream>
+
+#include "apps/networks/imagine.h"
+#include "apps/networks/imagine_output.h"
+#include "core/file.h"
+#include "core/geometry.h"
+#include "worldmodel/evac_config.h"
+
+namespace evac {
+
+nn::ModelConfig ModelSizes(const ImagineArguments& arguments) {
+  return arguments.config.empty() ? nn::ModelConfig() : ReadEvacConfig(arguments.config);
+}
+
+ActionStatistics StatisticsOf(const ImagineArguments& arguments) {
+  return arguments.statistics.empty() ? AgiBotWorldStatistics() : ReadActionStatistics(arguments.statistics);
+}
+
+ReferenceQuirks ReferenceQuirks::Named(const std::string& names) {
+  ReferenceQuirks quirks;
+  const std::pair<const char*, bool*> known[] = {{"residual_noise", &quirks.residual_noise},
+                                                 {"memory_not_scaled", &quirks.memory_not_scaled},
+                                                 {"delta_window", &quirks.delta_window},
+                                                 {"draw_behind_camera", &quirks.draw_behind_camera},
+                                                 {"decoded_start", &quirks.decoded_start}};
+  std::istringstream list(names);
+  for (std::string name; std::getline(list, name, ',');) {
+    bool found = false;
+    for (const auto& [known_name, value] : known) {
+      if (name != known_name && name != "all") continue;
+      *value = found = true;
+    }
+    if (!found) {
+      throw InvalidInput(
+          "--reference-quirks: found '{}', wanted all, or some of residual_noise, memory_not_scaled, "
+          "delta_window, draw_behind_camera, decoded_start with commas between them",
+          name);
+    }
+  }
+  return quirks;
+}
+
+PoseMapOptions MapOptions(const ImagineArguments& arguments, const nn::ModelConfig& config) {
+  nn::ModelConfig drawn = config;
+  drawn.pose_map.scaled |= arguments.scaled_maps;
+  PoseMapOptions options = PoseMapOptions::Of(drawn);
+  options.draw_behind_camera = ReferenceQuirks::Named(arguments.quirks).draw_behind_camera;
+  return options;
+}
+
+std::size_t FrameCount(const ImagineStart& start, const nn::ModelConfig& config, std::size_t chunks) {
+  const std::size_t targets = start.arms.size() - 1;
+  return chunks == 0 ? targets : std::min(targets, chunks * static_cast<std::size_t>(config.chunk));
+}
+
+MapPainter::MapPainter(const ImagineStart& start, const nn::ModelConfig& config, const PoseMapOptions& options)
+    : start_(start), options_(options) {
+  for (const Camera& camera : start.scene.cameras) {
+    cameras_.push_back(
+        Resized(camera, static_cast<int>(config.image_width_px), static_cast<int>(config.image_height_px)));
+  }
+}
+
+cv::Mat MapPainter::Paint(std::size_t frame) const {
+  return SideBySide(DrawPoseMaps(start_.arms.at(frame + 1), cameras_, options_));
+}
+
+std::size_t WriteMaps(const MapPainter& painter, std::size_t frames, const std::filesystem::path& out) {
+  MakeFolders(out);
+  PictureFolder maps(out / "maps");
+  for (std::size_t frame = 0; frame < frames; ++frame) maps.Append(painter.Paint(frame));
+  maps.Finish();
+  return frames;
+}
+
+ExitCode ImagineMaps(const ImagineArguments& arguments) {
+  const nn::ModelConfig config = ModelSizes(arguments);
+  const PoseMapOptions options = MapOptions(arguments, config);
+  const ImagineStart start = ReadImagineStart(arguments.inputs, static_cast<std::size_t>(config.views));
+  const MapPainter painter(start, config, options);
+  const std::size_t frames = WriteMaps(painter, FrameCount(start, config, arguments.chunks), arguments.out);
+  fmt::print("{}: {} maps of {}x{}, {:.4g} s apart\n", (arguments.out / "maps").string(), frames,
+             config.views * config.image_width_px, config.image_height_px, start.period_s);
+  return ExitCode::kOk;
+}
+
+}  // namespace evac

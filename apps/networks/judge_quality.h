@@ -1,0 +1,43 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "apps/networks/judge_training.h"
+#include "judges/classifier_judge.h"
+
+/// How good a classifier is: on clips that nothing was learned from.
+namespace evac {
+
+/// How clips are shown to the classifier when it is measured.
+struct JudgeLook {
+  bool masks_object = false;  ///< a grey disc of `mask_radius` of the picture's height lies over the object
+  bool first_view_only = false;
+  double mask_radius = 0.2;
+  bool reconstructed = false;  ///< the clips are shown as their codec gives them back
+};
+
+/// The network's logits of success, in the order of the clips.
+std::vector<double> Logits(const ClassifierNet& net, const JudgeClipSource& source, const JudgeClips& clips,
+                           const JudgeLook& look);
+
+/// Mean logarithmic loss of uncalibrated logits.
+double LogLoss(const std::vector<double>& logits, const JudgeClips& clips);
+
+/// Temperature (Guo et al. 2017) that makes the likelihood of the outcomes largest, and the threshold with the highest
+/// kappa, of those the one next to .5.
+ClassifierCard Calibrate(const std::vector<double>& logits, const JudgeClips& clips, double unsure);
+
+/// Each a number, or not a number where it is undefined.
+struct MeasuredJudge {
+  double auroc = 0, kappa = 0, ece = 0;
+  double cannot_tell = 0;  ///< share near the threshold; kappa counts those as their nearer side
+  std::size_t clips = 0;
+  std::string Line() const;
+};
+MeasuredJudge Measure(const std::vector<double>& logits, const JudgeClips& clips, const ClassifierCard& card);
+
+/// "near_miss 3/41, pretended_grasp 0/28": of failures, by what became of them, how many were taken for successes.
+std::string MistakesByFate(const std::vector<double>& logits, const JudgeClips& clips, const ClassifierCard& card);
+
+}  // namespace evac

@@ -1,0 +1,168 @@
+#include "apps/networks/judge_run_clips.h"
+
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <array>
+#include <cstring>
+#include <limits>
+#include <map>
+
+#include "core/hash.h"
+#include "core/seed.h"
+#include "core/store.h"
+#include "judges/classifier_clip.h"
+
+namespace evac {
+namespace {
+
+constexpr int kPictures = 24;  // of a clip: three times what the network sees, so that learning may jitter
+constexpr std::size_t kMarkDigits = 12;
+
+class RunClips final : public JudgeClipSource {
+ public:
+  std::vector<at::Tensor> pictures;  ///< of each clip, [kPictures, V, H, W, 3] bytes
+  std::vector<std::string> marks;
+
+  at::Tensor Pictures(const PackedClip& clip, const std::vector<std::int64_t>& rows) const override {
+    return pictures[clip.shard].index_select(0, at::tensor(at::ArrayRef<std::int64_t>(rows))).transpose(0, 1);
+  }
+  at::Tensor Objects(const PackedClip&, const std::vector<std::int64_t>& rows) const override {
+    return at::full({static_cast<std::int64_t>(cameras.size()), static_cast<std::int64_t>(rows.size()), 2},
+                    std::numeric_limits<float>::quiet_NaN());
+  }
+  bool KnowsObjects() const override { return false; }
+  std::string Mark(const PackedClip& clip) const override { return marks[clip.shard]; }
+};
+
+/// An episode with a label, before its video is read.
+struct Labelled {
+  const Task* task;
+  std::filesystem::path video;
+  std::string mark, state;
+  bool success;
+};
+
+std::vector<std::string> CameraNames(const Task& task) {
+  std::vector<std::string> names;
+  for (const Camera& camera : task.cameras) names.push_back(camera.name);
+  return names;
+}
+
+/// Tasks by name; all must be seen by the same cameras.
+class Tasks {
+ public:
+  const Task* Add(const Task& task, const std::filesystem::path& run) {
+    const std::vector<std::string> names = CameraNames(task);
+    if (cameras_.empty()) cameras_ = names;
+    if (names != cameras_)
+      throw InvalidInput("{}: task {} is seen by {}, wanted {} as the tasks before it", run.string(), task.id,
+                         fmt::join(names, ", "), fmt::join(cameras_, ", "));
+    return &tasks_.try_emplace(task.id, task).first->second;
+  }
+  const std::vector<std::string>& cameras() const { return cameras_; }
+
+ private:
+  std::map<std::string, Task> tasks_;
+  std::vector<std::string> cameras_;
+};
+
+void AddRun(const std::filesystem::path& run, const LabelledRuns& options, Tasks& tasks,
+            std::vector<Labelled>& labelled) {
+  const Store store = Store::Open(run, Store::Mode::kReadOnly);
+  std::map<std::string, const Task*> known;
+  for (const Task& task : store.Tasks()) known[task.id] = tasks.Add(task, run);
+  const auto verdicts = store.CurrentVerdicts();
+  for (const Episode& episode : store.Episodes()) {
+    const EpisodeKey& key = episode.key;
+    const bool wanted = options.worlds.empty() || std::ranges::count(options.worlds, key.world) > 0;
+    if (!wanted || IsFailure(episode.stop) || episode.video.empty()) continue;
+    const auto all = verdicts.find(key.Id());
+    if (all == verdicts.end()) continue;
+    const auto own = all->second.find(options.truth);
+    if (own == all->second.end()) continue;
+    const Label label = own->second.label;
+    if (label != Label::kSuccess && label != Label::kFailure) continue;
+    labelled.push_back({known.at(key.pair.task), store.folder() / episode.video,
+                        episode.video_sha256.substr(0, kMarkDigits), key.pair.task + "/" + key.pair.initial_state,
+                        label == Label::kSuccess});
+  }
+}
+
+/// [kPictures, V, H, W, 3]
+at::Tensor ReadPictures(const Labelled& one, const LabelledRuns& options) {
+  const auto seen = ReadClip(one.video, {one.task->cameras, kPictures, {options.width_px, options.height_px}});
+  at::Tensor bytes = at::empty({kPictures, static_cast<std::int64_t>(seen.size()), options.height_px, options.width_px, 3},
+                               at::kByte);
+  const auto size = static_cast<std::size_t>(options.height_px * options.width_px * 3);
+  auto* to = bytes.data_ptr<std::uint8_t>();
+  for (std::size_t t = 0; t < kPictures; ++t) {
+    for (const auto& view : seen) {
+      std::memcpy(to, view[t].data, size);
+      to += size;
+    }
+  }
+  return bytes;
+}
+
+void Add(const Labelled& one, at::Tensor pictures, RunClips& clips) {
+  const auto task = std::ranges::find(clips.tasks, one.task->id);
+  PackedClip clip;
+  clip.shard = clips.pictures.size();
+  clip.frames = kPictures;
+  clip.task = static_cast<std::int32_t>(task - clips.tasks.begin());
+  clip.outcome = one.success ? 1 : 0;
+  clip.state = one.state;
+  clips.clips.push_back(std::move(clip));
+  clips.pictures.push_back(std::move(pictures));
+  clips.marks.push_back(one.mark);
+}
+
+void CheckEnough(const RunClips& learn, const LabelledRuns& options) {
+  for (std::size_t task = 0; task < learn.tasks.size(); ++task) {
+    std::array<std::int64_t, 2> counts{};
+    for (const PackedClip& clip : learn.clips) {
+      if (clip.task == static_cast<std::int32_t>(task)) ++counts[static_cast<std::size_t>(clip.outcome)];
+    }
+    if (std::ranges::min(counts) < options.least)
+      throw InvalidInput(
+          "task {}: {} successes and {} failures by {} to learn from (a share of {} of the initial states is kept to "
+          "measure with), wanted at least {} of each: more labels, or fewer wanted (--least)",
+          learn.tasks[task], counts[1], counts[0], options.truth, options.holdout, options.least);
+  }
+}
+
+}  // namespace
+
+LabelledClips ReadLabelledClips(const LabelledRuns& options, const std::function<void(const std::string&)>& say) {
+  Tasks tasks;
+  std::vector<Labelled> labelled;
+  for (const std::filesystem::path& run : options.runs) AddRun(run, options, tasks, labelled);
+  if (labelled.empty())
+    throw InvalidInput("no clip has a success or failure by '{}': wanted one who has judged these runs", options.truth);
+  auto learn = std::make_unique<RunClips>(), holdout = std::make_unique<RunClips>();
+  std::string marks;
+  for (RunClips* part : {learn.get(), holdout.get()}) {
+    part->cameras = tasks.cameras();
+    part->height_px = options.height_px;
+    part->width_px = options.width_px;
+    for (const Labelled& one : labelled) {
+      if (std::ranges::count(part->tasks, one.task->id) == 0) part->tasks.push_back(one.task->id);
+    }
+    std::ranges::sort(part->tasks);
+  }
+  const std::uint64_t seed = SeedFor(options.seed, "judge hold-out");
+  for (const Labelled& one : labelled) try {
+      const bool is_kept = SplitMix64(SeedFor(seed, one.state)).Uniform() < options.holdout;
+      Add(one, ReadPictures(one, options), is_kept ? *holdout : *learn);
+      marks += one.mark + (one.success ? "+" : "-");
+    } catch (const Error& error) {
+      say(fmt::format("left out: {}", error.what()));
+    }
+  CheckEnough(*learn, options);
+  learn->recipe = holdout->recipe =
+      Sha256Hex(fmt::format("{} {} {}x{} {}", marks, options.truth, options.width_px, options.height_px, options.holdout));
+  return {std::move(learn), std::move(holdout)};
+}
+
+}  // namespace evac

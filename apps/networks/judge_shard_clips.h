@@ -1,0 +1,27 @@
+#pragma once
+
+#include "apps/networks/judge_clips.h"
+#include "apps/networks/judge_codec.h"
+
+namespace evac {
+
+/// One split of a packing, all clips whose outcome is known.
+class ShardClips final : public JudgeClipSource {
+ public:
+  /// @param codec  whose latents lie beside the shards, or null; outlives this
+  /// @throws as PackedSet and JudgeCodec::Open
+  ShardClips(const std::filesystem::path& shards, train::Split split, const JudgeCodec* codec);
+
+  at::Tensor Pictures(const PackedClip& clip, const std::vector<std::int64_t>& rows) const override;
+  at::Tensor Objects(const PackedClip& clip, const std::vector<std::int64_t>& rows) const override;
+  std::string Codec() const override { return codec_ ? set_.shards.codec() : ""; }
+  at::Tensor Reconstructed(const PackedClip& clip, const std::vector<std::int64_t>& rows) const override;
+
+ private:
+  const train::Shard& ShardOf(const PackedClip& clip) const { return set_.shards.shards()[clip.shard]; }
+
+  PackedSet set_;
+  const JudgeCodec* codec_;
+};
+
+}  // namespace evac

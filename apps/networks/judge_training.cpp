@@ -1,0 +1,122 @@
+#include "apps/networks/judge_training.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "core/error.h"
+#include "core/seed.h"
+
+namespace evac {
+namespace {
+
+enum Stream : std::uint32_t { kPick = 11, kChange = 12 };
+
+/// Rows of the pictures between first and last, each moved on its own.
+std::vector<std::int64_t> JitteredRows(const PackedClip& clip, double jitter, train::Dice& dice) {
+  std::vector<std::int64_t> rows;
+  const double step = static_cast<double>(clip.frames - 1) / static_cast<double>(kClassifierFrames - 1);
+  for (std::int64_t i = 0; i < kClassifierFrames; ++i) {
+    const bool is_inner = i > 0 && i + 1 < kClassifierFrames;
+    const double at = (static_cast<double>(i) + (is_inner ? dice.Uniform(-jitter, jitter) : 0)) * step;
+    rows.push_back(clip.first + std::clamp<std::int64_t>(std::llround(at), 0, clip.frames - 1));
+  }
+  return rows;
+}
+
+/// log(1 + e^x) - x y without overflow: the cross entropy of a logit and an outcome.
+at::Tensor CrossEntropy(const at::Tensor& logit, const at::Tensor& outcome) {
+  return (logit.clamp_min(0) - logit * outcome + (1 + (-logit.abs()).exp()).log()).mean();
+}
+
+at::Tensor Indices(const std::vector<std::int64_t>& rows) { return at::tensor(at::ArrayRef<std::int64_t>(rows)); }
+
+}  // namespace
+
+train::Settings SettingsOf(JudgeTrainingOptions& options) {
+  train::Settings settings = {{"batch", &options.batch},
+                              {"calibration", &options.calibration},
+                              {"drop_view", &options.drop_view},
+                              {"jitter", &options.jitter},
+                              {"object_weight", &options.object_weight},
+                              {"reconstructed_share", &options.reconstructed_share},
+                              {"unsure", &options.unsure},
+                              {"light", &options.changes.light},
+                              {"offset", &options.changes.offset},
+                              {"blur_share", &options.changes.blur_share}};
+  const train::Settings shared = SettingsOf(options.job.trainer);
+  settings.insert(settings.end(), shared.begin(), shared.end());
+  return settings;
+}
+
+JudgeSplit SplitForJudge(const JudgeClips& clips, const JudgeTrainingOptions& options) {
+  const std::uint64_t seed = SeedFor(options.job.trainer.seed, "judge calibration");
+  JudgeSplit split;
+  for (const PackedClip& clip : clips) {
+    const bool calibrates = SplitMix64(SeedFor(seed, clip.state)).Uniform() < options.calibration;
+    (calibrates ? split.calibration : split.fit).push_back(clip);
+  }
+  for (const JudgeClips* part : {&split.fit, &split.calibration}) {
+    const auto successes =
+        std::count_if(part->begin(), part->end(), [](const PackedClip& c) { return c.outcome == 1; });
+    if (successes == 0 || successes == static_cast<std::ptrdiff_t>(part->size()))
+      throw InvalidInput("{} of {} clips to {} are successes, wanted some of both kinds: more recordings", successes,
+                         part->size(), part == &split.fit ? "learn from" : "calibrate with");
+  }
+  return split;
+}
+
+std::vector<std::int64_t> RowsOf(const PackedClip& clip) {
+  std::vector<std::int64_t> rows;
+  constexpr std::int64_t last = kClassifierFrames - 1;
+  for (std::int64_t i = 0; i <= last; ++i) rows.push_back(clip.first + (i * (clip.frames - 1) + last / 2) / last);
+  return rows;
+}
+
+ClassifierClips ForNetwork(const at::Tensor& bytes, const JudgeClips& clips) {
+  std::vector<std::int64_t> tasks;
+  for (const PackedClip& clip : clips) tasks.push_back(clip.task);
+  return {bytes.to(at::kFloat) / 127.5 - 1, at::ones({bytes.size(0), bytes.size(1)}), Indices(tasks)};
+}
+
+JudgeTraining::JudgeTraining(const JudgeClipSource& source, const JudgeClips& fit, const JudgeTrainingOptions& options)
+    : source_(source), fit_(fit), options_(options) {
+  if (options.batch < 1) throw InvalidInput("judge training: batch is {}, wanted at least 1", options.batch);
+}
+
+JudgeTraining::Batch JudgeTraining::Draw(const train::StepPlace& place) const {
+  train::Dice pick(place, kPick), change(place, kChange);
+  JudgeClips clips;
+  std::vector<at::Tensor> pictures, objects;
+  std::vector<float> successes;
+  const auto views = static_cast<std::int64_t>(source_.cameras.size());
+  at::Tensor present = at::ones({options_.batch, views});
+  for (std::int64_t b = 0; b < options_.batch; ++b) {
+    const PackedClip& clip = fit_[static_cast<std::size_t>(pick.Below(static_cast<std::int64_t>(fit_.size())))];
+    const std::vector<std::int64_t> rows = JitteredRows(clip, options_.jitter, pick);
+    if (pick.Chance(options_.drop_view)) present[b].narrow(0, 1, views - 1).zero_();
+    const bool is_reconstructed = !source_.Codec().empty() && pick.Chance(options_.reconstructed_share);
+    pictures.push_back(is_reconstructed ? source_.Reconstructed(clip, rows) : source_.Pictures(clip, rows));
+    objects.push_back(source_.Objects(clip, rows));
+    successes.push_back(clip.outcome == 1 ? 1.0F : 0.0F);
+    clips.push_back(clip);
+  }
+  Batch batch{ForNetwork(at::stack(pictures), clips), at::tensor(at::ArrayRef<float>(successes)), {}, {}};
+  batch.clips.pictures = Changed(batch.clips.pictures, options_.changes, change);
+  batch.clips.present = present;
+  const auto size =
+      at::tensor({static_cast<float>(source_.width_px), static_cast<float>(source_.height_px)});
+  const at::Tensor object = at::stack(objects) / size;                // [B, V, T, 2]
+  const at::Tensor inside = ((object >= 0) * (object <= 1)).all(-1);  // false where it is not a number
+  batch.visible = inside.to(at::kFloat) * present.unsqueeze(-1);
+  batch.object = object.nan_to_num(0).clamp(0, 1);
+  return batch;
+}
+
+at::Tensor JudgeTraining::Loss(const ClassifierNet& net, const train::StepPlace& place) const {
+  const Batch batch = Draw(place);
+  const ClassifierAnswer answer = net(batch.clips);
+  const at::Tensor off = (answer.object - batch.object).abs().sum(-1) * batch.visible;
+  return CrossEntropy(answer.logit, batch.success) + options_.object_weight * off.sum() / (batch.visible.sum() + 1e-6);
+}
+
+}  // namespace evac

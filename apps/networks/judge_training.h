@@ -1,0 +1,59 @@
+#pragma once
+
+#include <optional>
+#include <vector>
+
+#include "apps/networks/judge_clips.h"
+#include "apps/networks/picture_changes.h"
+#include "judges/classifier_net.h"
+#include "worldmodel/train/settings.h"
+
+/// How the classifier judge is trained: on clips with a known outcome.
+namespace evac {
+
+struct JudgeTrainingOptions {
+  train::JobOptions job;             ///< of it the trainer's alone: a classifier is trained in floats
+  std::int64_t batch = 32;           ///< clips
+  double calibration = 0.15;         ///< share of the training split's initial states that only calibrates
+  double drop_view = 0.5;            ///< share of clips of which the first view alone is shown
+  double jitter = 0.3;               ///< pictures between first and last move by up to this part of their distance
+  double object_weight = 1;          ///< of looking where the object is, beside the verdict
+  double reconstructed_share = 0.5;  ///< share of clips seen as a codec gives them back; without one, none
+  double unsure = 0.1;               ///< what the card says: closer to the threshold is `cannot tell`
+  PictureChanges changes;
+};
+train::Settings SettingsOf(JudgeTrainingOptions& options);
+
+/// Clips to learn from, by initial state: most of them to learn from, the rest to calibrate with.
+struct JudgeSplit {
+  JudgeClips fit, calibration;
+};
+/// @throws InvalidInput if either part has outcomes of one kind alone.
+JudgeSplit SplitForJudge(const JudgeClips& clips, const JudgeTrainingOptions& options);
+
+/// The rows that a classifier sees, evenly spaced.
+std::vector<std::int64_t> RowsOf(const PackedClip& clip);
+/// Bytes of clips [B, V, T, H, W, 3] as the network takes them, all views present.
+ClassifierClips ForNetwork(const at::Tensor& bytes, const JudgeClips& clips);
+
+class JudgeTraining {
+ public:
+  /// @param source, fit  outlive this; fit are clips of the source
+  JudgeTraining(const JudgeClipSource& source, const JudgeClips& fit, const JudgeTrainingOptions& options);
+  at::Tensor Loss(const ClassifierNet& net, const train::StepPlace& place) const;
+
+ private:
+  struct Batch {
+    ClassifierClips clips;
+    at::Tensor success;  ///< [B] 1, 0
+    at::Tensor object;   ///< [B, V, T, 2] in parts of the picture
+    at::Tensor visible;  ///< [B, V, T] 1 where the object's middle is known, in the picture, and the view present
+  };
+  Batch Draw(const train::StepPlace& place) const;
+
+  const JudgeClipSource& source_;
+  const JudgeClips& fit_;
+  JudgeTrainingOptions options_;
+};
+
+}  // namespace evac

@@ -1,0 +1,283 @@
+#include "apps/networks/pack.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cstdio>
+#include <nlohmann/json.hpp>
+
+#include "apps/work_share.h"
+#include "core/error.h"
+#include "core/file.h"
+#include "core/hash.h"
+#include "core/seed.h"
+#include "worldmodel/clip.h"
+#include "worldmodel/evac_config.h"
+#include "worldmodel/nn/threads.h"
+#include "worldmodel/shard_writer.h"
+
+namespace evac {
+namespace {
+
+namespace fs = std::filesystem;
+using Json = nlohmann::ordered_json;
+
+constexpr double kRawFrames_hz = 30;  // of the statistics
+
+/// One clip to be made: which recording, and which of its crops.
+struct PlannedClip {
+  std::size_t source = 0;
+  int crop = 0;
+};
+
+struct PlannedShard {
+  bool holds_out = false;
+  std::vector<PlannedClip> clips;
+};
+
+/// Everything that is decided before the first shard is made.
+struct Packing {
+  SourceOptions how;
+  std::vector<PackSource> sources;
+  std::vector<LeftOut> left_out;
+  std::vector<std::string> tasks;
+  ClipOptions clip;
+  std::vector<PlannedShard> shards;
+  std::string recipe;  ///< SHA-256 of all that it is made from
+};
+
+void Tell(const std::string& line) { std::fputs((line + "\n").c_str(), stderr); }
+
+bool HoldsOut(const PackSource& source, const PackArguments& arguments) {
+  return SplitMix64(SeedFor(SeedFor(arguments.seed, "hold-out"), source.state)).Uniform() < arguments.hold_out;
+}
+
+/// Looks at every recording, several at a time; what cannot be packed is left out.
+void LookAtAll(const PackArguments& arguments, Packing& packing) {
+  std::vector<fs::path> folders;
+  for (const fs::path& input : arguments.inputs) {
+    const std::vector<fs::path> found = FindRecordings(input);
+    folders.insert(folders.end(), found.begin(), found.end());
+  }
+  packing.how.cameras = ChooseViews(folders, packing.how);
+  std::vector<Looked> looked(folders.size());
+  CountProgress progress("recordings looked at", static_cast<std::int64_t>(folders.size()), 0);
+  ShareOut(
+      static_cast<std::int64_t>(folders.size()), arguments.jobs,
+      [&](std::int64_t i) {
+        const auto at = static_cast<std::size_t>(i);
+        looked[at] = LookAt(folders[at], packing.how);
+      },
+      [&](std::int64_t) { progress.Count(); });
+  for (Looked& one : looked) {
+    if (one.source) {
+      packing.sources.push_back(*std::move(one.source));
+    } else {
+      packing.left_out.push_back(std::move(one.left_out));
+    }
+  }
+  if (!packing.left_out.empty()) Tell(CountByKind(packing.left_out));
+  if (packing.sources.empty())
+    throw InvalidInput("no recording can be packed; the last one: {}", packing.left_out.back().sentence);
+}
+
+/// One robot per packing: as many arms in all recordings as in the first.
+void LeaveOutOtherRobots(Packing& packing) {
+  const std::size_t arms = packing.sources.front().track.front().size();
+  std::erase_if(packing.sources, [&](const PackSource& source) {
+    const std::size_t found = source.track.front().size();
+    if (found == arms) return false;
+    packing.left_out.push_back({source.folder, "other_robot",
+                                fmt::format("{}: {} arms, wanted {} as in {}", source.folder.string(), found, arms,
+                                            packing.sources.front().folder.string())});
+    return true;
+  });
+}
+
+void MeasureMotion(const PackArguments& arguments, Packing& packing) {
+  MotionSums sums;
+  for (PackSource& source : packing.sources) {
+    if (!HoldsOut(source, arguments)) sums.Add(source.track);
+  }
+  packing.clip.delta_frames = arguments.period_s * kRawFrames_hz;
+  packing.clip.statistics = sums.Statistics("packed", packing.clip.delta_frames);
+}
+
+template <typename T>
+void Shuffle(std::vector<T>& items, SplitMix64 random) {
+  for (std::size_t i = items.size(); i > 1; --i) std::swap(items[i - 1], items[random.Below(i)]);
+}
+
+void PlanShards(const PackArguments& arguments, Packing& packing) {
+  for (const bool holds_out : {false, true}) {
+    std::vector<PlannedClip> clips;
+    for (std::size_t i = 0; i < packing.sources.size(); ++i) {
+      if (HoldsOut(packing.sources[i], arguments) != holds_out) continue;
+      for (int crop = 0; crop < (holds_out ? 1 : arguments.crops); ++crop) clips.push_back({i, crop});
+    }
+    Shuffle(clips, SplitMix64(SeedFor(SeedFor(arguments.seed, "order of clips"), holds_out ? 1 : 0)));
+    const auto size = static_cast<std::size_t>(arguments.clips_per_shard);
+    for (std::size_t begin = 0; begin < clips.size(); begin += size) {
+      const auto first = clips.begin() + static_cast<std::ptrdiff_t>(begin);
+      const auto last = clips.begin() + static_cast<std::ptrdiff_t>(std::min(begin + size, clips.size()));
+      packing.shards.push_back({holds_out, {first, last}});
+    }
+  }
+}
+
+std::string RecipeOf(const PackArguments& arguments, const Packing& packing) {
+  std::string all =
+      fmt::format("evac-shard 1 seed {} crops {} hold-out {} clips {} period {} size {}x{} maps {}", arguments.seed,
+                  arguments.crops, arguments.hold_out, arguments.clips_per_shard, arguments.period_s,
+                  packing.clip.picture_px.width, packing.clip.picture_px.height, PoseMapWords(packing.clip.pose_map));
+  for (const std::string& camera : packing.how.cameras) all += " " + camera;
+  for (const PackSource& source : packing.sources) all += "\n" + source.name + " " + source.sha256;
+  return Sha256Hex(all + "\n" + StatisticsPage(packing.clip.statistics));
+}
+
+Packing Plan(const PackArguments& arguments) {
+  const nn::ModelConfig config = ReadEvacConfig(arguments.config);
+  Packing packing;
+  packing.how = {arguments.period_s, arguments.cameras, static_cast<std::size_t>(config.views), arguments.arms,
+                 static_cast<std::size_t>(config.chunk + 1)};
+  packing.clip.picture_px = {static_cast<int>(config.image_width_px), static_cast<int>(config.image_height_px)};
+  nn::ModelConfig scaled = config;
+  scaled.pose_map.scaled = true;
+  packing.clip.pose_map = PoseMapOptions::Of(scaled);
+  LookAtAll(arguments, packing);
+  LeaveOutOtherRobots(packing);
+  for (const PackSource& source : packing.sources) packing.tasks.push_back(source.task);
+  std::sort(packing.tasks.begin(), packing.tasks.end());
+  packing.tasks.erase(std::unique(packing.tasks.begin(), packing.tasks.end()), packing.tasks.end());
+  MeasureMotion(arguments, packing);
+  PlanShards(arguments, packing);
+  packing.recipe = RecipeOf(arguments, packing);
+  return packing;
+}
+
+fs::path ShardPath(const fs::path& out, std::size_t number) {
+  return out / fmt::format("shard_{:05}.safetensors", number);
+}
+
+/// OUT/packing.json says which packing the shards beside it are of.
+void Claim(const PackArguments& arguments, const Packing& packing) {
+  MakeFolders(arguments.out);
+  const fs::path path = arguments.out / "packing.json";
+  const std::string text =
+      Json{{"format", "evac-packing"}, {"recipe", packing.recipe}, {"shards", packing.shards.size()}}.dump(1) + "\n";
+  if (!fs::exists(path)) {
+    WriteFileAtomically(path, text);
+  } else if (ReadFile(path) != text) {
+    throw InvalidInput("{}: holds shards of other recordings or options, wanted recipe {}; choose another --out",
+                       path.string(), packing.recipe);
+  }
+}
+
+Clip Make(const PlannedClip& planned, const PackArguments& arguments, const Packing& packing) {
+  const PackSource& source = packing.sources[planned.source];
+  const Recording recording = ReadForPacking(source.folder, packing.how);
+  std::optional<EpisodeTruth> truth;
+  if (source.row) truth = ReadTruth(TruthPath(*PlaceOf(source.folder)), source.frames, recording.cameras.size());
+  const ClipSource read =
+      ReadClipSource(recording, truth ? &*truth : nullptr, source.row ? source.row->video_scale : 1);
+  const cv::Size picture_px = read.pictures.front().front().size();
+  SplitMix64 random(
+      SeedFor(SeedFor(SeedFor(arguments.seed, "crop"), source.name), static_cast<std::uint64_t>(planned.crop)));
+  const Crop crop =
+      planned.crop == 0 ? Crop{0, 0, picture_px.width, picture_px.height} : RandomCrop(picture_px, random);
+  Clip clip = MakeClip(read, crop, packing.clip);
+  clip.recording = static_cast<std::int64_t>(planned.source);
+  clip.task = static_cast<std::int32_t>(std::find(packing.tasks.begin(), packing.tasks.end(), source.task) -
+                                        packing.tasks.begin());
+  clip.outcome = static_cast<std::int8_t>(!source.row ? -1 : source.row->success ? 1 : 0);
+  return clip;
+}
+
+std::string Joined(const std::vector<std::string>& names) {
+  std::string text;
+  for (const std::string& name : names) text += (text.empty() ? "" : ",") + name;
+  return text;
+}
+
+TensorMetadata MetadataOf(std::size_t number, const PackArguments& arguments, const Packing& packing) {
+  const bool one_arm = packing.sources.front().track.front().size() == 1;
+  return {{"split", packing.shards[number].holds_out ? "holdout" : "train"},
+          {"period_s", fmt::format("{}", arguments.period_s)},
+          {"height_px", std::to_string(packing.clip.picture_px.height)},
+          {"width_px", std::to_string(packing.clip.picture_px.width)},
+          {"cameras", Joined(packing.how.cameras)},
+          {"arms", one_arm ? "right" : "left,right"},
+          {"tasks", Joined(packing.tasks)},
+          {"pose_map", PoseMapWords(packing.clip.pose_map)},
+          {"delta_frames", fmt::format("{}", packing.clip.delta_frames)},
+          {"statistics", StatisticsPage(packing.clip.statistics)},
+          {"recipe", packing.recipe},
+          {"shard", std::to_string(number)},
+          {"shards", std::to_string(packing.shards.size())}};
+}
+
+void MakeShard(std::size_t number, const PackArguments& arguments, const Packing& packing) {
+  std::vector<Clip> clips;
+  for (const PlannedClip& planned : packing.shards[number].clips) clips.push_back(Make(planned, arguments, packing));
+  WriteShard(ShardPath(arguments.out, number), clips, packing.clip.picture_px, MetadataOf(number, arguments, packing));
+}
+
+void WriteLists(const PackArguments& arguments, const Packing& packing) {
+  std::string table = "folder,kind,sentence\n";
+  for (const LeftOut& one : packing.left_out)
+    table += fmt::format("{},{},{}\n", Json(one.folder.string()).dump(), one.kind, Json(one.sentence).dump());
+  WriteFileAtomically(arguments.out / "left_out.csv", table);
+  WriteFileAtomically(arguments.out / "statistics.yaml", StatisticsPage(packing.clip.statistics));
+}
+
+void WriteIndex(const PackArguments& arguments, const Packing& packing) {
+  Json shards = Json::array(), recordings = Json::array();
+  for (std::size_t number = 0; number < packing.shards.size(); ++number) {
+    const PlannedShard& shard = packing.shards[number];
+    std::size_t frames = 0;
+    for (const PlannedClip& clip : shard.clips) frames += packing.sources[clip.source].frames;
+    const fs::path path = ShardPath(arguments.out, number);
+    shards.push_back({{"file", path.filename().string()},
+                      {"split", shard.holds_out ? "holdout" : "train"},
+                      {"clips", shard.clips.size()},
+                      {"frames", frames},
+                      {"sha256", Sha256HexOfFile(path)}});
+  }
+  Json states = Json::array(), behaviours = Json::array(), fates = Json::array();
+  for (const PackSource& source : packing.sources) {
+    recordings.push_back(source.name);
+    states.push_back(source.state);
+    behaviours.push_back(source.row ? source.row->behaviour : "");
+    fates.push_back(source.row ? source.row->fate : "");
+  }
+  const Json page = {{"format", "evac-shards"},    {"version", 1},        {"recipe", packing.recipe},
+                     {"tasks", packing.tasks},     {"recordings", recordings}, {"states", states},
+                     {"behaviours", behaviours},   {"fates", fates},      {"shards", shards}};
+  WriteFileAtomically(arguments.out / "shards.json", page.dump(1) + "\n");
+}
+
+}  // namespace
+
+void Pack(const PackArguments& arguments) {
+  const Packing packing = Plan(arguments);
+  Claim(arguments, packing);
+  WriteLists(arguments, packing);
+  std::vector<std::size_t> todo;
+  for (std::size_t number = 0; number < packing.shards.size(); ++number) {
+    if (!fs::exists(ShardPath(arguments.out, number))) todo.push_back(number);
+  }
+  const auto count = static_cast<std::int64_t>(todo.size()), total = static_cast<std::int64_t>(packing.shards.size());
+  CountProgress progress("shards", total, total - count);
+  const nn::LibraryThreads one_thread(1);
+  ShareOut(
+      count, arguments.jobs,
+      [&](std::int64_t i) {
+        nn::UseLibraryThreadsHere(1);
+        MakeShard(todo[static_cast<std::size_t>(i)], arguments, packing);
+      },
+      [&](std::int64_t) { progress.Count(); });
+  WriteIndex(arguments, packing);
+  Tell(fmt::format("{} recordings in {} shards in {}", packing.sources.size(), total, arguments.out.string()));
+}
+
+}  // namespace evac

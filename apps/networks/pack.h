@@ -1,0 +1,30 @@
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "apps/networks/pack_sources.h"
+
+namespace evac {
+
+struct PackArguments {
+  std::vector<std::filesystem::path> inputs;
+  std::filesystem::path out, config;
+  std::vector<std::string> cameras;
+  ArmsKind arms = ArmsKind::kAuto;
+  double period_s = 0.1;
+  int crops = 1;            ///< clips per recording: the whole picture, then random crops
+  double hold_out = 0.05;   ///< share of initial states whose recordings are kept for testing
+  int clips_per_shard = 64;
+  std::uint64_t seed = 1;   ///< of crops, split and order
+  int jobs = 0;             ///< shards made at the same time; 0: one per core. Changes no byte
+};
+
+/// Turns recordings into the shards that `out` does not have yet (docs/formats/shards.md); says on stderr how far it is
+/// and what was left out.
+/// @throws InvalidInput if no recording can be packed, or `out` holds another packing.
+void Pack(const PackArguments& arguments);
+
+}  // namespace evac

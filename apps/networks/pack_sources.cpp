@@ -1,0 +1,155 @@
+#include "apps/networks/pack_sources.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "core/error.h"
+#include "core/file.h"
+#include "core/hash.h"
+
+namespace evac {
+namespace {
+
+namespace fs = std::filesystem;
+
+std::vector<fs::path> SubFolders(const fs::path& folder) {
+  std::vector<fs::path> folders;
+  for (const fs::directory_entry& entry : fs::directory_iterator(folder)) {
+    if (entry.is_directory()) folders.push_back(entry.path());
+  }
+  std::sort(folders.begin(), folders.end());
+  return folders;
+}
+
+bool LooksLikeRecording(const fs::path& folder) {
+  return fs::exists(folder / "action.npy") || fs::exists(folder / "proprio_stats.h5") || PlaceOf(folder).has_value();
+}
+
+std::string HashOfFiles(const Recording& recording, const std::optional<CollectedEpisode>& row,
+                        const fs::path& folder) {
+  std::string all;
+  for (const fs::path& file : recording.files) all += file.filename().string() + Sha256HexOfFile(file);
+  if (row) all += CollectedJson(*row) + Sha256HexOfFile(TruthPath(*PlaceOf(folder)));
+  return Sha256Hex(all);
+}
+
+/// An episode of a collection whose row is not written yet is not whole.
+void RefuseUnfinished(const fs::path& folder) {
+  const std::optional<TreePlace> place = PlaceOf(folder);
+  if (!place || !fs::exists(place->root / "collection.json") || fs::exists(RowPath(*place))) return;
+  throw InvalidInput("{}: its collection has no row for it yet", folder.string()).Called("unfinished");
+}
+
+std::string TaskOf(const fs::path& folder, const std::optional<CollectedEpisode>& row) {
+  if (row) return row->task;
+  const std::optional<TreePlace> place = PlaceOf(folder);
+  return place ? place->task : "recording";
+}
+
+PackSource Examine(const fs::path& folder, const SourceOptions& options) {
+  RefuseUnfinished(folder);
+  const Recording recording = ReadForPacking(folder, options);
+  PackSource source;
+  source.folder = folder;
+  source.row = RowOf(folder);
+  const std::optional<TreePlace> place = PlaceOf(folder);
+  source.name = place ? place->task + "/" + place->episode : folder.filename().string();
+  source.task = TaskOf(folder, source.row);
+  source.state = source.row ? source.row->initial_state : source.name;
+  source.track = recording.told.empty() ? recording.arms : recording.told;
+  source.frames = source.track.size();
+  if (source.frames < options.least_frames) {
+    throw InvalidInput("{}: {} steps of {} s, wanted at least {}", folder.string(), source.frames, recording.period_s,
+                       options.least_frames)
+        .Called("too_short");
+  }
+  if (source.row) ReadTruth(TruthPath(*place), source.frames, recording.cameras.size());
+  source.sha256 = HashOfFiles(recording, source.row, folder);
+  return source;
+}
+
+}  // namespace
+
+std::vector<fs::path> FindRecordings(const fs::path& input) {
+  std::error_code error;
+  const fs::path root = fs::canonical(input, error);
+  if (error || !fs::is_directory(root)) throw InvalidInput("{}: no such folder", input.string());
+  std::vector<fs::path> found;
+  if (fs::is_directory(root / "observations")) {
+    for (const fs::path& task : SubFolders(root / "observations")) {
+      for (const fs::path& episode : SubFolders(task)) found.push_back(episode);
+    }
+  } else if (LooksLikeRecording(root)) {
+    found.push_back(root);
+  } else {
+    for (const fs::path& folder : SubFolders(root)) {
+      if (LooksLikeRecording(folder)) found.push_back(folder);
+    }
+  }
+  if (!found.empty()) return found;
+  throw InvalidInput(
+      "{}: no recordings; wanted an AgiBot World tree (observations/<task>/<episode>), a recording, or a folder of "
+      "recordings (docs/formats/recording.md)",
+      input.string());
+}
+
+std::vector<std::string> ChooseViews(const std::vector<fs::path>& folders, const SourceOptions& options) {
+  if (!options.cameras.empty()) return options.cameras;
+  std::string last = "there is none";
+  for (const fs::path& folder : folders) {
+    try {
+      const Recording recording = ReadRecording(folder, {.count_video_frames = false});
+      if (recording.cameras.size() < options.views) continue;
+      std::vector<std::string> names;
+      for (std::size_t view = 0; view < options.views; ++view) names.push_back(recording.cameras[view].name);
+      return names;
+    } catch (const Error& error) {
+      last = error.what();
+    }
+  }
+  throw InvalidInput("no recording with {} cameras can be read; the last one that could not: {}", options.views, last);
+}
+
+Recording ReadForPacking(const fs::path& folder, const SourceOptions& options) {
+  const std::optional<CollectedEpisode> row = RowOf(folder);
+  RecordingOptions how;
+  how.cameras = options.cameras;
+  how.read_told = options.arms == ArmsKind::kTold || (options.arms == ArmsKind::kAuto && row);
+  Recording recording = ReadRecording(folder, how);
+  const double steps = options.period_s / recording.period_s;
+  const int every_nth = static_cast<int>(std::lround(steps));
+  if (every_nth < 1 || std::abs(steps - every_nth) > 0.02 * every_nth) {
+    throw InvalidInput("{}: steps of {:.4g} s, wanted {} s or a whole part of it", folder.string(), recording.period_s,
+                       options.period_s)
+        .Called("other_rate");
+  }
+  if (recording.videos.empty())
+    throw InvalidInput("{}: there is no video, only a first frame", folder.string()).Called("no_video");
+  if (options.arms == ArmsKind::kTold && recording.told.empty())
+    throw InvalidInput("{}: it does not say where the arms were told to be", folder.string()).Called("nothing_told");
+  if (every_nth == 1) return recording;
+  if (row) throw InvalidInput("{}: a collection's episodes are packed at their own period", folder.string());
+  how.every_nth = every_nth;
+  how.count_video_frames = false;  // they were counted
+  return ReadRecording(folder, how);
+}
+
+Looked LookAt(const fs::path& folder, const SourceOptions& options) try {
+  return {Examine(folder, options), {}};
+} catch (const Error& error) {
+  if (error.exit_code() != ExitCode::kInvalidInput) throw;
+  return {std::nullopt, {folder, error.kind()[0] == '\0' ? "other" : error.kind(), error.what()}};
+}
+
+std::string CountByKind(const std::vector<LeftOut>& left_out) {
+  if (left_out.empty()) return "";
+  std::map<std::string, int> counts;
+  for (const LeftOut& one : left_out) ++counts[one.kind];
+  std::string text;
+  for (const auto& [kind, count] : counts) text += fmt::format("{}{} {}", text.empty() ? "" : ", ", count, kind);
+  return fmt::format("{} recordings left out: {}", left_out.size(), text);
+}
+
+}  // namespace evac

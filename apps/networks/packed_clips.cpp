@@ -1,0 +1,76 @@
+#include "apps/networks/packed_clips.h"
+
+#include <nlohmann/json.hpp>
+#include <sstream>
+
+#include "core/error.h"
+#include "core/file.h"
+
+namespace evac {
+namespace {
+
+using nlohmann::json;
+
+/// shards.json, one entry per recording.
+struct Recordings {
+  std::vector<std::string> states, behaviours, fates;
+};
+
+Recordings ReadRecordings(const std::filesystem::path& path) try {
+  const json page = json::parse(ReadFile(path));
+  Recordings recordings;
+  page.at("states").get_to(recordings.states);
+  page.at("behaviours").get_to(recordings.behaviours);
+  page.at("fates").get_to(recordings.fates);
+  if (recordings.behaviours.size() != recordings.states.size() || recordings.fates.size() != recordings.states.size())
+    throw InvalidInput("{}: {} states, {} behaviours and {} fates, wanted as many of each", path.string(),
+                       recordings.states.size(), recordings.behaviours.size(), recordings.fates.size());
+  return recordings;
+} catch (const json::exception& error) {
+  throw InvalidInput("{}: {}; wanted states, behaviours and fates per recording, as `evac pack` writes them",
+                     path.string(), error.what());
+}
+
+/// `clip_id` of one shard.
+at::Tensor ClipIds(const std::filesystem::path& shard) {
+  const nn::MappedTensors file(TensorFile::Open(shard));
+  const at::Tensor ids = file.Get("clip_id");
+  nn::CheckShape(shard.string() + ": clip_id", ids, {-1});
+  return ids.to(at::kLong).clone();
+}
+
+}  // namespace
+
+std::vector<std::string> NamesIn(const std::string& joined) {
+  std::vector<std::string> names;
+  std::istringstream text(joined);
+  for (std::string part; std::getline(text, part, ',');) names.push_back(part);
+  return names;
+}
+
+std::string Joined(const std::vector<std::string>& names) {
+  std::string text;
+  for (const std::string& name : names) text += (text.empty() ? "" : ",") + name;
+  return text;
+}
+
+PackedSet::PackedSet(const std::filesystem::path& folder, train::Split split) : shards(folder, split) {
+  tasks = NamesIn(shards.metadata().at("tasks"));
+  cameras = NamesIn(shards.metadata().at("cameras"));
+  const Recordings recordings = ReadRecordings(folder / "shards.json");
+  std::vector<at::Tensor> ids;
+  for (const train::Shard& shard : shards.shards()) ids.push_back(ClipIds(shard.path));
+  std::vector<std::int64_t> in_shard(shards.shards().size(), 0);
+  for (const train::Clip& clip : shards.clips()) {
+    const std::int64_t recording = ids[clip.shard][in_shard[clip.shard]++].item<std::int64_t>();
+    const auto at = static_cast<std::size_t>(recording);
+    if (recording < 0 || at >= recordings.states.size() || clip.task < 0 ||
+        static_cast<std::size_t>(clip.task) >= tasks.size())
+      throw InvalidInput("{}: a clip of recording {} and task {}, wanted below {} and {}",
+                         shards.shards()[clip.shard].path.string(), recording, clip.task, recordings.states.size(),
+                         tasks.size());
+    clips.push_back({clip, recording, recordings.states[at], recordings.behaviours[at], recordings.fates[at]});
+  }
+}
+
+}  // namespace evac

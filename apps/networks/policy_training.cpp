@@ -1,0 +1,218 @@
+#include "apps/networks/policy_training.h"
+
+#include <algorithm>
+#include <cmath>
+#include <set>
+
+#include "core/error.h"
+#include "core/geometry.h"
+#include "policies/learned_input.h"
+
+namespace evac {
+namespace {
+
+enum Stream : std::uint32_t { kPick = 21, kChange = 22, kArms = 23 };
+
+constexpr double kClosedGripper = 120;  // AgiBot's raw reading
+constexpr double kGrasps = 0.5;
+constexpr double kNear_m = 0.05;  // an error of position that weighs as much as a hand that does not close
+
+at::Tensor ActionsOf(const std::filesystem::path& shard) {
+  const nn::MappedTensors file(TensorFile::Open(shard));
+  const at::Tensor actions = file.Get("actions");
+  nn::CheckShape(shard.string() + ": actions", actions, {-1, 16});
+  return actions.to(at::kFloat).clone();
+}
+
+ArmState ArmOf(const float* numbers) {
+  ArmState arm;
+  arm.base_from_gripper =
+      FromXyzQuat({numbers[0], numbers[1], numbers[2]}, {numbers[3], numbers[4], numbers[5], numbers[6]});
+  arm.closure = numbers[7] / kClosedGripper;
+  return arm;
+}
+
+Eigen::Isometry3d PoseFrom(const at::Tensor& c2w) {
+  Eigen::Isometry3d pose = Eigen::Isometry3d::Identity();
+  const auto* numbers = c2w.data_ptr<float>();
+  for (int row = 0; row < 3; ++row) {
+    for (int column = 0; column < 4; ++column) pose(row, column) = numbers[4 * row + column];
+  }
+  return pose;
+}
+
+/// One view's camera at one row, without its mount.
+Camera CameraAt(const train::Shard& shard, std::int64_t row, std::int64_t view) {
+  const auto* k = shard.k[row][view].data_ptr<float>();
+  return {.name = "",
+          .width_px = static_cast<int>(shard.frames.size(3)),
+          .height_px = static_cast<int>(shard.frames.size(2)),
+          .fx_px = k[0],
+          .fy_px = k[4],
+          .cx_px = k[2],
+          .cy_px = k[5]};
+}
+
+bool HoldsContact(const train::Shard& shard, std::int64_t first, std::int64_t end) {
+  const auto* contact = shard.contact.data_ptr<std::uint8_t>();
+  return std::any_of(contact + first, contact + end, [](std::uint8_t c) { return c != 0; });
+}
+
+}  // namespace
+
+train::Settings SettingsOf(PolicyOptions& options) {
+  train::Settings settings = {{"batch", &options.batch},
+                              {"behaviours", &options.behaviours},
+                              {"contact_share", &options.contact_share},
+                              {"arm_noise_m", &options.arm_noise_m},
+                              {"object_weight", &options.object_weight},
+                              {"light", &options.changes.light},
+                              {"offset", &options.changes.offset},
+                              {"blur_share", &options.changes.blur_share}};
+  const train::Settings shared = SettingsOf(options.job.trainer);
+  settings.insert(settings.end(), shared.begin(), shared.end());
+  return settings;
+}
+
+std::vector<std::string> ArmsOf(const PackedSet& set) { return NamesIn(set.shards.metadata().at("arms")); }
+
+PolicyTraining::PolicyTraining(const PackedSet& set, const PolicyOptions& options)
+    : set_(set), options_(options), arms_(ArmsOf(set)) {
+  if (options.batch < 1) throw InvalidInput("policy training: batch is {}, wanted at least 1", options.batch);
+  const std::vector<std::string> names = NamesIn(options.behaviours);
+  const std::set<std::string> wanted(names.begin(), names.end());
+  for (const train::Shard& shard : set.shards.shards()) actions_.push_back(ActionsOf(shard.path));
+  for (std::size_t i = 0; i < set.clips.size(); ++i) {
+    const PackedClip& clip = set.clips[i];
+    if (clip.outcome != 1 || clip.frames < 2 || (!wanted.empty() && !wanted.contains(clip.behaviour))) continue;
+    imitated_.push_back(i);
+    for (std::int64_t row = 0; row + 1 < clip.frames; ++row) {
+      const std::int64_t end = std::min(row + kLearnedChunk, clip.frames - 1) + 1;
+      if (HoldsContact(set.shards.shards()[clip.shard], clip.first + row, clip.first + end))
+        contacts_.push_back({i, row});
+    }
+  }
+  if (imitated_.empty())
+    throw InvalidInput("policy training: none of {} clips is a success of behaviours '{}'", set.clips.size(),
+                       options.behaviours);
+}
+
+Arms PolicyTraining::ArmsAt(const PackedClip& clip, std::int64_t row) const {
+  const float* numbers = actions_[clip.shard].data_ptr<float>() + 16 * (clip.first + std::min(row, clip.frames - 1));
+  return arms_.size() == 2 ? Arms{ArmOf(numbers), ArmOf(numbers + 8)} : Arms{ArmOf(numbers + 8)};
+}
+
+Moment PolicyTraining::Draw(train::Dice& dice) const {
+  if (!contacts_.empty() && dice.Chance(options_.contact_share))
+    return contacts_[static_cast<std::size_t>(dice.Below(static_cast<std::int64_t>(contacts_.size())))];
+  const std::size_t clip = imitated_[static_cast<std::size_t>(dice.Below(static_cast<std::int64_t>(imitated_.size())))];
+  return {clip, dice.Below(set_.clips[clip].frames - 1)};
+}
+
+void PolicyTraining::PutMoment(const Moment& moment, std::int64_t b, Batch& batch) const {
+  const PackedClip& clip = set_.clips[moment.clip];
+  const train::Shard& shard = set_.shards.shards()[clip.shard];
+  const std::int64_t row = clip.first + moment.row;
+  for (std::int64_t v = 0; v < set_.shards.views(); ++v)
+    PutRays(CameraAt(shard, row, v), PoseFrom(shard.c2w[row][v]), batch.input.rays[b][v].data_ptr<float>(),
+            batch.input.eyes[b][v].data_ptr<float>());
+  const Arms now = ArmsAt(clip, moment.row);
+  for (std::size_t a = 0; a < arms_.size(); ++a) {
+    const auto arm = static_cast<std::int64_t>(a);
+    PutArm(now[a], batch.input.arms[b][arm].data_ptr<float>());
+    for (std::int64_t k = 0; k < kLearnedChunk; ++k)
+      PutArm(ArmsAt(clip, moment.row + 1 + k)[a], batch.targets[b][k][arm].data_ptr<float>());
+    for (std::int64_t before = 0; before <= moment.row; ++before) {
+      if (ArmsAt(clip, before)[a].closure > kGrasps) batch.input.grasped[b][arm] = 1;
+    }
+  }
+  batch.input.task[b] = clip.task;
+}
+
+PolicyTraining::Batch PolicyTraining::BatchOf(const std::vector<Moment>& moments) const {
+  const auto b = static_cast<std::int64_t>(moments.size()), v = set_.shards.views(),
+             a = static_cast<std::int64_t>(arms_.size());
+  Batch batch{{{},
+               at::empty({b, v, 3, 3}),
+               at::empty({b, v, 3}),
+               at::empty({b, a, kArmNumbers}),
+               at::zeros({b, a}),
+               at::zeros({b}, at::kLong)},
+              at::empty({b, kLearnedChunk, a, kArmNumbers}),
+              {},
+              {}};
+  std::vector<at::Tensor> pictures, objects;
+  for (std::int64_t i = 0; i < b; ++i) {
+    const Moment& moment = moments[static_cast<std::size_t>(i)];
+    const PackedClip& clip = set_.clips[moment.clip];
+    const train::Shard& shard = set_.shards.shards()[clip.shard];
+    pictures.push_back(shard.frames[clip.first + moment.row]);
+    objects.push_back(shard.object_px[clip.first + moment.row]);
+    PutMoment(moment, i, batch);
+  }
+  batch.input.pictures = at::stack(pictures).to(at::kFloat) / 127.5 - 1;
+  const auto size =
+      at::tensor({static_cast<float>(set_.shards.width_px()), static_cast<float>(set_.shards.height_px())});
+  const at::Tensor object = at::stack(objects) / size;
+  batch.visible = ((object >= 0) * (object <= 1)).all(-1).to(at::kFloat);  // 0 where it is not a number
+  batch.object = object.nan_to_num(0).clamp(0, 1);
+  return batch;
+}
+
+/// Mean absolute error, positions in units of kNear_m.
+at::Tensor PolicyTraining::Distance(const LearnedOutput& output, const Batch& batch) const {
+  const at::Tensor off = (output.targets - batch.targets).abs();
+  return (off.narrow(-1, 0, 3) / kNear_m).sum(-1).mean() + off.narrow(-1, 3, 6).sum(-1).mean() +
+         off.narrow(-1, 9, 1).mean();
+}
+
+at::Tensor PolicyTraining::Loss(const LearnedNet& net, const train::StepPlace& place) const {
+  train::Dice pick(place, kPick), change(place, kChange), arms(place, kArms);
+  std::vector<Moment> moments;
+  for (std::int64_t i = 0; i < options_.batch; ++i) moments.push_back(Draw(pick));
+  Batch batch = BatchOf(moments);
+  batch.input.pictures = Changed(batch.input.pictures, options_.changes, change);
+  at::Tensor xyz_m = batch.input.arms.narrow(-1, 0, 3);
+  xyz_m += arms.Normal(xyz_m.sizes()) * options_.arm_noise_m;
+  const LearnedOutput output = net(batch.input);
+  const at::Tensor off = (output.object - batch.object).abs().sum(-1) * batch.visible;
+  return Distance(output, batch) + options_.object_weight * off.sum() / (batch.visible.sum() + 1e-6);
+}
+
+double PolicyTraining::Measure(const LearnedNet& net, std::int64_t moments) const {
+  const at::NoGradGuard no_gradients;
+  double sum = 0;
+  std::int64_t done = 0;
+  while (done < moments) {
+    std::vector<Moment> some;
+    for (; done < moments && static_cast<std::int64_t>(some.size()) < options_.batch; ++done) {
+      const std::size_t clip = imitated_[static_cast<std::size_t>(done) % imitated_.size()];
+      some.push_back({clip, (done * 37) % (set_.clips[clip].frames - 1)});
+    }
+    const Batch batch = BatchOf(some);
+    sum += Distance(net(batch.input), batch).item<double>() * static_cast<double>(some.size());
+  }
+  return sum / static_cast<double>(moments);
+}
+
+std::vector<Camera> CamerasOf(const PackedSet& set) {
+  const PackedClip& clip = set.clips.front();
+  const train::Shard& shard = set.shards.shards()[clip.shard];
+  const at::Tensor actions = ActionsOf(shard.path);
+  std::vector<Camera> cameras;
+  for (std::size_t v = 0; v < set.cameras.size(); ++v) {
+    Camera camera = CameraAt(shard, clip.first, static_cast<std::int64_t>(v));
+    camera.name = set.cameras[v];
+    camera.mount = camera.name == "hand_left"    ? Mount::kLeftGripper
+                   : camera.name == "hand_right" ? Mount::kRightGripper
+                                                 : Mount::kBase;
+    const Eigen::Isometry3d base_from_camera = PoseFrom(shard.c2w[clip.first][static_cast<std::int64_t>(v)]);
+    const float* arm = actions.data_ptr<float>() + 16 * clip.first + (camera.mount == Mount::kLeftGripper ? 0 : 8);
+    camera.mount_from_camera =
+        camera.mount == Mount::kBase ? base_from_camera : ArmOf(arm).base_from_gripper.inverse() * base_from_camera;
+    cameras.push_back(camera);
+  }
+  return cameras;
+}
+
+}  // namespace evac

@@ -1,0 +1,69 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "apps/networks/packed_clips.h"
+#include "apps/networks/picture_changes.h"
+#include "core/types.h"
+#include "policies/learned_net.h"
+#include "worldmodel/train/settings.h"
+
+/// How a policy learns by imitation: what was told to the arms in recordings that succeeded.
+namespace evac {
+
+struct PolicyOptions {
+  train::JobOptions job;                      ///< of it the trainer's alone: a policy is trained in floats
+  std::int64_t batch = 64;                    ///< moments
+  std::string behaviours = "good,near_miss";  ///< of a collection's mix, those worth imitating; empty: all
+  double contact_share = 0.5;                 ///< of moments whose chunk holds contact, beside those drawn from all
+  double arm_noise_m = 0.004;                 ///< deviation of where the arm is said to be: it learns to come back
+  double object_weight = 1;                   ///< of pointing at the object, beside the targets
+  PictureChanges changes;
+};
+train::Settings SettingsOf(PolicyOptions& options);
+
+/// One frame of a clip that is imitated, and the targets that followed it.
+struct Moment {
+  std::size_t clip = 0;  ///< of `PackedSet::clips`
+  std::int64_t row = 0;  ///< of the clip, from 0
+};
+
+class PolicyTraining {
+ public:
+  /// @param set  outlives this
+  /// @throws InvalidInput if nothing in it is worth imitating.
+  PolicyTraining(const PackedSet& set, const PolicyOptions& options);
+
+  at::Tensor Loss(const LearnedNet& net, const train::StepPlace& place) const;
+  /// The same over moments evenly spread over all clips, nothing changed or drawn; without the object's part.
+  double Measure(const LearnedNet& net, std::int64_t moments) const;
+  std::size_t clips() const { return imitated_.size(); }
+
+ private:
+  struct Batch {
+    LearnedInput input;
+    at::Tensor targets;  ///< [B, kLearnedChunk, A, kArmNumbers]
+    at::Tensor object;   ///< [B, V, 2] in parts of the picture
+    at::Tensor visible;  ///< [B, V] 1 where the object's middle is known and in the picture
+  };
+  Batch BatchOf(const std::vector<Moment>& moments) const;
+  Moment Draw(train::Dice& dice) const;
+  Arms ArmsAt(const PackedClip& clip, std::int64_t row) const;
+  void PutMoment(const Moment& moment, std::int64_t b, Batch& batch) const;
+  at::Tensor Distance(const LearnedOutput& output, const Batch& batch) const;
+
+  const PackedSet& set_;
+  PolicyOptions options_;
+  std::vector<at::Tensor> actions_;  ///< of each shard, [F, 16]
+  std::vector<std::string> arms_;
+  std::vector<std::size_t> imitated_;  ///< clips
+  std::vector<Moment> contacts_;       ///< moments whose chunk holds contact
+};
+
+/// {right}, or {left, right}: whose arms the shards hold.
+std::vector<std::string> ArmsOf(const PackedSet& set);
+/// The views' cameras of a clip, on their mounts, as the card keeps them.
+std::vector<Camera> CamerasOf(const PackedSet& set);
+
+}  // namespace evac

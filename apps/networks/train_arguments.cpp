@@ -1,0 +1,74 @@
+#include "apps/networks/train_arguments.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <thread>
+
+#include "apps/interrupts.h"
+#include "worldmodel/evac_config.h"
+
+namespace evac {
+
+void AddShared(CLI::App& command, const std::shared_ptr<TrainArguments>& arguments) {
+  command.add_option("SHARDS", arguments->shards, "a folder of `evac pack` (docs/formats/shards.md)")
+      ->required()
+      ->check(CLI::ExistingDirectory);
+  AddTraining(command, arguments);
+}
+
+void AddTraining(CLI::App& command, const std::shared_ptr<TrainArguments>& arguments) {
+  command
+      .add_option("--training", arguments->training, "the page of training options; what is left out is the paper's")
+      ->check(CLI::ExistingFile);
+  command.add_option("--set", arguments->settings, "NAME=VALUE, one option of that page; may be given again");
+  command.add_option("--minutes", arguments->minutes, "as many steps as fit, counted once after the first")
+      ->check(CLI::Range(0.001, 1e6));
+  command.add_option("--steps", arguments->steps, "so many steps")
+      ->check(CLI::Range(std::int64_t{1}, std::int64_t{1} << 40));
+  command
+      .add_option("--threads", arguments->threads, "default: one per core; the last digits of the sums depend on it")
+      ->check(CLI::Range(1, 1024));
+  command.add_option("-o,--out", arguments->out, "the folder to write; if it holds this training, it goes on")
+      ->required();
+}
+
+CLI::Option* AddConfig(CLI::App& command, const std::shared_ptr<TrainArguments>& arguments) {
+  return command.add_option("--config", arguments->config, "the page of the network's sizes")->check(CLI::ExistingFile);
+}
+
+void Override(const TrainArguments& arguments, train::TrainerOptions& options) {
+  if (arguments.minutes) options.minutes = *arguments.minutes;
+  if (!arguments.steps) return;
+  options.steps = *arguments.steps;
+  options.minutes = 0;
+}
+
+train::JobPlace PlaceOf(const TrainArguments& arguments, TrainingProgress& progress) {
+  const int cores = std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
+  return {arguments.shards,
+          arguments.out,
+          arguments.config.empty() ? nn::ModelConfig{} : ReadEvacConfig(arguments.config),
+          arguments.threads > 0 ? arguments.threads : cores,
+          IsInterrupted,
+          [&](const train::TrainerProgress& at) { progress.Show(at); },
+          [&](const std::string& sentence) { progress.Say(sentence); }};
+}
+
+int LibraryThreadsOf(const train::JobPlace& place, const train::JobOptions& options) {
+  return Workers(place, options) > 1 ? 1 : place.threads;
+}
+
+ExitCode End(const train::TrainerSummary& summary, const std::filesystem::path& out, const char* file) {
+  if (!summary.IsDone()) {
+    fmt::print(stderr, "interrupted at step {} of {}: the same command goes on from there\n", summary.step,
+               summary.steps);
+    return ExitCode::kInternal;
+  }
+  const std::string best =
+      summary.best ? fmt::format(", best hold-out {:.6g} at step {}", *summary.best, summary.best_step) : "";
+  fmt::print("{}: {} after {} steps{}\n", (out / file).string(), summary.why, summary.step, best);
+  return ExitCode::kOk;
+}
+
+}  // namespace evac

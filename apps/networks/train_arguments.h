@@ -1,0 +1,46 @@
+#pragma once
+
+#include <CLI/CLI.hpp>
+#include <filesystem>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "apps/networks/training_progress.h"
+#include "core/error.h"
+#include "worldmodel/train/train_codec.h"
+
+namespace evac {
+
+/// What every `evac train …` is told.
+struct TrainArguments {
+  std::string shards, config, training, out, codec, init;
+  std::vector<std::string> settings, init_except;
+  std::vector<std::int64_t> keep_steps;
+  std::optional<double> minutes;
+  std::optional<std::int64_t> steps;
+  int threads = 0;
+};
+
+/// Adds what all trainings share: --training, --set, --minutes, --steps, --threads, --out.
+void AddTraining(CLI::App& command, const std::shared_ptr<TrainArguments>& arguments);
+/// The same and SHARDS.
+void AddShared(CLI::App& command, const std::shared_ptr<TrainArguments>& arguments);
+
+/// Adds --config, the page of the network's sizes.
+CLI::Option* AddConfig(CLI::App& command, const std::shared_ptr<TrainArguments>& arguments);
+
+/// What the command line says beside the page.
+void Override(const TrainArguments& arguments, train::TrainerOptions& options);
+
+/// @param arguments, progress  outlive what is returned. Its `config` is read from --config, if that was given.
+train::JobPlace PlaceOf(const TrainArguments& arguments, TrainingProgress& progress);
+
+/// Threads that share the parts of a step use one core each.
+int LibraryThreadsOf(const train::JobPlace& place, const train::JobOptions& options);
+
+/// Says how it ended.
+ExitCode End(const train::TrainerSummary& summary, const std::filesystem::path& out, const char* file);
+
+}  // namespace evac

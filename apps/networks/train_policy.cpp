@@ -1,0 +1,69 @@
+#include "apps/networks/train_policy.h"
+
+#include <fmt/format.h>
+
+#include "apps/networks/learners.h"
+#include "core/error.h"
+#include "policies/learned_input.h"
+
+namespace evac {
+namespace {
+
+constexpr std::int64_t kMeasuredMoments = 1024;
+
+TensorMetadata CardText(const PackedSet& set, const PolicyOptions& options, std::size_t imitated) {
+  TensorMetadata card = {{"format", kLearnedFormat},
+                         {"tasks", Joined(set.tasks)},
+                         {"cameras", Joined(set.cameras)},
+                         {"arms", Joined(ArmsOf(set))},
+                         {"chunk", std::to_string(kLearnedChunk)},
+                         {"period_s", set.shards.metadata().at("period_s")},
+                         {"height_px", std::to_string(set.shards.height_px())},
+                         {"width_px", std::to_string(set.shards.width_px())},
+                         {"recipe", set.shards.metadata().at("recipe")},
+                         {"behaviours", options.behaviours},
+                         {"imitated_clips", std::to_string(imitated)},
+                         {"seed", std::to_string(options.job.trainer.seed)},
+                         {"licence", "as the project"}};
+  for (const Camera& camera : CamerasOf(set)) card["camera." + camera.name] = CardLine(camera);
+  return card;
+}
+
+}  // namespace
+
+train::TrainerSummary TrainPolicy(const train::JobPlace& place, const PolicyOptions& given,
+                                  const std::vector<std::int64_t>& keep_steps) {
+  PolicyOptions options = given;
+  const PackedSet set(place.shards, train::Split::kTrain), holdout(place.shards, train::Split::kHoldout);
+  const LearnedShape shape{set.tasks, set.cameras, ArmsOf(set), static_cast<int>(set.shards.height_px()),
+                           static_cast<int>(set.shards.width_px())};
+  const Learners<LearnedNet> learners(shape, options.job.trainer.seed, Workers(place, options.job));
+  const LearnedNet& net = learners.net();
+  const PolicyTraining training(set, options), measuring(holdout, options);
+  TensorMetadata card = CardText(set, options, training.clips());
+  if (place.say) place.say(fmt::format("{} clips to imitate, {} to measure with", training.clips(), measuring.clips()));
+  options.job.trainer.identity = IdentityOf(SettingsOf(options)) + set.shards.metadata().at("recipe") + " workers " +
+                                 std::to_string(learners.count());
+  train::Trainer trainer(learners.weights().all(), options.job.trainer, place.out);
+  const auto loss = [&](const LearnedNet& of, const train::StepPlace& at) { return training.Loss(of, at); };
+  learners.Replicate(trainer, loss);
+  const auto measure = [&] { return measuring.Measure(net, kMeasuredMoments); };
+  const auto write = [&](const std::string& file, std::int64_t step) {
+    card["steps"] = std::to_string(step);
+    card["holdout"] = fmt::format("{:.6g}", measure());
+    learners.Write(place.out / file, card);
+  };
+  const auto keep = [&](std::int64_t step) { write(fmt::format("policy_{:06}.safetensors", step), step); };
+  const train::TrainerSummary summary =
+      trainer.Run({.loss = [&](const train::StepPlace& at) { return loss(net, at); },
+                   .holdout = measure,
+                   .keep_steps = keep_steps,
+                   .keep = keep,
+                   .interrupted = place.interrupted,
+                   .on_progress = place.on_progress});
+  if (!summary.IsDone()) return summary;
+  trainer.WithBest([&] { write("policy.safetensors", summary.step); });
+  return summary;
+}
+
+}  // namespace evac

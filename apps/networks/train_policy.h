@@ -1,0 +1,15 @@
+#pragma once
+
+#include "apps/networks/policy_training.h"
+#include "worldmodel/train/train_codec.h"
+
+namespace evac {
+
+/// Trains a policy by imitation and writes OUT/policy.safetensors: its weights and its card (docs/learned_policy.md).
+/// @param keep_steps  after each of these the averaged weights are kept as OUT/policy_<step>.safetensors: checkpoints
+/// of
+///   one training
+train::TrainerSummary TrainPolicy(const train::JobPlace& place, const PolicyOptions& options,
+                                  const std::vector<std::int64_t>& keep_steps);
+
+}  // namespace evac

@@ -1,0 +1,53 @@
+#include "apps/networks/training_page.h"
+
+#include <algorithm>
+
+namespace evac {
+namespace {
+
+void ReadField(const Config& page, const train::Setting& setting) {
+  const std::string& name = setting.name;
+  std::visit(
+      [&](auto* field) {
+        using Type = std::decay_t<decltype(*field)>;
+        if constexpr (std::is_same_v<Type, std::int64_t>) {
+          const auto found = page.Get<std::uint64_t>(name);
+          page.Require(found < (std::uint64_t{1} << 40), name, "a whole number below 2^40");
+          *field = static_cast<std::int64_t>(found);
+        } else {
+          *field = page.Get<Type>(name);
+        }
+      },
+      setting.field);
+}
+
+std::string Names(const train::Settings& settings) {
+  std::string names;
+  for (const train::Setting& setting : settings) names += (names.empty() ? "" : ", ") + setting.name;
+  return names;
+}
+
+void ReadAll(const Config& page, const train::Settings& settings) {
+  for (const std::string& key : page.Keys()) {
+    const auto found = std::find_if(settings.begin(), settings.end(), [&](const auto& s) { return s.name == key; });
+    if (found == settings.end())
+      throw InvalidInput("{}: there is no such option, wanted one of: {}", page.Where(key), Names(settings));
+    ReadField(page, *found);
+  }
+}
+
+}  // namespace
+
+void ReadTrainingPage(const std::string& path, const std::string& section, const std::vector<std::string>& assignments,
+                      const train::Settings& settings) {
+  if (!path.empty()) {
+    const Config page = Config::FromFile(path);
+    page.AllowOnly({"codec", "world", "judge", "policy"});
+    if (page.Has(section)) ReadAll(page.Section(section), settings);
+  }
+  Config given = Config::FromText("{}", "--set");
+  for (const std::string& assignment : assignments) given.Set(assignment);
+  ReadAll(given, settings);
+}
+
+}  // namespace evac

@@ -1,0 +1,47 @@
+#include <fstream>
+#include <iterator>
+
+#include "apps/commands.h"
+#include "apps/network_parts.h"
+#include "apps/program_beside.h"
+
+/// Networks of a program that has none: it becomes the one that has.
+namespace evac {
+namespace {
+
+/// The command line, without the program's name.
+std::vector<std::string> Arguments() {
+  std::ifstream file("/proc/self/cmdline", std::ios::binary);
+  std::vector<std::string> words;
+  for (std::string word; std::getline(file, word, '\0');) words.push_back(word);
+  words.erase(words.begin());
+  return words;
+}
+
+[[noreturn]] void BecomeNetworks() { BecomeProgramBeside("evac-networks", Arguments()); }
+
+/// Its options, and its help, are the other program's.
+void AddBeside(CLI::App& app, const NetworkCommand& network) {
+  CLI::App* command = app.add_subcommand(network.name, network.what);
+  command->set_help_flag();
+  command->prefix_command();
+  command->callback(BecomeNetworks);
+}
+
+}  // namespace
+
+void NeedNetworks() { BecomeNetworks(); }
+
+std::unique_ptr<World> MakeEvacWorld(const SuiteWorld&, const Suite&, const Store*) { BecomeNetworks(); }
+void CheckNetwork(const SuiteEvac&) { BecomeNetworks(); }
+std::unique_ptr<Judge> MakeClassifier(const std::filesystem::path&, const Store&) { BecomeNetworks(); }
+
+void AddFidelity(CLI::App& app, ExitCode&) { AddBeside(app, kFidelityCommand); }
+void AddWeights(CLI::App& app, ExitCode&) { AddBeside(app, kWeightsCommand); }
+void AddImagine(CLI::App& app, ExitCode&) { AddBeside(app, kImagineCommand); }
+void AddTrain(CLI::App& app, ExitCode&) { AddBeside(app, kTrainCommand); }
+void AddEncode(CLI::App& app, ExitCode&) { AddBeside(app, kEncodeCommand); }
+void AddPack(CLI::App& app, ExitCode&) { AddBeside(app, kPackCommand); }
+void AddJudgeTrain(CLI::App& judge, ExitCode&) { AddBeside(judge, kJudgeTrainCommand); }
+
+}  // namespace evac
