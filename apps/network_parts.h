@@ -8,10 +8,10 @@
 #include "core/world.h"
 #include "harness/suite.h"
 
-/// The parts of `evac` that are networks, and with them libtorch, which takes half a second of a core to load. There are
-/// two of each, and the linker chooses: the program `evac-networks` has them (apps/networks); the program `evac` becomes
-/// evac-networks, with the same command line, where one is asked for (apps/networks_beside.cpp), and starts at once
-/// where none is. docs/decisions/0042.
+/// The parts of `evac` that are networks, and with them libtorch, which takes half a second of a core to load. There
+/// are two of each, and the linker chooses: the program `evac-networks` has them (apps/networks); the program `evac`
+/// becomes evac-networks, with the same command line, where one is asked for (apps/networks_beside.cpp), and starts at
+/// once where none is. docs/decisions/0042.
 namespace evac {
 
 /// For what is known to need a network, before anything was opened or written. Returns in evac-networks alone.
@@ -38,8 +38,8 @@ struct NetworkCommand {
   const char* what;
 };
 
-inline constexpr NetworkCommand kFidelityCommand{"fidelity",
-                                                 "Say how true a world model is: outcomes and pictures against reality"};
+inline constexpr NetworkCommand kFidelityCommand{
+    "fidelity", "Say how true a world model is: outcomes and pictures against reality"};
 inline constexpr NetworkCommand kWeightsCommand{"weights", "Look at, convert and make weights of the EVAC network."};
 inline constexpr NetworkCommand kImagineCommand{"imagine",
                                                 "Imagine what a camera sees when the arms do what was recorded"};
@@ -47,7 +47,8 @@ inline constexpr NetworkCommand kTrainCommand{"train",
                                               "Train the codec, the world model, the classifier judge, a policy."};
 inline constexpr NetworkCommand kEncodeCommand{"encode",
                                                "Write the latents of shards beside them, as training reads them"};
-inline constexpr NetworkCommand kPackCommand{"pack", "Turns recordings into the shards that networks are trained from."};
+inline constexpr NetworkCommand kPackCommand{"pack",
+                                             "Turns recordings into the shards that networks are trained from."};
 inline constexpr NetworkCommand kJudgeTrainCommand{
     "train", "Train a classifier for your own tasks, from clips that somebody has judged."};
 

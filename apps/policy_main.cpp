@@ -125,9 +125,7 @@ void AddLearned(CLI::App& app) {
   CLI::App* command = app.add_subcommand("learned", "Does what it learned by imitation (evac train policy).");
   command->set_help_flag();  // -h and all else is for that program
   command->prefix_command();
-  command->callback([command] {
-    BecomeProgramBeside("evac-policy-learned", command->remaining());
-  });
+  command->callback([command] { BecomeProgramBeside("evac-policy-learned", command->remaining()); });
 }
 
 }  // namespace

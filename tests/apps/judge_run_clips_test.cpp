@@ -33,7 +33,8 @@ class LabelledRun : public testing::Test {
     task.rubric.version = "1";
     store_.AddTask(task);
     store_.AddWorld({.name = "real", .type = "mujoco", .is_real = true, .profile_hash = ""});
-    for (const char* checkpoint : {"1", "2"}) store_.AddPolicy({.name = "p", .checkpoint = checkpoint, .declaration = "{}"});
+    for (const char* checkpoint : {"1", "2"})
+      store_.AddPolicy({.name = "p", .checkpoint = checkpoint, .declaration = "{}"});
     for (int state = 0; state < kStates; ++state) {
       AddClip(state, "1", true);
       AddClip(state, "2", false);

@@ -79,7 +79,8 @@ class CodedJudgeTest : public TrainJudgeTest {
  protected:
   void SetUp() override {
     TrainJudgeTest::SetUp();
-    config_ = {.channels = 32, .channel_mult = {1, 1}, .num_res_blocks = 1, .z_channels = 8, .scale_factor = 1, .patch_px = 2};
+    config_ = {
+        .channels = 32, .channel_mult = {1, 1}, .num_res_blocks = 1, .z_channels = 8, .scale_factor = 1, .patch_px = 2};
     train::CodecOptions options;
     options.job.trainer.steps = 60;
     options.job.trainer.learning_rate = 5e-3;
@@ -141,7 +142,8 @@ TEST_F(TrainJudgeTest, CalibrationSharesNoInitialStateWithLearning) {
 TEST_F(TrainJudgeTest, OutcomesOfOneKindAloneAreRefused) {
   ShardClips set(folder_ / "shards", train::Split::kTrain, nullptr);
   for (PackedClip& clip : set.clips) clip.outcome = 1;
-  EXPECT_THAT([&] { SplitForJudge(set.clips, Quick(2)); }, ThrowsMessage<Error>(HasSubstr("wanted some of both kinds")));
+  EXPECT_THAT([&] { SplitForJudge(set.clips, Quick(2)); },
+              ThrowsMessage<Error>(HasSubstr("wanted some of both kinds")));
 }
 
 TEST_F(TrainJudgeTest, APackingThatSaysNothingOfStatesIsRefused) {

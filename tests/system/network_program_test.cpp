@@ -23,10 +23,16 @@ TEST(NetworkProgram, IsTheOnlyOneThatLoadsLibtorch) {
 
 TEST(NetworkProgram, IsTheSameProgramToItsUser) {
   using Words = std::vector<std::string>;
-  for (const Words& words :
-       {Words{"--help"}, {"train", "-h"}, {"judge", "train", "--help"}, {"judge", "-h"}, {"weights"}, {"--version"},
-        {"weights", "inspect", "no such file.safetensors"}, {"weights", "inspect", ""}, {"encode", "--colour", "red"},
-        {"judge", "no such run", "--judge", "classifier", "--weights", "none.safetensors"}}) {
+  for (const Words& words : {Words{"--help"},
+                             {"train", "-h"},
+                             {"judge", "train", "--help"},
+                             {"judge", "-h"},
+                             {"weights"},
+                             {"--version"},
+                             {"weights", "inspect", "no such file.safetensors"},
+                             {"weights", "inspect", ""},
+                             {"encode", "--colour", "red"},
+                             {"judge", "no such run", "--judge", "classifier", "--weights", "none.safetensors"}}) {
     Words light = words, networks = words;
     light.insert(light.begin(), Binary("evac"));
     networks.insert(networks.begin(), Binary("evac-networks"));
