@@ -32,7 +32,7 @@ std::string NameField(const Config& page, const std::string& key) {
 void AllowOnlyFieldsOf(const std::string& type, const Config& page) {
   if (type == "evac") {
     return page.AllowOnly({"name", "type", "role", "weights", "config", "statistics", "solver", "steps", "eta", "cfg",
-                           "cfg_rescale", "period_s", "pose_map", "threads_per_scene", "quirks", "cache", "initial_states"});
+                           "cfg_rescale", "period_s", "pose_map", "products", "threads_per_scene", "quirks", "cache", "initial_states"});
   }
   page.AllowOnly({"name", "type", "role", "profile", "initial_states"});
 }

@@ -57,10 +57,10 @@ void ReadCache(const Config& page, SuiteEvac& evac) {
 
 std::string HashOf(const SuiteEvac& evac) {
   const std::string statistics = evac.statistics ? Config::FromFile(*evac.statistics).ContentHash() : "agibotworld";
-  return Sha256Hex(fmt::format("{} {} {} {} {} {} {} {} {} {} {} {}", Sha256HexOfFile(evac.weights),
+  return Sha256Hex(fmt::format("{} {} {} {} {} {} {} {} {} {} {} {}{}", Sha256HexOfFile(evac.weights),
                                Config::FromFile(evac.config).ContentHash(), statistics, evac.solver, evac.steps,
                                evac.eta, evac.cfg, evac.cfg_rescale, evac.period_s, evac.pose_map_scales,
-                               evac.all_threads_per_scene, fmt::join(evac.quirks, ",")));
+                               evac.all_threads_per_scene, fmt::join(evac.quirks, ","), evac.bf16 ? " bf16" : ""));
 }
 
 }  // namespace
@@ -76,6 +76,9 @@ SuiteEvac ReadSuiteEvac(const Config& page) {
   const std::string pose_map = page.Get<std::string>("pose_map", "absolute");
   page.Require(pose_map == "absolute" || pose_map == "scaled", "pose_map", "absolute (pixels, as published) or scaled");
   evac.pose_map_scales = pose_map == "scaled";
+  const std::string products = page.Get<std::string>("products", "float32");
+  page.Require(products == "float32" || products == "bfloat16", "products", "float32 or bfloat16");
+  evac.bf16 = products == "bfloat16";
   const std::string threads = page.Get<std::string>("threads_per_scene", "1");
   page.Require(threads == "1" || threads == "all", "threads_per_scene", "1 or all");
   evac.all_threads_per_scene = threads == "all";

@@ -23,6 +23,7 @@ struct SuiteEvac {
   double period_s = 0.1;                            ///< between two frames, as the network was trained
   bool pose_map_scales = false;                     ///< discs and axes in parts of the picture, not in pixels
   bool all_threads_per_scene = false;
+  bool bf16 = false;  ///< weights, products and the values between layers; else floats
   std::vector<std::string> quirks;                    ///< of the reference, by name (docs/evac_quirks.md)
   std::optional<std::filesystem::path> cache_folder;  ///< of imagined chunks
   double cache_limit_gb = 10;

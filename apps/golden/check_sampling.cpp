@@ -194,7 +194,7 @@ class Inference {
     // newest.
     const Tensor moved =
         at::cat({samples.narrow(2, 1, config_.memory - 1), samples.narrow(2, config_.Frames() - 1, 1)}, 2);
-    conditioning.concat.image = nn::ImageCondition(moved, config_.chunk, conditioning.concat.mask);
+    nn::Remember(model_.schedule(), moved, conditioning.concat);
     CompareConditioning(file_, Name(index, "cond."), conditioning, tolerance_, comparison_);
     Remember(index, samples);
   }

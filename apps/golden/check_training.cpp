@@ -66,7 +66,7 @@ class Training {
     concat_.pose_map =
         at::cat({at::zeros_like(maps.narrow(2, 0, config_.memory)), maps.narrow(2, config_.memory, config_.chunk)}, 2);
     concat_.mask = at::ones_like(maps.narrow(1, 0, 1));
-    concat_.image = nn::ImageCondition(latents_.narrow(2, 0, config_.memory), config_.chunk, concat_.mask);
+    nn::Remember(model_.schedule(), latents_.narrow(2, 0, config_.memory), concat_);
   }
 
   void Project() {

@@ -59,7 +59,9 @@ FirstScene FirstSceneOf(const Suite& suite, const Store* store, const std::strin
 
 std::unique_ptr<const nn::EvacModel> Load(const SuiteEvac& evac, const nn::ModelConfig& config) try {
   nn::LoadReport report;
-  auto model = std::make_unique<const nn::EvacModel>(nn::LoadModel(evac.weights, config, {}, &report));
+  nn::LoadOptions options;
+  if (evac.bf16) options = {.dtype = at::kBFloat16, .products = at::kBFloat16};
+  auto model = std::make_unique<const nn::EvacModel>(nn::LoadModel(evac.weights, config, options, &report));
   if (!report.schedule.empty())
     std::fprintf(stderr, "evac: warning: %s: %s\n", evac.weights.c_str(), report.schedule.c_str());
   return model;

@@ -60,6 +60,9 @@ TEST_F(EvacSuite, SaysWhatTheNetworkIsAndHowItImagines) {
   EXPECT_EQ(evac.cfg, 2);
   EXPECT_EQ(evac.cache_folder, "/tmp/chunks");
   EXPECT_EQ(evac.cache_limit_gb, 3);
+  EXPECT_FALSE(evac.bf16);
+  EXPECT_TRUE(Read({"worlds.0.products=bfloat16"}).worlds[0].evac->bf16);
+  EXPECT_THAT(Complaint({"worlds.0.products=half"}), AllOf(HasSubstr("products"), HasSubstr("float32 or bfloat16")));
 }
 
 TEST_F(EvacSuite, ItsHashIsOfTheFilesContentAndOfAllThatDecidesAFrame) {
@@ -69,6 +72,8 @@ TEST_F(EvacSuite, ItsHashIsOfTheFilesContentAndOfAllThatDecidesAFrame) {
   EXPECT_EQ(Read({"worlds.0.cache={folder: /tmp/chunks}"}).hash, hash) << "a cache changes nothing";
   EXPECT_NE(Read({"worlds.0.steps=9"}).hash, hash);
   EXPECT_NE(Read({"worlds.0.eta=0.5"}).hash, hash);
+  EXPECT_NE(Read({"worlds.0.products=bfloat16"}).hash, hash);
+  EXPECT_EQ(Read({"worlds.0.products=float32"}).hash, hash);
   Write("c.yaml", "# a comment\nchunk: 4\n");
   EXPECT_EQ(Read().hash, hash);
   Write("c.yaml", "chunk: 5\n");

@@ -106,6 +106,17 @@ TEST_F(Weights, AreTheNumbersThatTheNetworkComputesWith) {
   EXPECT_TRUE(at::equal(from_file.ActionTokens(deltas), from_seed.ActionTokens(deltas)));
 }
 
+TEST_F(Weights, InHalfTheBytesComputeNearlyTheSame) {
+  const at::NoGradGuard no_grad;
+  const fs::path path = Saved(7);
+  const EvacModel whole = LoadModel(path, config_),
+                  half = LoadModel(path, config_, {.dtype = at::kBFloat16, .products = at::kBFloat16});
+  const Tensor latents = Noise({1, 4, 8, 12}, 3);
+  const Tensor exact = whole.vae().Decode(latents), coarse = half.vae().Decode(latents).to(at::kFloat);
+  EXPECT_FALSE(at::equal(exact, coarse));
+  EXPECT_LT((exact - coarse).square().mean().item<double>(), 1e-3 * exact.square().mean().item<double>());
+}
+
 TEST_F(Weights, StayMappedAsLongAsATensorOfThemLives) {
   std::optional<FileWeights> source(std::in_place, Saved(), config_);
   const Tensor kept = source->Take(kOut, {4, 32, 3, 3});

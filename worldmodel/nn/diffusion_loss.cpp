@@ -1,8 +1,11 @@
 #include "worldmodel/nn/diffusion_loss.h"
 
 #include <ATen/ops/mse_loss.h>
+#include <ATen/ops/ones_like.h>
 
 #include <cmath>
+
+#include "worldmodel/nn/carried_frame.h"
 
 namespace evac::nn {
 namespace {
@@ -43,21 +46,40 @@ Tensor WithNoisyMemory(const NoiseSchedule& schedule, const Tensor& latents, con
 
 }  // namespace
 
-Tensor ImageCondition(const Tensor& memory, std::int64_t chunk, const Tensor& mask) {
+void Remember(const NoiseSchedule& schedule, const Tensor& memory, Concat& concat) {
+  const std::int64_t n = memory.size(2), chunk = concat.mask.size(2) - n;
   std::vector<std::int64_t> shape = memory.sizes().vec();
   shape[2] = chunk;
-  return at::cat({memory, memory.narrow(2, memory.size(2) - 1, 1).expand(shape)}, 2) * mask;
+  concat.image = at::cat({memory, memory.narrow(2, n - 1, 1).expand(shape)}, 2) * concat.mask;
+  if (!schedule.carry_plane_m()) return;
+  const CarriedFrame later =
+      CarryAlongPlane(memory.select(2, n - 1), concat.direction, concat.origin, n - 1, n, *schedule.carry_plane_m());
+  concat.carried = at::cat({memory, later.latents}, 2) * concat.mask;
+  concat.seen = at::cat({at::ones_like(concat.mask.narrow(2, 0, n)), later.seen}, 2) * concat.mask;
 }
 
-Tensor FromLastFrame(const NoiseSchedule& schedule, const Tensor& v, const Tensor& image, const Tensor& t) {
+Tensor NothingChanges(const NoiseSchedule& schedule, const Tensor& memory, const Tensor& direction,
+                      const Tensor& origin) {
+  const std::int64_t n = memory.size(2);
+  if (schedule.carry_plane_m())
+    return CarryAlongPlane(memory.select(2, n - 1), direction, origin, n - 1, n, *schedule.carry_plane_m()).latents;
+  std::vector<std::int64_t> shape = memory.sizes().vec();
+  shape[2] = direction.size(2) - n;
+  return memory.narrow(2, n - 1, 1).expand(shape);
+}
+
+Tensor FromLastFrame(const NoiseSchedule& schedule, const Tensor& v, const Concat& concat, const Tensor& t) {
   if (!schedule.from_last_frame()) return v;
-  return v - image * PerRow(t, 5, [&](std::int64_t step) {
-           return std::sqrt(1 - schedule.AlphaBar(step)) * schedule.Scale(step);
-         });
+  const Tensor& still = concat.carried.defined() ? concat.carried : concat.image;
+  return v - still * PerRow(t, 5, [&](std::int64_t step) {
+               return std::sqrt(1 - schedule.AlphaBar(step)) * schedule.Scale(step);
+             });
 }
 
 Tensor DenoiserInput(const Tensor& x, const Concat& concat) {
-  return at::cat({x, concat.image, concat.mask, concat.pose_map, concat.direction, concat.origin}, 1);
+  std::vector<Tensor> parts = {x, concat.image, concat.mask, concat.pose_map, concat.direction, concat.origin};
+  if (concat.carried.defined()) parts.insert(parts.end(), {concat.carried, concat.seen});
+  return at::cat(parts, 1);
 }
 
 Tensor DiffusionLoss(const UNet& unet, const NoiseSchedule& schedule, const DiffusionBatch& batch) {
@@ -65,7 +87,7 @@ Tensor DiffusionLoss(const UNet& unet, const NoiseSchedule& schedule, const Diff
   const Tensor latents =
       batch.teacher_forcing ? WithNoisyMemory(schedule, batch.latents, *batch.teacher_forcing) : batch.latents;
   Concat concat = batch.concat;
-  concat.image = ImageCondition(latents.narrow(2, 0, batch.memory), chunk, concat.mask);
+  Remember(schedule, latents.narrow(2, 0, batch.memory), concat);
   const Tensor t = batch.t.repeat_interleave(batch.context.views, 0);  // [BV]
   const Levels levels = LevelsAt(schedule, t, 5);
   const Tensor x = latents * PerRow(t, 5, [&](std::int64_t step) { return schedule.Scale(step); });
@@ -73,7 +95,7 @@ Tensor DiffusionLoss(const UNet& unet, const NoiseSchedule& schedule, const Diff
   const Tensor target = batch.noise * levels.signal - x * levels.noise;
   const Tensor seen = at::cat({x.narrow(2, 0, batch.memory), noisy.narrow(2, batch.memory, chunk)}, 2);
   const UNet::Input input{DenoiserInput(seen, concat), t, batch.context.views, batch.memory};
-  const Tensor v = FromLastFrame(schedule, unet(input, unet.Prepare(batch.context)), concat.image, t);
+  const Tensor v = FromLastFrame(schedule, unet(input, unet.Prepare(batch.context)), concat, t);
   const Tensor found = v.narrow(2, batch.memory, chunk), wanted = target.narrow(2, batch.memory, chunk);
   if (!batch.weight.defined()) return at::mse_loss(found, wanted);
   return ((found - wanted).square() * batch.weight).mean();

@@ -14,21 +14,27 @@ struct Concat {
   Tensor pose_map;   ///< [BV, z, T, h, w]: 0 in memory frames
   Tensor direction;  ///< [BV, 3, T, h, w]: unit rays, base frame
   Tensor origin;     ///< [BV, 3, T, h, w]: metres, base frame
+  /// [BV, z, T, h, w]: as `image`, but the last memory frame carried to where the camera is; undefined: it is not.
+  Tensor carried = {};
+  Tensor seen = {};  ///< [BV, 1, T, h, w]: 1 where that frame shows the place; undefined with `carried`
 };
 
-/// The memory [BV, z, N, h, w], its last frame `chunk` times more, all times `mask`. @returns [BV, z, T, h, w]
-Tensor ImageCondition(const Tensor& memory, std::int64_t chunk, const Tensor& mask);
+/// Fills in `image`, and what is carried if the schedule says so, from the memory [BV, z, N, h, w] and the rest.
+void Remember(const NoiseSchedule& schedule, const Tensor& memory, Concat& concat);
+
+/// The chunk in which nothing changes: the newest memory frame, repeated or carried. @returns [BV, z, K, h, w]
+Tensor NothingChanges(const NoiseSchedule& schedule, const Tensor& memory, const Tensor& direction,
+                      const Tensor& origin);
 
 /// [BV, in_channels, T, h, w] in the order the network was trained with.
 Tensor DenoiserInput(const Tensor& x, const Concat& concat);
 
-/// What the network's answer is added to: nothing, or, with `from_last_frame`, the v of a chunk in which the newest
-/// memory frame stands still.
-/// @param v      [BV, z, T, h, w]: the network's answer
-/// @param image  [BV, z, T, h, w]: as in Concat
-/// @param t      [BV] integers
-/// @returns      [BV, z, T, h, w]
-Tensor FromLastFrame(const NoiseSchedule& schedule, const Tensor& v, const Tensor& image, const Tensor& t);
+/// What the network's answer is added to: nothing, or, with `from_last_frame`, the v of a chunk in which nothing
+/// changes.
+/// @param v  [BV, z, T, h, w]: the network's answer
+/// @param t  [BV] integers
+/// @returns  [BV, z, T, h, w]
+Tensor FromLastFrame(const NoiseSchedule& schedule, const Tensor& v, const Concat& concat, const Tensor& t);
 
 /// Noise on the memory in training, so that the network bears with its own mistakes later.
 struct TeacherForcing {
@@ -39,7 +45,7 @@ struct TeacherForcing {
 
 struct DiffusionBatch {
   Tensor latents;  ///< [BV, z, T, h, w], clean
-  Concat concat;   ///< `image` is worked out here
+  Concat concat;   ///< what Remember fills in is worked out here
   UNet::Context context;
   Tensor t;                 ///< [B] integers
   Tensor noise;             ///< [BV, z, T, h, w]

@@ -49,9 +49,9 @@ Conditioning Condition(const EvacModel& model, const ChunkRequest& request) {
   Concat& concat = conditioning.concat;
   concat.pose_map = at::cat({at::zeros_like(request.memory), request.pose_maps}, 2);
   concat.mask = at::ones_like(concat.pose_map.narrow(1, 0, 1));
-  concat.image = ImageCondition(request.memory, request.pose_maps.size(2), concat.mask);
   concat.direction = request.direction;
   concat.origin = request.origin;
+  Remember(model.schedule(), request.memory, concat);
   conditioning.tokens = model.ContextTokens(model.ImageTokens(request.image), model.ActionTokens(request.deltas));
   if (model.config().unet.frame_actions) conditioning.frames = FrameActions(request.arms, conditioning.memory);
   return conditioning;
@@ -62,7 +62,7 @@ Conditioning Unconditioned(const EvacModel& model, const ChunkRequest& request, 
   const std::int64_t memory = request.memory.size(2), chunk = request.pose_maps.size(2);
   const Tensor& mask = conditioning.concat.mask;
   without.concat.mask = at::cat({mask.narrow(2, 0, memory), at::zeros_like(mask.narrow(2, memory, chunk))}, 2);
-  without.concat.image = ImageCondition(request.memory, chunk, without.concat.mask);
+  Remember(model.schedule(), request.memory, without.concat);
   without.tokens =
       model.ContextTokens(model.ImageTokens(at::zeros_like(request.image)), model.ActionTokens(request.deltas));
   return without;
@@ -72,14 +72,14 @@ Denoise MakeDenoise(const EvacModel& model, const Conditioning& conditioning) {
   const std::int64_t rows = conditioning.tokens.size(0), views = conditioning.views, memory = conditioning.memory;
   const auto constant = [&](std::int64_t value) { return at::full({rows / views}, value, at::kLong); };
   const at::Device device = conditioning.tokens.device();
-  PreparedContext context = model.unet().Prepare({conditioning.tokens, constant(model.config().fps).to(device),
-                                                  constant(model.config().domain).to(device), views,
-                                                  conditioning.frames});
+  PreparedContext context =
+      model.unet().Prepare({conditioning.tokens, constant(model.config().fps).to(device),
+                            constant(model.config().domain).to(device), views, conditioning.frames});
   return [&model, concat = conditioning.concat, context = std::move(context), views, rows, memory](const Tensor& x_t,
                                                                                                    std::int64_t t) {
     const Tensor steps = at::full({rows}, t, at::kLong).to(x_t.device());
     const Tensor v = model.unet()({DenoiserInput(x_t, concat), steps, views, memory}, context);
-    return FromLastFrame(model.schedule(), v, concat.image, steps);
+    return FromLastFrame(model.schedule(), v, concat, steps);
   };
 }
 

@@ -94,8 +94,14 @@ void ModelConfig::Check() const {
           image_resampler.embedding_dim, "clip.width = " + std::to_string(image_encoder.width));
   Require(action_resampler.embedding_dim >= 14 && action_resampler.embedding_dim % 2 == 0,
           "action resampler embedding_dim", action_resampler.embedding_dim, "14, or more by an even number");
-  Require(unet.in_channels == 3 * vae.z_channels + 7, "unet.in_channels", unet.in_channels,
-          "3 latents, a mask and 6 of the rays: " + std::to_string(3 * vae.z_channels + 7));
+  const std::int64_t carried = schedule.carry_plane_m ? vae.z_channels + 1 : 0,
+                     inputs = 3 * vae.z_channels + 7 + carried;
+  Require(unet.in_channels == inputs, "unet.in_channels", unet.in_channels,
+          "3 latents, a mask and 6 of the rays" +
+              std::string(carried > 0 ? ", with carry_plane_m a latent and a mask more" : "") + ": " +
+              std::to_string(inputs));
+  if (schedule.carry_plane_m && !schedule.from_last_frame)
+    throw TensorError("schedule.carry_plane_m: wanted schedule.from_last_frame: true as well");
   Require(unet.out_channels == vae.z_channels, "unet.out_channels", unet.out_channels, "vae.z_channels");
   Require(domain >= 0 && domain < unet.domains, "domain", domain, "a row of unet.domains");
   const std::int64_t multiple = vae.Stride() << (unet.channel_mult.size() - 1);

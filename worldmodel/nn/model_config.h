@@ -10,8 +10,8 @@ namespace evac::nn {
 
 /// The denoiser (EVAC, Sec. 3; a latent video UNet after DynamiCrafter).
 struct UNetConfig {
-  std::int64_t in_channels =
-      19;  ///< 4 noisy latent, 4 image latent, 1 mask, 4 pose map latent, 3 ray direction, 3 ray origin
+  std::int64_t in_channels = 19;  ///< 4 noisy latent, 4 image latent, 1 mask, 4 pose map latent, 3 ray direction, 3 ray
+                                  ///< origin; with schedule.carry_plane_m 4 carried latent, 1 seen
   std::int64_t out_channels = 4;
   std::int64_t model_channels = 320;                            ///< a multiple of 32: the groups of every normalisation
   std::vector<std::int64_t> channel_mult = {1, 2, 4, 4};        ///< one per level, finest first
@@ -79,16 +79,21 @@ struct ScheduleConfig {
   /// The network's answer is counted from the v of "nothing changes": it need not learn to copy the newest memory
   /// frame. Not in the paper; helps where training is short.
   bool from_last_frame = false;
+  /// With from_last_frame: where a camera moves, "nothing changes" is the newest memory frame carried to where the
+  /// camera will be, as if all it shows lay in the plane z = this many metres of the base frame (carried_frame.h). The
+  /// network is shown that too: z + 1 channels more. Not in the paper.
+  std::optional<double> carry_plane_m;
 };
 
 /// How pose maps are drawn (spec 2).
 struct PoseMapConfig {
-  bool scaled = false;  ///< radius and thickness in parts of the picture's height: 50 and 8 of 320. Published: in pixels
-  /// Height in metres, base frame, to which a line is drawn straight down from each gripper: which point of the table it
-  /// is above, which one camera alone does not show. Not in the paper.
+  bool scaled =
+      false;  ///< radius and thickness in parts of the picture's height: 50 and 8 of 320. Published: in pixels
+  /// Height in metres, base frame, to which a line is drawn straight down from each gripper: which point of the table
+  /// it is above, which one camera alone does not show. Not in the paper.
   std::optional<double> drop_line_m;
-  /// From the recorded pose to where the fingers meet, along the tool axis: what the disc is drawn at. AgiBot records the
-  /// flange; 0 for robots whose poses are the fingertips'.
+  /// From the recorded pose to where the fingers meet, along the tool axis: what the disc is drawn at. AgiBot records
+  /// the flange; 0 for robots whose poses are the fingertips'.
   double tool_length_m = 0.23;
 
   /// What is not as published, for files that were drawn so: " drop_line_m=0 tool_length_m=0", or nothing.

@@ -19,6 +19,7 @@ class NoiseSchedule {
   /// The factor on clean latents at step t: 1 falling to base_scale; 1 everywhere without dynamic rescaling.
   double Scale(std::int64_t t) const { return scales_[Index(t)]; }
   bool from_last_frame() const { return from_last_frame_; }
+  std::optional<double> carry_plane_m() const { return carry_plane_m_; }
 
   /// A buffer that a checkpoint carries: the key and its float values.
   struct Buffer {
@@ -38,6 +39,7 @@ class NoiseSchedule {
   std::vector<double> alphas_cumprod_, scales_;  ///< rounded to float
   std::vector<float> scale_buffer_;
   bool from_last_frame_;
+  std::optional<double> carry_plane_m_;
 };
 
 /// v-prediction (Salimans and Ho 2022): three ways to say the same of x_t = √ā x0 + √(1 - ā) ε.

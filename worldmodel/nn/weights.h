@@ -13,6 +13,8 @@ namespace evac::nn {
 struct LoadOptions {
   at::ScalarType dtype = at::kFloat;  ///< of every parameter; the same as in the file: mapped, not copied
   at::Device device = at::kCPU;
+  /// Of products, and of the values between the denoiser's layers; nothing: floats, whatever the weights' type.
+  std::optional<at::ScalarType> products = std::nullopt;
   bool with_unread = false;  ///< also give what nothing reads, for copying a file: dead keys, leftovers of CLIP
 };
 
@@ -31,6 +33,7 @@ class FileWeights final : public ParameterSource {
 
   /// Undefined for a key that nothing reads, unless asked for with `with_unread`.
   Tensor Take(const std::string& key, at::IntArrayRef shape) override;
+  std::optional<at::ScalarType> ProductType() const override { return options_.products; }
   bool Has(const std::string& key) const { return tensors_.file().Has(key); }
   const TensorFile& file() const { return tensors_.file(); }
   const LoadReport& report() const { return report_; }

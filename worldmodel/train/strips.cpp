@@ -34,12 +34,20 @@ Tensor Imagine(const nn::EvacModel& model, const WorldBatch& batch, const StripO
 
 /// The frames from the newest memory on: [V (1 + K), 3, H, W].
 Tensor Truth(const ShardSet& shards, const Window& window) {
-  const Tensor frames = shards.shards()[window.clip->shard].frames.narrow(0, window.clip->first + window.last, window.chunk + 1);
+  const Tensor frames =
+      shards.shards()[window.clip->shard].frames.narrow(0, window.clip->first + window.last, window.chunk + 1);
   return PicturesFrom(frames.transpose(0, 1).flatten(0, 1));
 }
 
-double SquaredError(const Tensor& a, const Tensor& b) { return ((a - b) / 2).square().mean().item<double>(); }
-double Psnr(double error) { return -10 * std::log10(std::max(error, 1e-12)); }
+/// Per view. @param a, b  [V, K, 3, H, W] in [-1, 1]
+Tensor SquaredErrors(const Tensor& a, const Tensor& b) { return ((a - b) / 2).square().flatten(1).mean(1); }
+
+std::vector<double> Psnr(const Tensor& errors) {
+  std::vector<double> decibel;
+  for (std::int64_t view = 0; view < errors.size(0); ++view)
+    decibel.push_back(-10 * std::log10(std::max(errors[view].item<double>(), 1e-12)));
+  return decibel;
+}
 
 /// [F, 3, H, W] → [H, some W, 3]
 Tensor Row(const Tensor& frames, std::int64_t every) {
@@ -54,16 +62,15 @@ Strips DrawStrips(const nn::EvacModel& model, const ShardSet& shards, const std:
                   const StripOptions& options) {
   const at::NoGradGuard no_gradients;
   std::vector<Tensor> rows;
-  double error = 0, copy_error = 0;
+  Tensor error = at::zeros({model.config().views}), copy_error = at::zeros({model.config().views});
   for (std::size_t i = 0; i < windows.size(); ++i) {
     const WorldBatch batch = MakeWorldBatch(shards, {windows[i]});
     const std::int64_t views = batch.views, chunk = windows[i].chunk;
     const Tensor truth = Truth(shards, windows[i]).unflatten(0, {views, chunk + 1});
-    const Tensor imagined =
-        Imagine(model, batch, options, static_cast<std::int64_t>(i)).unflatten(0, {views, chunk});
+    const Tensor imagined = Imagine(model, batch, options, static_cast<std::int64_t>(i)).unflatten(0, {views, chunk});
     const Tensor newest = truth.narrow(1, 0, 1);
-    error += SquaredError(imagined, truth.narrow(1, 1, chunk));
-    copy_error += SquaredError(newest.expand(imagined.sizes()), truth.narrow(1, 1, chunk));
+    error += SquaredErrors(imagined, truth.narrow(1, 1, chunk));
+    copy_error += SquaredErrors(newest.expand(imagined.sizes()), truth.narrow(1, 1, chunk));
     for (std::int64_t view = 0; view < views; ++view) {
       rows.push_back(Row(truth[view], options.every));
       rows.push_back(Row(at::cat({newest[view], imagined[view]}), options.every));

@@ -10,14 +10,14 @@ namespace evac::train {
 
 /// Windows imagined and set beside the truth.
 struct Strips {
-  Tensor picture;      ///< [rows, columns, 3] bytes, RGB: per window a row of truth, and one imagined below it
-  double psnr = 0;     ///< dB of the imagined frames, colours 0 … 1
-  double psnr_copy = 0;  ///< of the newest memory frame repeated
+  Tensor picture;  ///< [rows, columns, 3] bytes, RGB: per window a row of truth, and one imagined below it
+  /// One number per view, in dB, colours 0 … 1: of the imagined frames, and of the newest memory frame repeated.
+  std::vector<double> psnr, psnr_copy;
 };
 
 struct StripOptions {
-  std::int64_t steps = 6;      ///< of DPM-Solver++(2M)
-  std::int64_t every = 5;      ///< the first frame and then every so-manieth is drawn; all are measured
+  std::int64_t steps = 6;  ///< of DPM-Solver++(2M)
+  std::int64_t every = 5;  ///< the first frame and then every so-manieth is drawn; all are measured
   std::uint64_t seed = 0;
 };
 

@@ -51,7 +51,8 @@ class OnlyRead final : public nn::ParameterSource {
 
 /// One copy of the model that is trained, and its loss.
 struct WorldWorker {
-  WorldWorker(nn::ParameterSource& source, const ShardSet& shards, const nn::ModelConfig& config, const WorldOptions& options)
+  WorldWorker(nn::ParameterSource& source, const ShardSet& shards, const nn::ModelConfig& config,
+              const WorldOptions& options)
       : weights(source, options.job.bf16 ? at::kBFloat16 : at::kFloat),
         model(weights, config),
         training(model, shards, options.world) {}
@@ -95,6 +96,12 @@ std::string Number(double value) {
   return text;
 }
 
+std::string Numbers(const std::vector<double>& values) {
+  std::string text;
+  for (const double value : values) text += (text.empty() ? "" : ", ") + Number(value);
+  return text;
+}
+
 }  // namespace
 
 TrainerSummary TrainWorld(const JobPlace& place, const WorldOptions& given, const WorldStart& start,
@@ -117,8 +124,8 @@ TrainerSummary TrainWorld(const JobPlace& place, const WorldOptions& given, cons
   const WorldTraining measuring(model, holdout, options.world);
   const std::vector<Window> windows = measuring.sampler().Spread(options.job.holdout_size),
                             drawn = measuring.sampler().Spread(kStripWindows);
-  options.job.trainer.identity = IdentityOf(SettingsOf(options)) + shards.metadata().at("recipe") + " " + shards.codec() +
-                                 " workers " + std::to_string(workers.size());
+  options.job.trainer.identity = IdentityOf(SettingsOf(options)) + shards.metadata().at("recipe") + " " +
+                                 shards.codec() + " workers " + std::to_string(workers.size());
   Trainer trainer(TrainedParameters(weights, place.config, options.world), options.job.trainer, place.out);
   for (std::size_t i = 1; i < workers.size(); ++i)
     trainer.AddReplica({TrainedParameters(workers[i].weights, place.config, options.world),
@@ -126,15 +133,16 @@ TrainerSummary TrainWorld(const JobPlace& place, const WorldOptions& given, cons
   const auto draw = [&](std::int64_t step) {
     const Strips strips = DrawStrips(model, holdout, drawn, {.steps = options.strip_steps});
     if (place.say)
-      place.say("step " + std::to_string(step) + ": imagined " + Number(strips.psnr) + " dB, a frozen copy " +
-                Number(strips.psnr_copy) + " dB");
+      place.say("step " + std::to_string(step) + ": by view, imagined " + Numbers(strips.psnr) + " dB, a frozen copy " +
+                Numbers(strips.psnr_copy) + " dB");
     if (look) look(step, strips);
   };
-  const TrainerSummary summary = trainer.Run({.loss = [&](const StepPlace& at) { return workers.front().training.Loss(at); },
-                                              .holdout = [&] { return measuring.Measure(windows); },
-                                              .look = draw,
-                                              .interrupted = place.interrupted,
-                                              .on_progress = place.on_progress});
+  const TrainerSummary summary =
+      trainer.Run({.loss = [&](const StepPlace& at) { return workers.front().training.Loss(at); },
+                   .holdout = [&] { return measuring.Measure(windows); },
+                   .look = draw,
+                   .interrupted = place.interrupted,
+                   .on_progress = place.on_progress});
   if (!summary.IsDone()) return summary;
   trainer.WithBest([&] {
     Save(place.out / "weights.safetensors", weights, place.config,

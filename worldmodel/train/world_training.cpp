@@ -103,13 +103,17 @@ Tensor WorldTraining::TokensOf(const WorldBatch& batch) const {
 
 /// [BV, 1, K, h, w], mean 1: by place, and by the step's noise.
 Tensor WorldTraining::Weight(const WorldBatch& batch, const Tensor& t) const {
-  const std::int64_t n = batch.memory, chunk = batch.latents.size(2) - n, h = batch.latents.size(3), w = batch.latents.size(4);
+  const std::int64_t n = batch.memory, chunk = batch.latents.size(2) - n, h = batch.latents.size(3),
+                     w = batch.latents.size(4);
   Tensor weight = at::ones({batch.latents.size(0), 1, chunk, h, w});
   const Tensor frames = batch.latents.narrow(2, n, chunk);
   if (options_.change_weight > 0)
-    weight += options_.change_weight * (frames - batch.latents.narrow(2, n - 1, 1)).abs().mean(1, true);
+    weight += options_.change_weight * (frames - nn::NothingChanges(model_.schedule(), batch.latents.narrow(2, 0, n),
+                                                                    batch.direction, batch.origin))
+                                           .abs()
+                                           .mean(1, true);
   if (options_.object_weight > 0) {
-    const Tensor object = batch.object.narrow(2, n, chunk);  // [BV, 2, K]
+    const Tensor object = batch.object.narrow(2, n, chunk);                                // [BV, 2, K]
     const Tensor x = at::arange(w, at::kFloat) + 0.5 - object.select(1, 0).unsqueeze(-1);  // [BV, K, w]
     const Tensor y = at::arange(h, at::kFloat) + 0.5 - object.select(1, 1).unsqueeze(-1);
     const Tensor distance = x.square().unsqueeze(2) + y.square().unsqueeze(3);  // [BV, K, h, w]
@@ -150,13 +154,13 @@ Tensor WorldTraining::LossOf(const WorldBatch& given, const Drops& drops, const 
     std::vector<float> angles;
     for (std::int64_t i = 0; i < rows * n; ++i) angles.push_back(static_cast<float>(dice.Uniform(-1.57, 1.57)));
     std::vector<std::int64_t> shape = {rows * n, batch.latents.size(1), batch.latents.size(3), batch.latents.size(4)};
-    step.teacher_forcing = nn::TeacherForcing{at::tensor(angles).reshape({rows, n}), 3 + dice.Below(18), dice.Normal(shape)};
+    step.teacher_forcing =
+        nn::TeacherForcing{at::tensor(angles).reshape({rows, n}), 3 + dice.Below(18), dice.Normal(shape)};
   } else if (noisy_memory) {
     std::vector<float> deviations;
     for (std::int64_t i = 0; i < rows; ++i)
-      deviations.push_back(dice.Chance(options_.memory_noise_share)
-                               ? static_cast<float>(dice.Uniform(0, options_.memory_noise))
-                               : 0.0F);
+      deviations.push_back(
+          dice.Chance(options_.memory_noise_share) ? static_cast<float>(dice.Uniform(0, options_.memory_noise)) : 0.0F);
     step.latents = batch.latents.clone();
     Tensor memory = step.latents.narrow(2, 0, n);
     memory.add_(dice.Normal(memory.sizes()) * PerRow(deviations, 5));
@@ -169,14 +173,15 @@ Tensor WorldTraining::ImagineOnce(const WorldBatch& batch, Dice& dice) const {
   const std::int64_t n = batch.memory, chunk = batch.latents.size(2) - n, last = model_.schedule().steps() - 1;
   const Tensor memory = batch.latents.narrow(2, 0, n);
   const Tensor mask = at::ones_like(batch.latents.narrow(1, 0, 1));
-  const nn::Concat concat{nn::ImageCondition(memory, chunk, mask), mask, batch.pose_maps, batch.direction, batch.origin};
+  nn::Concat concat{{}, mask, batch.pose_maps, batch.direction, batch.origin};
+  nn::Remember(model_.schedule(), memory, concat);
   const Tensor noise = dice.Normal(batch.latents.sizes());
   const double scale = model_.schedule().Scale(last);
   const Tensor x = at::cat({memory * scale, noise.narrow(2, n, chunk)}, 2);
   const Tensor t = at::full({batch.latents.size(0)}, last, at::kLong);
   const nn::UNet::Input input{nn::DenoiserInput(x, concat), t, batch.views, n};
   const Tensor answer = model_.unet()(input, model_.unet().Prepare(ContextOf(TokensOf(batch), batch)));
-  const Tensor v = nn::FromLastFrame(model_.schedule(), answer, concat.image, t);
+  const Tensor v = nn::FromLastFrame(model_.schedule(), answer, concat, t);
   return nn::CleanFrom(x, v, model_.schedule().AlphaBar(last)).narrow(2, n, chunk) / scale;
 }
 
@@ -210,7 +215,8 @@ void WorldTraining::RememberOwn(const std::vector<Window>& windows, WorldBatch& 
 }
 
 Tensor WorldTraining::Loss(const StepPlace& place) const {
-  Dice windows_dice(place, kWindows), steps(place, kSteps), dropouts(place, kDropouts), noise(place, kNoise), self(place, kSelf);
+  Dice windows_dice(place, kWindows), steps(place, kSteps), dropouts(place, kDropouts), noise(place, kNoise),
+      self(place, kSelf);
   std::vector<Window> windows;
   std::vector<std::int64_t> t;
   for (std::int64_t i = 0; i < options_.batch; ++i) {
