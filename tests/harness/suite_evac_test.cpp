@@ -73,7 +73,6 @@ TEST_F(EvacSuite, ItsHashIsOfTheFilesContentAndOfAllThatDecidesAFrame) {
   EXPECT_NE(Read({"worlds.0.steps=9"}).hash, hash);
   EXPECT_NE(Read({"worlds.0.eta=0.5"}).hash, hash);
   EXPECT_NE(Read({"worlds.0.products=bfloat16"}).hash, hash);
-  EXPECT_EQ(Read({"worlds.0.products=float32"}).hash, hash);
   Write("c.yaml", "# a comment\nchunk: 4\n");
   EXPECT_EQ(Read().hash, hash);
   Write("c.yaml", "chunk: 5\n");
