@@ -9,6 +9,7 @@
 #include <thread>
 
 #include "apps/interrupts.h"
+#include "apps/network_parts.h"
 #include "apps/rate_resolve.h"
 #include "apps/rate_status.h"
 #include "apps/rate_tables.h"
@@ -31,6 +32,7 @@ std::int64_t Now_ms() {
 
 struct RateArguments {
   std::string study, file, role = "rater", url, csv, jsonl;
+  std::string round_trip, config;
   int count = 1;
   bool as_json = false;
   StudyOptions make{};
@@ -40,6 +42,12 @@ struct RateArguments {
 
 void New(RateArguments& arguments) {
   StudyOptions options = arguments.make;
+  if (arguments.round_trip.empty() != arguments.config.empty())
+    throw InvalidInput("--vae-roundtrip WEIGHTS and --config PAGE go together: found one of the two");
+  if (!arguments.round_trip.empty()) {
+    NeedNetworks();
+    options.round_trip = CodecRoundTrip(arguments.round_trip, arguments.config);
+  }
   options.evac_version = kProgram;
   const StudyMade made = MakeStudy(arguments.study, options, [](std::size_t done, std::size_t of) {
     fmt::print(stderr, "\r{} of {} clips", done, of);
@@ -133,6 +141,9 @@ void AddNew(CLI::App& rate, const std::shared_ptr<RateArguments>& shared, ExitCo
       ->capture_default_str();
   command->add_option("--height", a.make.height_px, "of the first view as raters see it, pixels")
       ->capture_default_str();
+  command->add_option("--vae-roundtrip", a.round_trip,
+                      "weights of a world model: clips that it did not imagine are shown as its codec gives them back");
+  command->add_option("--config", a.config, "that world model's page");
   command->add_option("--gold-from", a.make.gold_from,
                       "a judge whose verdicts are known to be right: examples, practice and gold clips");
 }

@@ -7,6 +7,7 @@
 #include "core/store.h"
 #include "core/world.h"
 #include "harness/suite.h"
+#include "judges/rating_clip.h"
 
 /// The parts of `evac` that are networks, and with them libtorch, which takes half a second of a core to load. There
 /// are two of each, and the linker chooses: the program `evac-networks` has them (apps/networks); the program `evac`
@@ -31,6 +32,12 @@ void CheckNetwork(const SuiteEvac& evac);
 
 /// The classifier judge of a run. @throws InvalidInput if the weights are none of its, or do not know the run's tasks.
 std::unique_ptr<Judge> MakeClassifier(const std::filesystem::path& weights, const Store& store);
+
+/// Pictures as a world model's codec gives them back.
+/// @param weights  of the codec, alone or in a checkpoint
+/// @param config   the network's page
+/// @throws InvalidInput or TensorError if the two are not of one codec, or either is broken.
+ClipRoundTrip CodecRoundTrip(const std::filesystem::path& weights, const std::filesystem::path& config);
 
 /// A subcommand as `evac -h` lists it; declared in commands.h, defined with the networks.
 struct NetworkCommand {

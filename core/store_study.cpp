@@ -153,7 +153,8 @@ void StudyStore::Mark() { database_->connection.Run("SAVEPOINT one"); }
 void StudyStore::Release() { database_->connection.Run("RELEASE one"); }
 void StudyStore::Undo() { database_->connection.RunScript("ROLLBACK TO one; RELEASE one"); }
 
-std::string StudyStore::AddWave(std::span<const StudyClip> clips, std::span<const StudyRubric> rubrics) {
+std::string StudyStore::AddWave(std::span<const StudyClip> clips, std::span<const StudyRubric> rubrics,
+                                const std::string& codec_sha256) {
   sqlite::Connection& connection = database_->connection;
   const int wave = Waves() + 1;
   std::string list;
@@ -161,6 +162,7 @@ std::string StudyStore::AddWave(std::span<const StudyClip> clips, std::span<cons
   const std::string hash = Sha256Hex(list);
   sqlite::Transaction transaction(connection);
   connection.Run("INSERT INTO waves VALUES (?, ?)", wave, hash);
+  if (!codec_sha256.empty()) connection.Run("INSERT INTO round_trips VALUES (?, ?)", wave, codec_sha256);
   for (const StudyRubric& rubric : rubrics)
     connection.Run("INSERT OR IGNORE INTO rubrics VALUES (?, ?, ?)", rubric.hash, rubric.task, rubric.document);
   for (const StudyClip& clip : clips) {
@@ -176,6 +178,13 @@ std::string StudyStore::AddWave(std::span<const StudyClip> clips, std::span<cons
   }
   transaction.Commit();
   return hash;
+}
+
+std::string StudyStore::Codec() const {
+  sqlite::Connection& connection = database_->connection;
+  if (Pragma(connection, "SELECT count(*) FROM sqlite_schema WHERE name = 'round_trips'") == 0) return {};
+  sqlite::Statement row = connection.Query("SELECT codec_sha256 FROM round_trips ORDER BY wave LIMIT 1");
+  return row.Step() ? row.Text(0) : std::string();
 }
 
 int StudyStore::Waves() const { return static_cast<int>(Pragma(database_->connection, "SELECT count(*) FROM waves")); }

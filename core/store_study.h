@@ -148,7 +148,11 @@ class StudyStore {
 
   // ---- what is rated
   /// All of them or none. @returns the wave's list hash: SHA-256 over its clips in their order.
-  std::string AddWave(std::span<const StudyClip> clips, std::span<const StudyRubric> rubrics);
+  /// @param codec_sha256  of the codec that clips of worlds not imagined were put through; empty: through none
+  std::string AddWave(std::span<const StudyClip> clips, std::span<const StudyRubric> rubrics,
+                      const std::string& codec_sha256 = "");
+  /// Of the first wave.
+  std::string Codec() const;
   int Waves() const;
   std::vector<StudyClip> Clips() const;
   StudyClip Clip(std::int64_t id) const;

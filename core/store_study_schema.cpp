@@ -79,6 +79,7 @@ PRAGMA user_version = 1;
 
 /// A rater's next clip, who holds one, how far a rater is: each read from an index of just those rows.
 const char* const kStudyIndexes = R"sql(
+CREATE TABLE IF NOT EXISTS round_trips (wave INTEGER PRIMARY KEY REFERENCES waves (number), codec_sha256 TEXT NOT NULL);
 CREATE INDEX IF NOT EXISTS presentations_to_finish ON presentations (rater, order_index)
   WHERE state = 'open' AND shown_ms IS NOT NULL;
 CREATE INDEX IF NOT EXISTS presentations_to_come ON presentations (rater, order_index)

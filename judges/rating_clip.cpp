@@ -17,7 +17,8 @@ namespace {
 int Even(double value) { return std::max(2, 2 * static_cast<int>(std::lround(value / 2))); }
 
 /// One picture of the source as raters see it.
-cv::Mat Shown(const cv::Mat& source, const Task& task, const ClipLayout& layout, const ClipFormat& format) {
+cv::Mat Shown(const cv::Mat& source, const Task& task, const ClipLayout& layout, const ClipFormat& format,
+              const ClipRoundTrip& round_trip) {
   cv::Mat picture(format.height_px, format.width_px, CV_8UC3, cv::Scalar::all(0));
   const int left = (format.width_px - layout.width_px) / 2, top = (format.height_px - layout.height_px) / 2;
   double width_px = 0;
@@ -31,8 +32,13 @@ cv::Mat Shown(const cv::Mat& source, const Task& task, const ClipLayout& layout,
                         std::min(static_cast<int>(std::lround(camera.height_px * scale)), source.rows));
     const ViewPlace& view = layout.views[i];
     cv::Mat into = picture(cv::Rect(left + view.x_px, top + view.y_px, view.width_px, view.height_px));
-    const bool shrinks = view.width_px < from.width;
-    cv::resize(source(from), into, into.size(), 0, 0, shrinks ? cv::INTER_AREA : cv::INTER_CUBIC);
+    cv::Mat seen = source(from);
+    if (round_trip.show) {
+      cv::resize(seen, seen, {camera.width_px, camera.height_px}, 0, 0, cv::INTER_AREA);
+      seen = round_trip.show(seen);
+    }
+    const bool shrinks = view.width_px < seen.cols;
+    cv::resize(seen, into, into.size(), 0, 0, shrinks ? cv::INTER_AREA : cv::INTER_CUBIC);
     at += camera.width_px;
   }
   return picture;
@@ -85,14 +91,14 @@ std::string ViewsJson(const ClipLayout& layout, int width_px, int height_px) {
 }
 
 int EncodeClip(const std::filesystem::path& source, const Task& task, const ClipLayout& layout,
-               const ClipFormat& format, const std::filesystem::path& target) {
+               const ClipFormat& format, const ClipRoundTrip& round_trip, const std::filesystem::path& target) {
   VideoReader reader(source);
   CheckWidth(reader, task, source);
   VideoWriter writer(target, {.period_s = format.period_s, .crf = format.crf});
   int frames = 0;
   for (cv::Mat frame = reader.Next(); !frame.empty(); frame = reader.Next()) {
     const double until_s = reader.time_s() + task.period_s;
-    const cv::Mat picture = Shown(frame, task, layout, format);
+    const cv::Mat picture = Shown(frame, task, layout, format, round_trip);
     for (; frames * format.period_s < until_s - 1e-6; ++frames) writer.Append(picture);
   }
   if (frames == 0) throw InvalidInput("{}: has no frames", source.string());

@@ -2,6 +2,8 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <functional>
+#include <opencv2/core.hpp>
 #include <string>
 #include <vector>
 
@@ -35,10 +37,17 @@ struct ClipFormat {
   int crf = 23;
 };
 
+/// What pictures that no world model drew are put through before they are shown: the world model's own codec, because
+/// its softness would give the imagined ones away.
+struct ClipRoundTrip {
+  std::string codec_sha256 = {};                             ///< empty: pictures are shown as they are
+  std::function<cv::Mat(const cv::Mat& picture)> show = {};  ///< RGB of a camera's size → the same size
+};
+
 /// Encodes one episode's video (views side by side, as `evac run` leaves it) for raters. @returns the number of frames.
 /// @throws Error naming the file if it is damaged, or its width is not its cameras'.
 int EncodeClip(const std::filesystem::path& source, const Task& task, const ClipLayout& layout,
-               const ClipFormat& format, const std::filesystem::path& target);
+               const ClipFormat& format, const ClipRoundTrip& round_trip, const std::filesystem::path& target);
 
 /// Makes a file `bytes` long with an mp4 box that players skip, so that its length tells nothing.
 /// @throws InternalError if it is longer already.

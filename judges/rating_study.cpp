@@ -25,6 +25,7 @@ struct Candidate {
   StudyClip clip;
   fs::path video;
   Task task;
+  bool is_imagined = false;
 };
 
 void Check(const StudyOptions& options) {
@@ -77,7 +78,7 @@ class Collector {
     const Store store = Store::Open(run, Store::Mode::kReadOnly);
     std::map<std::string, Task> tasks;
     for (const Task& task : store.Tasks()) tasks[task.id] = task;
-    for (const WorldInfo& world : store.Worlds()) is_real_[world.name] = world.is_real;
+    for (const WorldInfo& world : store.Worlds()) worlds_[world.name] = world;
     const std::vector<Episode> episodes = store.Episodes();
     const auto drawn = DrawnStates(episodes, options_);
     const auto verdicts = store.CurrentVerdicts();
@@ -107,7 +108,9 @@ class Collector {
            const std::map<std::string, std::map<std::string, Verdict>>& verdicts) {
     const StudyRubric rubric = RubricOf(task);
     rubrics[rubric.hash] = rubric;
-    Candidate candidate{ClipOf(episode, run, is_real_[episode.key.world], rubric.hash), run / episode.video, task};
+    const WorldInfo& world = worlds_[episode.key.world];
+    Candidate candidate{ClipOf(episode, run, world.is_real, rubric.hash), run / episode.video, task,
+                        world.type == "evac"};
     const auto of_episode = verdicts.find(episode.key.Id());
     if (!options_.gold_from.empty() && of_episode != verdicts.end()) {
       const auto known = of_episode->second.find(options_.gold_from);
@@ -121,7 +124,7 @@ class Collector {
   }
 
   const StudyOptions& options_;
-  std::map<std::string, bool> is_real_;
+  std::map<std::string, WorldInfo> worlds_;
 };
 
 /// How many clips are taken for what, in this order: never more than a quarter of all for one use.
@@ -167,7 +170,8 @@ struct Encoded {
   std::uintmax_t longest = 0;
 };
 
-Encoded EncodeAll(std::vector<Candidate>& candidates, const StudyInfo& info, int height_px, const fs::path& folder,
+Encoded EncodeAll(std::vector<Candidate>& candidates, const StudyInfo& info, int height_px,
+                  const ClipRoundTrip& round_trip, const fs::path& folder,
                   const std::function<void(std::size_t, std::size_t)>& progress) {
   MakeFolders(folder / "clips");
   Encoded encoded;
@@ -177,7 +181,8 @@ Encoded EncodeAll(std::vector<Candidate>& candidates, const StudyInfo& info, int
     StudyClip clip = candidate.clip;
     clip.file = "clips/" + NewSecret() + ".mp4";
     clip.views = ViewsJson(layout, info.width_px, info.height_px);
-    clip.frames = EncodeClip(candidate.video, candidate.task, layout, format, folder / clip.file);
+    clip.frames = EncodeClip(candidate.video, candidate.task, layout, format,
+                             candidate.is_imagined ? ClipRoundTrip{} : round_trip, folder / clip.file);
     encoded.longest = std::max(encoded.longest, fs::file_size(folder / clip.file));
     encoded.clips.push_back(std::move(clip));
     progress(encoded.clips.size(), candidates.size());
@@ -200,6 +205,15 @@ StudyInfo InfoFor(const std::vector<Candidate>& candidates, const StudyOptions& 
     info.period_s = std::min(info.period_s, candidate.task.period_s);
   }
   return info;
+}
+
+void CheckSameRoundTrip(const StudyStore& store, const ClipRoundTrip& round_trip, const fs::path& folder) {
+  const auto named = [](const std::string& codec) {
+    return codec.empty() ? std::string("through none") : fmt::format("through the codec {:.12}…", codec);
+  };
+  if (store.Codec() == round_trip.codec_sha256) return;
+  throw InvalidInput("{}: its clips went {}, those of a new wave must go the same way; found {} (--vae-roundtrip)",
+                     folder.string(), named(store.Codec()), named(round_trip.codec_sha256));
 }
 
 void LeaveOutWhatIsThere(std::vector<Candidate>& candidates, const StudyStore& store) {
@@ -237,9 +251,11 @@ StudyMade MakeStudy(const fs::path& folder, const StudyOptions& options,
     store = StudyStore::Open(folder, StudyStore::Mode::kReadWrite);
     LeaveOutWhatIsThere(candidates, *store);
     if (candidates.empty()) throw InvalidInput("{}: every clip of these runs is in it already", folder.string());
+    CheckSameRoundTrip(*store, options.round_trip, folder);
   }
   const StudyInfo info = is_new ? InfoFor(candidates, options, folder) : store->info();
-  Encoded encoded = EncodeAll(candidates, info, std::min(options.height_px, info.height_px), folder, progress);
+  Encoded encoded =
+      EncodeAll(candidates, info, std::min(options.height_px, info.height_px), options.round_trip, folder, progress);
   constexpr std::uintmax_t kRound = 1 << 16;  // of one wave all are of one length, of several nearly
   const std::uintmax_t bytes = (encoded.longest + 8 + kRound - 1) / kRound * kRound;
   StudyMade made;
@@ -254,7 +270,7 @@ StudyMade MakeStudy(const fs::path& folder, const StudyOptions& options,
   std::vector<StudyRubric> rubrics;
   for (const auto& [hash, rubric] : collector.rubrics) rubrics.push_back(rubric);
   if (is_new) store = StudyStore::Create(folder, info);
-  made.list_hash = store->AddWave(encoded.clips, rubrics);
+  made.list_hash = store->AddWave(encoded.clips, rubrics, options.round_trip.codec_sha256);
   made.left_out = collector.left_out;
   return made;
 }

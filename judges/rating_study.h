@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "core/store_study.h"
+#include "judges/rating_clip.h"
 
 namespace evac {
 
@@ -23,6 +24,7 @@ struct StudyOptions {
   int practice = 8;          ///< clips with feedback, if there is gold; their answers count nowhere
   double gold_share = 0.06;  ///< of the clips, at least `min_gold`, at most a quarter
   int min_gold = 12;
+  ClipRoundTrip round_trip = {};  ///< of clips from worlds that are not imagined; the same for all waves of a study
   std::string evac_version = {};
 };
 
@@ -35,7 +37,8 @@ struct StudyMade {
 /// Freezes the episodes of runs that have a video into a study: encodes every clip anew (rating_clip.h), gives it a
 /// name that says nothing, and writes the list. A study that is there gets another wave with what it does not hold yet.
 /// @param progress  called after every clip with how many are done, of how many.
-/// @throws InvalidInput if a run is not there, no episode has a video, or an option is out of range.
+/// @throws InvalidInput if a run is not there, no episode has a video, an option is out of range, or earlier waves were
+/// put through another codec, or through none.
 StudyMade MakeStudy(const std::filesystem::path& folder, const StudyOptions& options,
                     const std::function<void(std::size_t, std::size_t)>& progress);
 

@@ -8,7 +8,9 @@
 #include "core/error.h"
 #include "core/file.h"
 #include "core/video.h"
+#include "judges/rating_study.h"
 #include "tests/judges/rating_support.h"
+#include "tests/reports/stored_run.h"
 
 namespace evac {
 namespace {
@@ -63,11 +65,60 @@ TEST(RatingClip, ASourceOfAnotherRateKeepsItsTime) {
   writer.Finish();
   const ClipLayout layout = LayoutOf(task.cameras, 48);
   EXPECT_EQ(
-      EncodeClip(folder / "slow.mp4", task, layout, {layout.width_px, layout.height_px, 0.1}, folder / "fast.mp4"), 20);
+      EncodeClip(folder / "slow.mp4", task, layout, {layout.width_px, layout.height_px, 0.1}, {}, folder / "fast.mp4"),
+      20);
   const auto frames = ReadAllFrames(folder / "fast.mp4");
   ASSERT_EQ(frames.size(), 20u);
   EXPECT_NEAR(frames[19].at<cv::Vec3b>(20, 20)[0], 180, 6);
   EXPECT_NEAR(frames[10].at<cv::Vec3b>(20, 20)[0], 100, 6);
+}
+
+TEST(RatingClip, EachViewGoesThroughTheCodecInItsCamerasSize) {
+  TempFolder folder;
+  Task task;
+  task.cameras = {OfSize("head", 64, 48), OfSize("hand", 32, 48)};
+  VideoWriter writer(folder / "wide.mp4", {});  // each pixel twice
+  cv::Mat frame(96, 192, CV_8UC3, cv::Scalar::all(40));
+  frame.colRange(128, 192).setTo(cv::Scalar::all(200));
+  for (int k = 0; k < 3; ++k) writer.Append(frame);
+  writer.Finish();
+  const ClipLayout layout = LayoutOf(task.cameras, 96);
+  std::vector<cv::Size> sizes;
+  const ClipRoundTrip negative{"codec", [&](const cv::Mat& picture) {
+                                 sizes.push_back(picture.size());
+                                 return cv::Mat(cv::Scalar::all(255) - picture);
+                               }};
+  EncodeClip(folder / "wide.mp4", task, layout, {layout.width_px, layout.height_px, 0.1}, negative,
+             folder / "shown.mp4");
+  ASSERT_EQ(sizes.size(), 6u);
+  EXPECT_EQ(sizes[0], cv::Size(64, 48));
+  EXPECT_EQ(sizes[1], cv::Size(32, 48));
+  const cv::Mat shown = ReadAllFrames(folder / "shown.mp4").at(1);
+  EXPECT_NEAR(shown.at<cv::Vec3b>(20, 20)[0], 215, 6);
+  EXPECT_NEAR(shown.at<cv::Vec3b>(20, layout.views[1].x_px + 10)[0], 55, 6);
+}
+
+TEST(RatingClip, OnlyWhatNoWorldModelDrewGoesThroughItsCodecAndEveryWaveTheSameWay) {
+  StoredRun run("mixed", "sf", "fs");
+  run.store().AddWorld({"dream", "evac", false, "network"});
+  run.AddEpisode({{"take", "41-0000", "pick", "1", 1}, "dream"}, 's');
+  std::size_t pictures = 0, frames = 0;
+  StudyOptions options{.runs = {run.folder()}, .height_px = 64};
+  options.round_trip = {"c0dec", [&](const cv::Mat& picture) { return ++pictures, picture.clone(); }};
+  const std::filesystem::path folder = run.folder().parent_path() / "study";
+  MakeStudy(folder, options, [](std::size_t, std::size_t) {});
+  const StudyStore study = StudyStore::Open(folder, StudyStore::Mode::kReadOnly);
+  EXPECT_EQ(study.Codec(), "c0dec");
+  for (const StudyClip& clip : study.Clips())
+    frames += clip.world == "dream" ? 0 : static_cast<std::size_t>(clip.frames);
+  EXPECT_EQ(study.Clips().size(), 5u);
+  EXPECT_EQ(pictures, frames);
+
+  run.Add("41-0007", 's', 's');
+  options.round_trip = {};
+  EXPECT_THAT([&] { MakeStudy(folder, options, [](std::size_t, std::size_t) {}); },
+              testing::ThrowsMessage<Error>(testing::HasSubstr("its clips went through the codec c0dec")));
+  EXPECT_EQ(study.Waves(), 1);
 }
 
 TEST(RatingClip, PaddingLeavesTheClipPlayable) {

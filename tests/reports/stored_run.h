@@ -37,6 +37,30 @@ class StoredRun {
     AddEpisode({{"take", state, "pick", "1", 1}, "sim"}, sim);
   }
 
+  void AddEpisode(const EpisodeKey& key, char outcome) {
+    EpisodeRecord record;
+    record.episode.key = key;
+    record.episode.chunks = 4;
+    record.episode.stop = StopReason::kMaxChunks;
+    record.episode.stop_reason = "4 of 4 chunks executed";
+    VideoWriter writer(store_.VideoPath(key), {});
+    const int frames = key.world == "real" ? frames_ : frames_ + frames_ / 4;  // never of one length
+    for (int time = 0; time < frames; ++time) writer.Append(Frame(time, key));
+    record.video = writer.Finish();
+    std::vector<unsigned char> jpeg;
+    cv::imencode(".jpg", Frame(0, key), jpeg);
+    record.thumbnail_jpeg.assign(jpeg.begin(), jpeg.end());
+    store_.Add(record);
+    Verdict verdict;
+    verdict.episode_id = key.Id();
+    verdict.judge = "oracle";
+    verdict.label = outcome == 's' ? Label::kSuccess : Label::kFailure;
+    verdict.stages = {{"reach", true}, {"grasp", outcome == 's'}};
+    verdict.reason = outcome == 's' ? "grasped at 1.5 s" : "never grasped; nearest 0.04 m";
+    verdict.rubric_version = rubric_;
+    store_.AddVerdict(verdict);
+  }
+
  private:
   static Task TakeTask(const std::string& rubric) {
     Task task;
@@ -64,30 +88,6 @@ class StoredRun {
     cv::Mat rgb(48, 64, CV_8UC3, key.world == "real" ? cv::Scalar(40, 90, 60) : cv::Scalar(40, 60, 120));
     rgb.colRange(time % 60, time % 60 + 4).setTo(cv::Scalar(255, 255, 255));
     return rgb;
-  }
-
-  void AddEpisode(const EpisodeKey& key, char outcome) {
-    EpisodeRecord record;
-    record.episode.key = key;
-    record.episode.chunks = 4;
-    record.episode.stop = StopReason::kMaxChunks;
-    record.episode.stop_reason = "4 of 4 chunks executed";
-    VideoWriter writer(store_.VideoPath(key), {});
-    const int frames = key.world == "real" ? frames_ : frames_ + frames_ / 4;  // never of one length
-    for (int time = 0; time < frames; ++time) writer.Append(Frame(time, key));
-    record.video = writer.Finish();
-    std::vector<unsigned char> jpeg;
-    cv::imencode(".jpg", Frame(0, key), jpeg);
-    record.thumbnail_jpeg.assign(jpeg.begin(), jpeg.end());
-    store_.Add(record);
-    Verdict verdict;
-    verdict.episode_id = key.Id();
-    verdict.judge = "oracle";
-    verdict.label = outcome == 's' ? Label::kSuccess : Label::kFailure;
-    verdict.stages = {{"reach", true}, {"grasp", outcome == 's'}};
-    verdict.reason = outcome == 's' ? "grasped at 1.5 s" : "never grasped; nearest 0.04 m";
-    verdict.rubric_version = rubric_;
-    store_.AddVerdict(verdict);
   }
 
   TempFolder parent_;

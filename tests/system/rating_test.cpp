@@ -5,10 +5,15 @@
 #include <filesystem>
 #include <fstream>
 #include <nlohmann/json.hpp>
+#include <opencv2/core.hpp>
 
+#include "core/hash.h"
 #include "core/store_study.h"
+#include "core/video.h"
 #include "tests/reports/stored_run.h"
 #include "tests/support/command.h"
+#include "worldmodel/evac_config.h"
+#include "worldmodel/nn/weights.h"
 
 /// `evac rate` as a lab runs it, and the page in real browsers: tests/system/browser/rating_page.py says what is tried.
 namespace evac::system_test {
@@ -81,6 +86,32 @@ TEST(RatingSession, ASheetComesInAndLabelsGoBackIntoTheRun) {
   EXPECT_EQ(calibrated.exit_code, 3) << calibrated.err << "two clips are too few to say";
   const auto lines = Rate({"export", study, "--jsonl", "-"}).out;
   EXPECT_EQ(nlohmann::json::parse(lines.substr(0, lines.find('\n'))).at("note"), "clean, quick");
+}
+
+TEST(RatingSession, ClipsThatWereNotImaginedAreShownAsTheWorldModelsCodecGivesThemBackIfAskedFor) {
+  const StoredRun run("soft", "sf", "fs");
+  const auto beside = [&](const char* name) { return (run.folder().parent_path() / name).string(); };
+  const std::string weights = beside("small.safetensors"), config = EVAC_SOURCE_DIR "/tests/system/evac_small.yaml";
+  nn::RandomWeights random(5);
+  nn::SaveWeights(weights, random, ReadEvacConfig(config));
+  ASSERT_EQ(Rate({"new", beside("crisp"), "--run", run.folder().string(), "--height", "64"}).exit_code, 0);
+  const CommandResult made = Rate({"new", beside("soft_study"), "--run", run.folder().string(), "--height", "64",
+                                   "--vae-roundtrip", weights, "--config", config});
+  ASSERT_EQ(made.exit_code, 0) << made.err;
+  const auto first = [&](const char* name) {
+    const StudyStore study = StudyStore::Open(beside(name), StudyStore::Mode::kReadOnly);
+    return ReadAllFrames(std::filesystem::path(beside(name)) / study.Clips().front().file).front();
+  };
+  const cv::Mat crisp = first("crisp"), soft = first("soft_study");
+  ASSERT_EQ(crisp.size(), soft.size());
+  EXPECT_GT(cv::norm(crisp, soft, cv::NORM_L1) / static_cast<double>(crisp.total() * 3), 5)
+      << "random weights show something else";
+  EXPECT_EQ(StudyStore::Open(beside("soft_study"), StudyStore::Mode::kReadOnly).Codec(), Sha256HexOfFile(weights));
+  EXPECT_EQ(Rate({"new", beside("half"), "--run", run.folder().string(), "--vae-roundtrip", weights}).exit_code, 2);
+  const CommandResult other =
+      Rate({"new", beside("other"), "--run", run.folder().string(), "--vae-roundtrip", config, "--config", config});
+  EXPECT_EQ(other.exit_code, 2) << other.err;
+  EXPECT_FALSE(std::filesystem::exists(beside("other"))) << "nothing is left half-made";
 }
 
 TEST(RatingSession, VerdictsByTwoRubricsAreInOneRateOnlyWhenAskedFor) {
