@@ -18,7 +18,7 @@ function unfold(answer, given) {
 
 async function settle(label, first, given) {
   const {answered} = await send('/api/verdict', {...given, ...rating.player.record(), client_uuid: secret(), label, supersedes: first, is_final: true,
-    stages: rating.stages, flags: [...rating.flags], cause: label === 'failure' ? rating.cause : '', note: rating.note, coverage: 1});
+    stages: rating.stages, flags: [...rating.flags], cause: label === 'failure' ? rating.cause : '', note: rating.note, ...howSure(), coverage: 1});
   await answered.catch(() => {});
   speak('decided');
   rate();

@@ -4,10 +4,10 @@ const keyHelp = [  // [keys, meaning, the right hand's]
   ['[  ]', 'slower, faster'], ['R', 'again from the start', 'O'], ['A', 'loop the last two seconds', 'P'],
   ['S  F  U', 'success, failure, cannot tell', 'K  ;  U'], ['1 … 5', 'stage reached', '6 … 0'],
   ['Shift+1 … 5  V', 'one view alone, all views', 'Shift+6 … 0  M'], ['X, then 1 … 6', 'flags', 'Y, then 6 … 0 and -'],
-  ['N', 'note (Esc leaves it)'], ['Z', 'undo the last verdict', 'Backspace'], ['H', 'what you said'], ['?', 'this help, and the task'],
+  ['C', 'how sure: sure, fairly, a guess', 'I'], ['N', 'note (Esc leaves it)'], ['Z', 'undo the last verdict', 'Backspace'], ['H', 'what you said'], ['?', 'this help, and the task'],
 ];
 /** What the left hand's keys are to the right hand: keys beside each other, none used twice. The others are there already. */
-const rightHand = {K: 'S', ';': 'F', O: 'R', P: 'A', M: 'V', Y: 'X', Backspace: 'Z'};
+const rightHand = {K: 'S', ';': 'F', O: 'R', P: 'A', M: 'V', Y: 'X', I: 'C', Backspace: 'Z'};
 const rightDigits = ['Digit6', 'Digit7', 'Digit8', 'Digit9', 'Digit0', 'Minus'];
 const isRightHanded = () => localStorage.getItem('evac-keys') === 'right';
 let areFlagsOpen = false;
@@ -43,7 +43,7 @@ const acts = {
   ' ': player => player.toggle(), J: player => player.seek(player.time - 1), L: player => player.seek(player.time + 1),
   ',': player => player.step(-1), '.': player => player.step(1), Home: player => player.seek(0), End: player => player.seek(player.duration),
   '[': player => player.faster(-1), ']': player => player.faster(1), R: player => player.replay(), A: player => player.loopEnd(),
-  V: player => player.isolate(-1), X: openFlags, N: openNote, H: openHistory,
+  V: player => player.isolate(-1), X: openFlags, C: nextConfidence, N: openNote, H: openHistory,
   S: () => decide('success'), F: () => decide('failure'), U: () => decide('cannot_tell'),
 };
 
@@ -73,7 +73,7 @@ function onRateScreen(event) {
   if (isRightHanded() && rightHand[key]) key = rightHand[key];
   if (key === 'Z') return undo(), true;
   const act = acts[key];
-  if (!act || (event.repeat && 'SFUXNHRA'.includes(key))) return false;
+  if (!act || (event.repeat && 'SFUXCNHRA'.includes(key))) return false;
   if (session.isOther) return true;
   act(player);
   return true;

@@ -47,7 +47,7 @@ function closeClip() {
 
 function showClip(clip, source) {
   closeClip();
-  Object.assign(rating, {clip, source, isBusy: false, stages: 0, flags: new Set(), cause: '', note: '', film: null});
+  Object.assign(rating, {clip, source, isBusy: false, stages: 0, flags: new Set(), cause: '', confidence: 0, note: '', film: null});
   const resumed = JSON.parse(sessionStorage.getItem('evac-clip') || 'null');
   const player = new Player(clip, source, refresh, why => unplayable(clip, why));
   rating.player = player;
@@ -137,6 +137,8 @@ function column(clip) {
       make('.chips', {role: 'group', 'aria-label': 'Flags'}, flags)),
     make('details.more', {}, make('summary', {}, 'Cause, if it fails', make('span.chosen-cause', {})),
       make('.chips', {role: 'group', 'aria-label': 'Cause of the failure'}, causes)),
+    make('.chips.sure', {role: 'group', 'aria-label': 'How sure you are'}, make('kbd', {}, 'C'), make('span.quiet', {}, 'How sure?'), sureness.map(([level, name]) =>
+      make('button', {type: 'button', 'aria-pressed': 'false', 'data-sure': level, 'aria-keyshortcuts': 'C', onclick: () => setConfidence(level)}, name))),
     make('details.more.noted', {}, make('summary', {}, make('kbd', {}, 'N'), 'Note'),
       make('textarea', {rows: 3, maxlength: 500, 'aria-label': 'Note', oninput: event => { rating.note = event.target.value; }})),
     make('.final', {},
@@ -182,6 +184,18 @@ function setCause(cause) {
   document.querySelectorAll('[data-cause]').forEach(button => button.setAttribute('aria-pressed', String(button.dataset.cause === rating.cause)));
   $('.chosen-cause').textContent = rating.cause ? ` · ${named(rating.cause)}` : '';
 }
+/** How sure a rater is, if they say: 3 … 1. */
+const sureness = [[3, 'sure'], [2, 'fairly'], [1, 'a guess']];
+function setConfidence(level) {
+  rating.confidence = rating.confidence === level ? 0 : level;
+  document.querySelectorAll('[data-sure]').forEach(button => button.setAttribute('aria-pressed', String(Number(button.dataset.sure) === rating.confidence)));
+}
+const howSure = () => rating.confidence ? {confidence: rating.confidence} : {};
+/** Sure, fairly, a guess, nothing said. */
+function nextConfidence() {
+  setConfidence(rating.confidence === 0 ? 3 : rating.confidence === 1 ? 1 : rating.confidence - 1);
+  speak(rating.confidence ? sureness.find(([level]) => level === rating.confidence)[1] : 'not said how sure');
+}
 
 /** A verdict. It is kept here first, then sent; the next clip comes after 600 ms, undo stays for longer. */
 async function decide(label) {
@@ -194,7 +208,7 @@ async function decide(label) {
   const {tab, ...record} = player.record();
   if (rating.isOpen) record.coverage = Math.max(record.coverage, session.me.cover);
   const body = {client_uuid: uuid, presentation: clip.presentation, label, stages: rating.stages, flags: [...rating.flags],
-    cause: label === 'failure' ? rating.cause : '', note: rating.note, ...record};
+    cause: label === 'failure' ? rating.cause : '', note: rating.note, ...howSure(), ...record};
   if (rating.supersedes) body.supersedes = rating.supersedes;
   $(`.verdict.${label}`).classList.add('given');
   refresh();

@@ -229,6 +229,10 @@ def keys(ann):
     browser.press("4")
     browser.press("x")
     check(browser.js("rating.stages === 1 && rating.flags.has('blur_hides')"), "digits are stages, after X flags")
+    browser.press("c")
+    browser.press("c")
+    check(browser.js("rating.confidence === 2 && document.querySelector('[data-sure=\"2\"]').getAttribute('aria-pressed') === 'true'"),
+          "C says how sure: fairly")
     browser.press("n")
     for letter in "sfu":
         browser.press(letter)
@@ -247,7 +251,8 @@ def keys(ann):
     ann.say(";", "failure")
     browser.js("localStorage.removeItem('evac-keys')")
     row = current()[clip]
-    check((row["stages"], row["flags"], row["note"]) == (1, "blur_hides", "sfu"), "stages, flags and note are stored", row)
+    check((row["stages"], row["flags"], row["confidence"], row["note"]) == (1, "blur_hides", 2, "sfu"),
+          "stages, flags, how sure and note are stored", row)
     browser.press("h")
     browser.wait("document.querySelector('.history')")
     look(browser, "history")
