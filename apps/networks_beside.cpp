@@ -14,6 +14,7 @@ std::vector<std::string> Arguments() {
   std::ifstream file("/proc/self/cmdline", std::ios::binary);
   std::vector<std::string> words;
   for (std::string word; std::getline(file, word, '\0');) words.push_back(word);
+  if (words.empty()) throw InternalError("cannot read /proc/self/cmdline");
   words.erase(words.begin());
   return words;
 }

@@ -30,7 +30,8 @@ CarriedFrame CarryAlongPlane(const Tensor& frame, const Tensor& direction, const
   const Tensor from = origin.narrow(2, first, later).flatten(2).to(at::kDouble);
   const Tensor distance = (plane_m - from.narrow(1, 2, 1)) / ray.narrow(1, 2, 1);
   const Tensor camera = origin.select(2, at).narrow(2, 0, 1).narrow(3, 0, 1).flatten(2).to(at::kDouble);
-  const Tensor place = at::where(distance > 0, from + distance * ray - camera, ray);
+  constexpr double kFar_m = 1e4;  // and a ray along the plane, which meets it nowhere
+  const Tensor place = at::where((distance > 0).logical_and(distance < kFar_m), from + distance * ray - camera, ray);
   const Tensor found = at::matmul(FrameFromPlace(direction.select(2, at)), place);
   const Tensor depth = found.narrow(1, 2, 1), safe = depth.clamp_min(1e-9);
   const Tensor x = found.narrow(1, 0, 1) / safe, y = found.narrow(1, 1, 1) / safe;
