@@ -95,7 +95,7 @@ TEST(CarriedFrame, WhereNoRayMeetsThePlaneItTurnsWithTheCameraAlone) {
 
 TEST(CarriedFrame, ARayAlongThePlaneIsFarAway) {
   const Tensor across = ((at::arange(kWidth, at::kFloat) - 3.5) * 0.1).reshape({1, kWidth}).expand({5, kWidth});
-  const Tensor up = ((at::arange(5, at::kFloat) - 2) * -0.1).reshape({5, 1}).expand({5, kWidth});
+  const Tensor up = ((at::arange(5, at::kFloat) - 2) * 0.1).reshape({5, 1}).expand({5, kWidth});
   const Tensor ray = at::stack({at::ones({5, kWidth}), -across, up});  // along x; the middle row keeps its height
   const Tensor unit = ray / at::linalg_vector_norm(ray, 2, at::IntArrayRef{0}, true);
   const Tensor here = OriginOf({}).narrow(1, 0, 5), there = OriginOf({.x_m = 0.5}).narrow(1, 0, 5);
