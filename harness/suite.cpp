@@ -32,7 +32,8 @@ std::string NameField(const Config& page, const std::string& key) {
 void AllowOnlyFieldsOf(const std::string& type, const Config& page) {
   if (type == "evac") {
     return page.AllowOnly({"name", "type", "role", "weights", "config", "statistics", "solver", "steps", "eta", "cfg",
-                           "cfg_rescale", "period_s", "pose_map", "products", "threads_per_scene", "quirks", "cache", "initial_states"});
+                           "cfg_rescale", "period_s", "pose_map", "products", "threads_per_scene", "quirks", "cache",
+                           "initial_states"});
   }
   page.AllowOnly({"name", "type", "role", "profile", "initial_states"});
 }
@@ -57,12 +58,17 @@ SuiteWorld ReadWorld(const Config& page) {
 }
 
 SuitePolicy ReadPolicy(const Config& page) {
-  page.AllowOnly({"name", "checkpoint", "command", "join"});
+  page.AllowOnly({"name", "checkpoint", "command", "join", "files"});
   SuitePolicy policy;
   policy.name = NameField(page, "name");
   policy.checkpoint = page.Has("checkpoint") ? NameField(page, "checkpoint") : "default";
   page.Require(page.Has("command") != page.Has("join"), "command",
                "either a command line (a list) or `join: {url, token}`");
+  for (const std::string& file : page.Get<std::vector<std::string>>("files", {})) {
+    policy.files.push_back((page.file().parent_path() / file).lexically_normal().string());
+    page.Require(!file.empty() && fs::exists(policy.files.back()), "files",
+                 fmt::format("files or folders that are there, and '{}' is not", file));
+  }
   if (page.Has("join")) {
     const Config join = page.Section("join");
     join.AllowOnly({"url", "token"});
@@ -256,11 +262,12 @@ std::string WithPathsFromHere(const std::string& assignment) {
   if (equals == std::string::npos || equals + 1 == assignment.size()) return assignment;
   const std::string field = assignment.substr(0, equals), value = assignment.substr(equals + 1);
   const std::string last = field.substr(field.rfind('.') + 1);
-  if (field == "tasks" && value.starts_with('[')) {
-    std::vector<std::string> tasks =
-        Config::FromText("tasks: " + value, "--set " + assignment).Get<std::vector<std::string>>("tasks");
-    for (std::string& task : tasks) task = FromWorkingDirectory(task);
-    return fmt::format("tasks=[\"{}\"]", fmt::join(tasks, "\", \""));
+  if ((field == "tasks" || last == "files") && value.starts_with('[')) {
+    std::vector<std::string> paths =
+        Config::FromText("paths: " + value, "--set " + assignment).Get<std::vector<std::string>>("paths");
+    if (paths.empty()) return assignment;
+    for (std::string& path : paths) path = FromWorkingDirectory(path);
+    return fmt::format("{}=[\"{}\"]", field, fmt::join(paths, "\", \""));
   }
   const bool is_path = last == "recording" || last == "profile" || last == "weights" || last == "config" ||
                        last == "statistics" || last == "folder" || field.starts_with("tasks.");
@@ -271,7 +278,9 @@ std::string WithPathsFromHere(const std::string& assignment) {
 
 std::span<const InitialState> StatesOf(const Suite& suite, const SuiteWorld& world) {
   const std::span<const InitialState> all = suite.initial_states;
-  return world.initial_states == 0 ? all : all.first(std::min<std::size_t>(all.size(), static_cast<std::size_t>(world.initial_states)));
+  return world.initial_states == 0
+             ? all
+             : all.first(std::min<std::size_t>(all.size(), static_cast<std::size_t>(world.initial_states)));
 }
 
 Suite ReadSuite(const fs::path& path, const std::vector<std::string>& assignments) {

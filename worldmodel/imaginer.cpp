@@ -230,16 +230,18 @@ ChunkLatents Imaginer::DenoiseAnew(const ImaginedScene& scene, const ChunkCondit
 
 Pictures Imaginer::DecodeAnew(const ChunkLatents& latents) const {
   const at::NoGradGuard no_gradients;
-  Pictures pictures;
-  for (const std::vector<float>& frame : latents.frames) {
-    const Tensor latent = TensorOf(frame, With(LatentShape(config()), 0, config().views)).clone();
-    const Tensor decoded = nn::DecodeLatents(*model_, latent.to(at::Device(options_.device)));  // [V, 3, H, W]
-    if (!decoded.isfinite().all().item<bool>())
-      throw InternalError("the codec answers finite latents with numbers that are not");
-    const Tensor bytes = nn::ToBytes(decoded).permute({0, 2, 3, 1}).cpu().contiguous();
-    std::vector<cv::Mat>& views = pictures.emplace_back();
-    for (std::int64_t v = 0; v < config().views; ++v) views.push_back(BytePicture(bytes[v]));
-  }
+  std::vector<Tensor> all;
+  for (const std::vector<float>& frame : latents.frames)
+    all.push_back(TensorOf(frame, With(LatentShape(config()), 0, config().views)));
+  if (all.empty()) return {};
+  const Tensor decoded =
+      nn::DecodeLatents(*model_, at::cat(all).to(at::Device(options_.device)));  // [frames V, 3, H, W]
+  if (!decoded.isfinite().all().item<bool>())
+    throw InternalError("the codec answers finite latents with numbers that are not");
+  const Tensor bytes = nn::ToBytes(decoded).permute({0, 2, 3, 1}).cpu().contiguous();
+  Pictures pictures(all.size());
+  for (std::size_t i = 0; i < all.size() * static_cast<std::size_t>(config().views); ++i)
+    pictures[i / static_cast<std::size_t>(config().views)].push_back(BytePicture(bytes[static_cast<std::int64_t>(i)]));
   return pictures;
 }
 

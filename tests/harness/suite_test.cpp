@@ -94,6 +94,35 @@ TEST_F(SuiteTest, TheHashIgnoresCommentsLayoutAndSpeedButNotTheContentOfFiles) {
   EXPECT_NE(ReadSuite(path, {}).hash, hash);
 }
 
+TEST_F(SuiteTest, TheHashCoversTheFilesThatAPolicysCommandNamesAndThoseListedBesideIt) {
+  const std::string text = R"(
+suite: tiny
+recording: rec
+worlds:
+  - {name: echo, type: echo}
+policies:
+  - {name: mine, command: [python3, policy.py, --weights=net/step_9.bin, --seed, "3"], files: [net, ../elsewhere]}
+)";
+  std::filesystem::create_directories(folder_ / "suites/net");
+  std::filesystem::create_directories(folder_ / "suites/rec");
+  Write("elsewhere", "one"), Write("suites/rec/action.npy", "bytes");
+  Write("suites/policy.py", "one"), Write("suites/net/step_9.bin", "one"), Write("suites/net/norm.json", "one");
+  const auto path = Write("suites/suite.yaml", text);
+  std::string last = ReadSuite(path, {}).hash;
+  EXPECT_EQ(ReadSuite(path, {}).hash, last);
+  for (const char* file : {"suites/policy.py", "suites/net/step_9.bin", "suites/net/norm.json", "elsewhere"}) {
+    Write(file, "another");
+    const std::string now = ReadSuite(path, {}).hash;
+    EXPECT_NE(now, last) << file;
+    last = now;
+  }
+  // The argument alone, without the list.
+  const std::string bare = ReadSuite(path, {"policies.0.files=[]"}).hash;
+  Write("suites/net/step_9.bin", "a third");
+  EXPECT_NE(ReadSuite(path, {"policies.0.files=[]"}).hash, bare);
+  EXPECT_THAT(Complaint(path, {"policies.0.files=[nowhere]"}), AllOf(HasSubstr("files"), HasSubstr("nowhere")));
+}
+
 TEST_F(SuiteTest, ItsStopRuleIsCheckedAsATasksIs) {
   const auto demo = std::filesystem::path(EVAC_SOURCE_DIR) / "apps/configs/demo.yaml";
   EXPECT_EQ(ReadSuite(demo, {"still={dwell_chunks: 4}"}).tasks.at(0).still.dwell_chunks, 4);

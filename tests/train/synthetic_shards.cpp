@@ -22,7 +22,7 @@ Tensors Empty(const SyntheticShards& o) {
   t.clip_id = at::arange(o.clips, at::kLong);
   t.crop = at::zeros({o.clips, 4}, at::kInt);
   t.task = at::zeros({o.clips}, at::kInt);
-  t.outcome = at::ones({o.clips}, at::kChar);
+  t.outcome = (at::arange(o.clips) >= o.failures).to(at::kChar);
   t.frames = at::zeros({f, v, o.height_px, o.width_px, 3}, at::kByte);
   t.maps = at::full({f, v, o.height_px, o.width_px, 3}, 50, at::kByte);
   t.actions = at::zeros({f, 16});

@@ -11,6 +11,7 @@ namespace evac::train {
 struct SyntheticShards {
   std::int64_t clips = 6;        ///< of each split
   std::int64_t frames = 9;       ///< of a clip
+  std::int64_t failures = 0;     ///< of the clips of each split; the others are successes
   std::int64_t views = 1;
   std::int64_t height_px = 16, width_px = 24;
   std::uint64_t seed = 1;

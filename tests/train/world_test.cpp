@@ -211,6 +211,18 @@ TEST(Windows, LieInTheirClipNewestLastAndHoldContactWhenAsked) {
   }
 }
 
+TEST(Windows, ComeFromSuccessesAloneWhenAsked) {
+  const TempFolder folder;
+  WriteSyntheticShards(folder.path(), {.frames = 12});
+  WriteSyntheticShards(folder.path(), {.clips = 6, .frames = 12, .failures = 4});
+  const ShardSet shards(folder.path(), Split::kTrain);
+  const WindowSampler sampler(shards, {.chunk = 3, .memory = 4, .history = 8, .rollout_share = 0.5, .successes_only = true});
+  Dice dice({1, 0, 0, 0}, 1);
+  for (int i = 0; i < 200; ++i) EXPECT_EQ(sampler.Pick(dice).clip->outcome, 1);
+  WriteSyntheticShards(folder.path(), {.clips = 6, .frames = 12, .failures = 6});
+  EXPECT_THROW(WindowSampler(ShardSet(folder.path(), Split::kTrain), {.chunk = 3, .memory = 4, .history = 8, .successes_only = true}), TensorError);
+}
+
 TEST(Rays, AreThoseOfTheWorldThatImagines) {
   Eigen::Matrix4f c2w = Eigen::Matrix4f::Identity();
   c2w.block<3, 3>(0, 0) = (Eigen::AngleAxisf(0.4F, Eigen::Vector3f::UnitX()) * Eigen::AngleAxisf(-1.1F, Eigen::Vector3f::UnitZ())).matrix();

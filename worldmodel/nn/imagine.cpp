@@ -11,21 +11,22 @@
 namespace evac::nn {
 namespace {
 
-constexpr std::int64_t kCodecBatch = 2;
+constexpr std::int64_t kCodecPixels = std::int64_t{2} * 320 * 512;  // at once: two pictures of the published size
 
-/// [rows, frames, ...] pictures through `function`, a few at a time.
+/// `count` pictures of `pixels` each through `function`, so many at a time as memory bears.
 template <typename Function>
-Tensor InBatches(std::int64_t count, Function function) {
+Tensor InBatches(std::int64_t count, std::int64_t pixels, Function function) {
+  const std::int64_t batch = std::max<std::int64_t>(1, kCodecPixels / pixels);
   std::vector<Tensor> parts;
-  for (std::int64_t from = 0; from < count; from += kCodecBatch)
-    parts.push_back(function(from, std::min(kCodecBatch, count - from)));
+  for (std::int64_t from = 0; from < count; from += batch)
+    parts.push_back(function(from, std::min(batch, count - from)));
   return at::cat(parts, 0);
 }
 
 }  // namespace
 
 Tensor EncodeImages(const EvacModel& model, const Tensor& images, const Tensor& noise) {
-  return InBatches(images.size(0), [&](std::int64_t from, std::int64_t count) {
+  return InBatches(images.size(0), images.size(2) * images.size(3), [&](std::int64_t from, std::int64_t count) {
     const Posterior posterior = model.vae().Encode(images.narrow(0, from, count));
     return posterior.Sample(noise.defined() ? noise.narrow(0, from, count) : noise) * model.vae().scale_factor();
   });
@@ -37,9 +38,10 @@ Tensor EncodePoseMaps(const EvacModel& model, const Tensor& maps, const Tensor& 
 }
 
 Tensor DecodeLatents(const EvacModel& model, const Tensor& latents) {
-  return InBatches(latents.size(0), [&](std::int64_t from, std::int64_t count) {
-    return model.vae().Decode(latents.narrow(0, from, count));
-  });
+  const std::int64_t stride = model.config().vae.Stride();
+  return InBatches(
+      latents.size(0), latents.size(2) * latents.size(3) * stride * stride,
+      [&](std::int64_t from, std::int64_t count) { return model.vae().Decode(latents.narrow(0, from, count)); });
 }
 
 Conditioning Condition(const EvacModel& model, const ChunkRequest& request) {

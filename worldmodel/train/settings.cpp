@@ -79,6 +79,7 @@ Settings SettingsOf(WorldOptions& options) {
                        {"history", &w.windows.history},
                        {"rollout_share", &w.windows.rollout_share},
                        {"contact_share", &w.windows.contact_share},
+                       {"successes_only", &w.windows.successes_only},
                        {"first_image", &w.windows.first_image},
                        {"drop", &w.drop},
                        {"memory_noise_kind", &options.memory_noise_kind},

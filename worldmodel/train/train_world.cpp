@@ -121,7 +121,9 @@ TrainerSummary TrainWorld(const JobPlace& place, const WorldOptions& given, cons
     workers.emplace_back(read, shards, place.config, options);
   const TrainableWeights& weights = workers.front().weights;
   const nn::EvacModel& model = workers.front().model;
-  const WorldTraining measuring(model, holdout, options.world);
+  WorldTrainingOptions all = options.world;
+  all.windows.successes_only = false;  // what is measured is the same, whatever was learned from
+  const WorldTraining measuring(model, holdout, all);
   const std::vector<Window> windows = measuring.sampler().Spread(options.job.holdout_size),
                             drawn = measuring.sampler().Spread(kStripWindows);
   options.job.trainer.identity = IdentityOf(SettingsOf(options)) + shards.metadata().at("recipe") + " " +

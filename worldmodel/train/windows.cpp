@@ -25,10 +25,13 @@ WindowSampler::WindowSampler(const ShardSet& shards, const WindowOptions& option
   if (options.memory < 1 || options.chunk < 1 || options.history < options.memory)
     throw TensorError("windows: memory " + std::to_string(options.memory) + ", chunk " + std::to_string(options.chunk) +
                       ", history " + std::to_string(options.history) + ", wanted 1 <= memory <= history, 1 <= chunk");
-  for (const Clip& clip : shards.clips()) AddClip(shards, clip);
+  for (const Clip& clip : shards.clips()) {
+    if (!options.successes_only || clip.outcome == 1) AddClip(shards, clip);
+  }
   if (any_.empty())
     throw TensorError("no clip of " + shards.shards().front().path.parent_path().string() + " has " +
-                      std::to_string(options.chunk + 1) + " frames");
+                      std::to_string(options.chunk + 1) + " frames" +
+                      (options.successes_only ? " and ended in success" : ""));
 }
 
 void WindowSampler::AddClip(const ShardSet& shards, const Clip& clip) {

@@ -25,6 +25,7 @@ struct WindowOptions {
   /// Of the samples that begin where rollouts do (frame 0, K, 2K, …) and remember what rollouts do (4.6). The paper: 0.
   double rollout_share = 0;
   double contact_share = 0;         ///< of the samples whose chunk holds a frame in contact. The paper: 0
+  bool successes_only = false;      ///< from clips that ended in success, as a lab that keeps no failures would have. The paper: both
   bool first_image = false;         ///< the image encoder sees the oldest memory, as when imagining; else any of it
 };
 
