@@ -1,4 +1,5 @@
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <memory>
@@ -8,6 +9,7 @@
 #include "apps/network_parts.h"
 #include "core/error.h"
 #include "harness/scheduler.h"
+#include "harness/suite_hash.h"
 
 namespace evac {
 namespace {
@@ -38,6 +40,11 @@ ExitCode Validate(const ValidateArguments& arguments) {
   const bool all_states = std::ranges::all_of(suite.worlds, [](const SuiteWorld& world) { return world.initial_states == 0; });
   fmt::print("{}: valid. {} worlds x {} tasks x {} policies x {}{} initial states x {} seeds = {} episodes. Suite hash {}\n", arguments.suite,
              suite.worlds.size(), suite.tasks.size(), suite.policies.size(), all_states ? "" : "up to ", suite.initial_states.size(), suite.seeds.size(), episodes, suite.hash);
+  for (const SuitePolicy& policy : suite.policies) {
+    if (const std::vector<std::string> files = FilesInNoHash(suite, policy); !files.empty())
+      fmt::print("note: {}@{} is given {}, whose content is in no hash: list under its `files` what decides its actions\n",
+                 policy.name, policy.checkpoint, fmt::join(files, ", "));
+  }
   return ExitCode::kOk;
 }
 

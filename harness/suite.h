@@ -28,7 +28,7 @@ struct SuitePolicy {
   std::string name, checkpoint;
   std::vector<std::string> command;  ///< empty: joins a policy that runs already
   std::string join_url, join_token;  ///< where it listens
-  std::vector<std::string> files = {};  ///< that decide what it does, beside those its command names; absolute
+  std::vector<std::string> files = {};  ///< and folders that decide what it does: hashed by content; absolute
 };
 
 struct Transport {

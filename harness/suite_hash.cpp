@@ -1,7 +1,5 @@
 #include "harness/suite_hash.h"
 
-#include <fmt/format.h>
-
 #include <algorithm>
 #include <sstream>
 #include <vector>
@@ -54,23 +52,6 @@ bool IsOfModel(const std::string& line, const Suite& suite) {
   return false;
 }
 
-/// A line per file that decides what a policy does: of the arguments of its command those that name one (its weights,
-/// its script), and what the suite lists. Not the program itself, which is built anew on every machine.
-std::string FilesOf(const SuitePolicy& policy, const fs::path& folder) {
-  std::string lines;
-  const auto add = [&](const std::string& kind, std::size_t at, const fs::path& path) {
-    lines += fmt::format("{} {} of {}@{} {}\n", kind, at, policy.name, policy.checkpoint, HashOfTree(path));
-  };
-  for (std::size_t i = 1; i < policy.command.size(); ++i) {
-    const std::string& word = policy.command[i];
-    const fs::path named = folder / word.substr(word.starts_with("--") ? word.find('=') + 1 : 0);
-    std::error_code ignored;
-    if (fs::is_regular_file(named, ignored)) add("argument", i, named);
-  }
-  for (std::size_t i = 0; i < policy.files.size(); ++i) add("file", i, policy.files[i]);
-  return lines;
-}
-
 std::string HashOf(const Config& page, const Suite& suite, bool with_models) {
   std::ostringstream text;
   std::istringstream lines(page.Canonical());
@@ -89,12 +70,31 @@ std::string HashOf(const Config& page, const Suite& suite, bool with_models) {
   for (const SuiteWorld& world : suite.worlds) {
     if (world.evac && with_models) text << "evac " << world.name << " " << world.evac->hash << "\n";
   }
-  for (const SuitePolicy& policy : suite.policies) text << FilesOf(policy, fs::absolute(suite.path).parent_path());
+  for (const SuitePolicy& policy : suite.policies) {
+    for (std::size_t i = 0; i < policy.files.size(); ++i)
+      text << "file " << i << " of " << policy.name << "@" << policy.checkpoint << " " << HashOfTree(policy.files[i])
+           << "\n";
+  }
   if (suite.recording) text << "recording " << HashOfTree(*suite.recording) << "\n";
   return Sha256Hex(text.str());
 }
 
 }  // namespace
+
+std::vector<std::string> FilesInNoHash(const Suite& suite, const SuitePolicy& policy) {
+  std::vector<std::string> found;
+  for (std::size_t i = 1; i < policy.command.size(); ++i) {
+    const std::string& word = policy.command[i];
+    const std::string value = word.substr(word.starts_with("--") ? word.find('=') + 1 : 0);
+    const fs::path named = (fs::absolute(suite.path).parent_path() / value).lexically_normal();
+    std::error_code ignored;
+    const bool is_listed = std::ranges::any_of(policy.files, [&](const std::string& file) {
+      return (named / "").string().starts_with((fs::path(file) / "").string());  // it, or below it
+    });
+    if (!is_listed && fs::is_regular_file(named, ignored)) found.push_back(value);
+  }
+  return found;
+}
 
 std::string SuiteHash(const Config& page, const Suite& suite) { return HashOf(page, suite, true); }
 

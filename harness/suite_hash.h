@@ -1,6 +1,7 @@
 #pragma once
 
 #include <string>
+#include <vector>
 
 #include "core/config.h"
 #include "harness/suite.h"
@@ -14,5 +15,9 @@ std::string SuiteHash(const Config& page, const Suite& suite);
 
 /// The same without the worlds of type evac: suites that differ in a world model alone have the same reality.
 std::string RealityHash(const Config& page, const Suite& suite);
+
+/// The arguments of a policy's command that name files which its `files` do not list. They may decide what it does, and
+/// they may be what it writes: only the suite's author knows.
+std::vector<std::string> FilesInNoHash(const Suite& suite, const SuitePolicy& policy);
 
 }  // namespace evac

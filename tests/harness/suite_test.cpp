@@ -9,6 +9,7 @@
 
 #include "core/error.h"
 #include "harness/scheduler.h"
+#include "harness/suite_hash.h"
 #include "tests/support/temp_folder.h"
 
 namespace evac {
@@ -94,14 +95,14 @@ TEST_F(SuiteTest, TheHashIgnoresCommentsLayoutAndSpeedButNotTheContentOfFiles) {
   EXPECT_NE(ReadSuite(path, {}).hash, hash);
 }
 
-TEST_F(SuiteTest, TheHashCoversTheFilesThatAPolicysCommandNamesAndThoseListedBesideIt) {
+TEST_F(SuiteTest, TheHashCoversTheFilesThatAPolicyListsAndWhichItDoesNotIsKnown) {
   const std::string text = R"(
 suite: tiny
 recording: rec
 worlds:
   - {name: echo, type: echo}
 policies:
-  - {name: mine, command: [python3, policy.py, --weights=net/step_9.bin, --seed, "3"], files: [net, ../elsewhere]}
+  - {name: mine, command: [python3, policy.py, --weights=net/step_9.bin, --seed, "3"], files: [policy.py, net/, ../elsewhere]}
 )";
   std::filesystem::create_directories(folder_ / "suites/net");
   std::filesystem::create_directories(folder_ / "suites/rec");
@@ -116,10 +117,12 @@ policies:
     EXPECT_NE(now, last) << file;
     last = now;
   }
-  // The argument alone, without the list.
-  const std::string bare = ReadSuite(path, {"policies.0.files=[]"}).hash;
-  Write("suites/net/step_9.bin", "a third");
-  EXPECT_NE(ReadSuite(path, {"policies.0.files=[]"}).hash, bare);
+  const auto unlisted = [&](const std::vector<std::string>& assignments) {
+    const Suite suite = ReadSuite(path, assignments);
+    return FilesInNoHash(suite, suite.policies[0]);
+  };
+  EXPECT_THAT(unlisted({}), testing::IsEmpty());
+  EXPECT_THAT(unlisted({"policies.0.files=[]"}), testing::ElementsAre("policy.py", "net/step_9.bin"));
   EXPECT_THAT(Complaint(path, {"policies.0.files=[nowhere]"}), AllOf(HasSubstr("files"), HasSubstr("nowhere")));
 }
 
