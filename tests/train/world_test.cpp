@@ -121,6 +121,33 @@ TEST(TrainWorld, TheLossFallsWithEverythingThatThePaperLacks) {
   EXPECT_LT(after, 0.9 * before);
 }
 
+TEST(TrainWorld, AViewsErrorsCountAsMuchAsItsWeight) {
+  const Prepared at(2);
+  ShardSet shards(at.folder / "shards", Split::kTrain);
+  shards.OpenLatents(at.config.vae.z_channels, at.config.vae.Stride());
+  nn::RandomWeights random(3);
+  TrainableWeights weights(random);
+  const nn::EvacModel model(weights, at.config);
+  const auto loss = [&](const std::string& view_weights) {
+    WorldOptions options = Quick(1);
+    options.view_weights = view_weights;
+    options.Resolve();
+    options.world.windows.chunk = at.config.chunk;
+    options.world.windows.memory = at.config.memory;
+    const WorldTraining training(model, shards, options.world);
+    return training.Measure(training.sampler().Spread(8));
+  };
+  const double alike = loss(""), first = loss("1,1e-9"), second = loss("1e-9,1");
+  EXPECT_GT(std::abs(first - second), 1e-3 * alike) << "or nothing is tested";
+  EXPECT_NEAR(alike, (first + second) / 2, 1e-4 * alike);
+  EXPECT_NEAR(loss("3,3"), alike, 1e-5 * alike);
+  EXPECT_NEAR(loss("3,1"), (3 * first + second) / 4, 1e-4 * alike);
+  for (const char* wrong : {"1,-1", "1,0", "1,x", "1,,1", "1,inf"}) EXPECT_THROW(loss(wrong), TensorError) << wrong;
+  WorldOptions three = Quick(1);
+  three.view_weights = "1,1,1";
+  EXPECT_THROW(TrainWorld({at.folder / "shards", at.folder / "out", at.config}, three, {.codec = at.codec()}, {}), TensorError);
+}
+
 std::string Bytes(const std::filesystem::path& path) {
   std::ifstream file(path, std::ios::binary);
   return {std::istreambuf_iterator<char>(file), {}};

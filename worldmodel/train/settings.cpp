@@ -1,7 +1,10 @@
 #include "worldmodel/train/settings.h"
 
+#include <cmath>
 #include <cstdio>
+#include <cstdlib>
 #include <set>
+#include <sstream>
 
 namespace evac::train {
 namespace {
@@ -11,6 +14,20 @@ void AddJob(Settings& settings, JobOptions& job) {
   settings.insert(settings.end(), shared.begin(), shared.end());
   settings.push_back({"bf16", &job.bf16});
   settings.push_back({"holdout_size", &job.holdout_size});
+}
+
+/// "1,0.25". @throws TensorError for a number that is none, or not above 0
+std::vector<double> Numbers(const std::string& text) {
+  std::vector<double> numbers;
+  std::istringstream words(text);
+  for (std::string word; std::getline(words, word, ',');) {
+    char* end = nullptr;
+    const double number = std::strtod(word.c_str(), &end);
+    if (word.empty() || *end != '\0' || !(number > 0) || !std::isfinite(number))
+      throw TensorError("view_weights is '" + text + "', wanted numbers above 0 with commas between");
+    numbers.push_back(number);
+  }
+  return numbers;
 }
 
 /// What may change from one process of a training to the next, and what the trainer compares itself.
@@ -94,6 +111,7 @@ Settings SettingsOf(WorldOptions& options) {
                        {"object_weight", &w.object_weight},
                        {"object_radius", &w.object_radius},
                        {"change_weight", &w.change_weight},
+                       {"view_weights", &options.view_weights},
                        {"self_memory_share", &w.self_memory_share},
                        {"self_memory_from", &w.self_memory_from},
                        {"train_action_resampler", &w.train_action_resampler},
@@ -104,6 +122,7 @@ Settings SettingsOf(WorldOptions& options) {
 }
 
 void WorldOptions::Resolve() {
+  world.view_weights = Numbers(view_weights);
   if (memory_noise_kind != "published" && memory_noise_kind != "uniform")
     throw TensorError("memory_noise_kind is '" + memory_noise_kind + "', wanted published or uniform");
   world.memory_noise_kind = memory_noise_kind == "uniform" ? MemoryNoise::kUniform : MemoryNoise::kPublished;

@@ -36,9 +36,10 @@ struct WorldOptions {
   WorldTrainingOptions world;
   std::string memory_noise_kind = "published";  ///< or "uniform"
   std::string step_weight = "velocity";         ///< or "min_snr", "clean"
+  std::string view_weights;                     ///< "1,0.25": numbers above 0, one per view; empty: alike
   std::int64_t strip_steps = 6;                 ///< of the sampler that draws strips
 
-  /// The words above as what they mean. @throws TensorError for a word that is none of them
+  /// The words above as what they mean. @throws TensorError for a word that is none of them, a number that is none
   void Resolve();
 };
 

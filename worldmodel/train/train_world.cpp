@@ -121,6 +121,10 @@ TrainerSummary TrainWorld(const JobPlace& place, const WorldOptions& given, cons
     workers.emplace_back(read, shards, place.config, options);
   const TrainableWeights& weights = workers.front().weights;
   const nn::EvacModel& model = workers.front().model;
+  if (!options.world.view_weights.empty() &&
+      options.world.view_weights.size() != static_cast<std::size_t>(place.config.views))
+    throw TensorError("view_weights has " + std::to_string(options.world.view_weights.size()) + " numbers, wanted " +
+                      std::to_string(place.config.views) + ": one per view");
   WorldTrainingOptions all = options.world;
   all.windows.successes_only = false;  // what is measured is the same, whatever was learned from
   const WorldTraining measuring(model, holdout, all);

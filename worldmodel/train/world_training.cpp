@@ -120,6 +120,12 @@ Tensor WorldTraining::Weight(const WorldBatch& batch, const Tensor& t) const {
     const Tensor bell = (distance * (-0.5 / (options_.object_radius * options_.object_radius))).exp();
     weight += options_.object_weight * bell.nan_to_num(0).unsqueeze(1);
   }
+  if (!options_.view_weights.empty()) {
+    std::vector<float> by_row;
+    for (std::int64_t i = 0; i < weight.size(0); ++i)
+      by_row.push_back(static_cast<float>(options_.view_weights.at(static_cast<std::size_t>(i % batch.views))));
+    weight = weight * PerRow(by_row, 5);
+  }
   weight = weight / weight.mean();
   std::vector<float> by_step;
   const std::int64_t* steps = t.data_ptr<std::int64_t>();

@@ -39,6 +39,7 @@ struct WorldTrainingOptions {
   double object_weight = 0;         ///< more of latents at the object: a bell of `object_radius` latent pixels
   double object_radius = 1;
   double change_weight = 0;         ///< more of latents that differ from the newest memory frame, per unit
+  std::vector<double> view_weights; ///< how much each view counts beside the others, in the shards' order; empty: alike
 
   double self_memory_share = 0;  ///< of the samples whose memory the network imagined itself, in one step
   double self_memory_from = 0.5; ///< after this part of the training
