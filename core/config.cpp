@@ -95,16 +95,21 @@ void DemandUtf8(const std::string& text, const std::filesystem::path& file) {
                      static_cast<unsigned char>(text[good]));
 }
 
-/// An escape ("\_") may stand for such bytes too.
-void DemandUtf8(const YAML::Node& scalar, const std::filesystem::path& file) {
-  if (scalar.IsScalar() && Utf8Prefix(scalar.Scalar()) != scalar.Scalar().size())
+/// An escape ("\_") may stand for such bytes too. And the library writes a carriage return as it is, but reads it as a
+/// part of the line's end where a line feed follows.
+void DemandWritable(const YAML::Node& scalar, const std::filesystem::path& file) {
+  if (!scalar.IsScalar()) return;
+  if (Utf8Prefix(scalar.Scalar()) != scalar.Scalar().size())
     throw InvalidInput("{}:{}: an escape stands for bytes that are no UTF-8", file.string(), scalar.Mark().line + 1);
+  if (scalar.Scalar().find('\r') != std::string::npos)
+    throw InvalidInput("{}:{}: found a carriage return in a value, wanted none: lines end in \\n or \\r\\n",
+                       file.string(), scalar.Mark().line + 1);
 }
 
 /// YAML allows keys that are lists; its parser lets the first of two equal keys win. Neither can be meant.
 void DemandPlain(const YAML::Node& node, const std::filesystem::path& file) {
   std::set<std::string> keys;
-  DemandUtf8(node, file);
+  DemandWritable(node, file);
   for (const auto& item : node) {
     if (!node.IsMap()) {
       DemandPlain(item, file);
@@ -113,7 +118,7 @@ void DemandPlain(const YAML::Node& node, const std::filesystem::path& file) {
     const int line = item.first.Mark().line + 1;
     if (!item.first.IsScalar())
       throw InvalidInput("{}:{}: found {} as a key, wanted a text", file.string(), line, Shown(item.first));
-    DemandUtf8(item.first, file);
+    DemandWritable(item.first, file);
     if (!keys.insert(item.first.Scalar()).second)
       throw InvalidInput("{}:{}: field {} is given twice", file.string(), line, item.first.Scalar());
     DemandPlain(item.second, file);
@@ -182,6 +187,7 @@ void Config::Set(const std::string& assignment) {
   } catch (const YAML::Exception& error) {
     throw InvalidInput("--set {}: the value is not YAML: {}", assignment, error.msg);
   }
+  DemandPlain(value, "--set " + assignment);
   if (parent.IsMap()) {
     parent[keys.back()] = value;
     return;
