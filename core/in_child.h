@@ -1,0 +1,16 @@
+#pragma once
+
+#include <functional>
+#include <string>
+
+namespace evac {
+
+/// Does `work` in a process of its own, a fork of this one, and returns what it returned: for libraries that crash on a
+/// hostile file where they should refuse it. The child has its own memory: nothing else that `work` changes is seen
+/// here.
+/// @param what  begins the message, "FILE"
+/// @throws InvalidInput with the message of an Error that `work` threw; or, if the process crashed or computed for more
+///   than a minute, saying so; InternalError if there can be no process
+std::string InChild(const std::string& what, const std::function<std::string()>& work);
+
+}  // namespace evac
