@@ -32,7 +32,9 @@ TEST(InChild, ReturnsWhatWasReturnedAndChangesNothingElse) {
   int seen = 0;
   const std::string bytes = InChild("a.h5", [&] {
     seen = 1;
-    return std::string(3'000'000, '\0') + "end";
+    std::string all(3'000'000, '\0');
+    all.append("end");
+    return all;
   });
   EXPECT_EQ(bytes.size(), 3'000'003U);
   EXPECT_TRUE(bytes.ends_with("end"));
