@@ -18,6 +18,24 @@ namespace {
 constexpr rlim_t kPatience_s = 60;  // of processor time
 constexpr char kDone = 'd', kRefused = 'r';
 
+/// What an Error is beside its message. Its kind is a literal, which lies at the same place in the child and here.
+struct Refusal {
+  ExitCode exit_code = ExitCode::kInvalidInput;
+  const char* kind = "";
+};
+
+std::string Packed(const Refusal& refusal, const std::string& message) {
+  std::string bytes(1, kRefused);
+  bytes.append(reinterpret_cast<const char*>(&refusal), sizeof refusal);
+  return bytes.append(message);
+}
+
+[[noreturn]] void ThrowUnpacked(const std::string& bytes) {
+  Refusal refusal;
+  std::memcpy(&refusal, bytes.data() + 1, sizeof refusal);
+  throw Error(refusal.exit_code, bytes.substr(1 + sizeof refusal)).Called(refusal.kind);
+}
+
 void WriteAll(int fd, const std::string& bytes) {
   for (std::size_t at = 0; at < bytes.size();) {
     const ssize_t written = ::write(fd, bytes.data() + at, bytes.size() - at);
@@ -37,8 +55,10 @@ void WriteAll(int fd, const std::string& bytes) {
   ::setrlimit(RLIMIT_CPU, &patience);
   try {
     WriteAll(fd, kDone + work());
+  } catch (const Error& error) {
+    WriteAll(fd, Packed({error.exit_code(), error.kind()}, error.what()));
   } catch (const std::exception& error) {
-    WriteAll(fd, kRefused + std::string(error.what()));
+    WriteAll(fd, Packed({}, error.what()));
   }
   ::_exit(0);
 }
@@ -75,7 +95,7 @@ std::string InChild(const std::string& what, const std::function<std::string()>&
                        ::strsignal(WTERMSIG(status)));
   if (!WIFEXITED(status) || WEXITSTATUS(status) != 0 || answer.empty())
     throw InvalidInput("{}: a broken file: reading it ended with status {}", what, status);
-  if (answer.front() == kRefused) throw InvalidInput("{}", answer.substr(1));
+  if (answer.front() == kRefused) ThrowUnpacked(answer);
   return answer.substr(1);
 }
 

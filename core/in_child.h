@@ -9,8 +9,8 @@ namespace evac {
 /// hostile file where they should refuse it. The child has its own memory: nothing else that `work` changes is seen
 /// here.
 /// @param what  begins the message, "FILE"
-/// @throws InvalidInput with the message of an Error that `work` threw; or, if the process crashed or computed for more
-///   than a minute, saying so; InternalError if there can be no process
+/// @throws the Error that `work` threw; InvalidInput if it threw something else, crashed or computed for more than a
+///   minute; InternalError if there can be no process
 std::string InChild(const std::string& what, const std::function<std::string()>& work);
 
 }  // namespace evac

@@ -47,6 +47,17 @@ TEST(InChild, SaysWhatWasThrown) {
   EXPECT_EQ(Refusal([]() -> std::string { throw std::runtime_error("other"); }), "other");
 }
 
+TEST(InChild, AnErrorKeepsItsKindAndItsExitCode) {
+  try {
+    InChild("a.h5", []() -> std::string { throw InternalError("disk full").Called("no_space"); });
+    FAIL();
+  } catch (const Error& error) {
+    EXPECT_EQ(error.exit_code(), ExitCode::kInternal);
+    EXPECT_STREQ(error.kind(), "no_space");
+    EXPECT_STREQ(error.what(), "disk full");
+  }
+}
+
 TEST(InChild, ACrashIsARefusal) {
   EXPECT_THAT(Refusal([] {
                 std::raise(SIGSEGV);
