@@ -50,7 +50,7 @@ void WriteAll(int fd, const std::string& bytes) {
   ::prctl(PR_SET_PDEATHSIG, SIGKILL);
   if (::getppid() != parent) ::_exit(1);
   for (const int signal : {SIGSEGV, SIGBUS, SIGFPE, SIGILL, SIGABRT, SIGXCPU, SIGPIPE}) ::signal(signal, SIG_DFL);
-  const rlimit no_core{0, 0}, patience{kPatience_s, kPatience_s};
+  const rlimit no_core{0, 0}, patience{kPatience_s, kPatience_s + 5};  // SIGXCPU comes before SIGKILL
   ::setrlimit(RLIMIT_CORE, &no_core);
   ::setrlimit(RLIMIT_CPU, &patience);
   try {
@@ -90,6 +90,9 @@ std::string InChild(const std::string& what, const std::function<std::string()>&
   int status = 0;
   while (::waitpid(child, &status, 0) < 0 && errno == EINTR) {
   }
+  if (WIFSIGNALED(status) && (WTERMSIG(status) == SIGKILL || WTERMSIG(status) == SIGTERM || WTERMSIG(status) == SIGINT))
+    throw InternalError("{}: the process that read it was stopped from outside, by signal {} (out of memory?)", what,
+                        WTERMSIG(status));
   if (WIFSIGNALED(status))
     throw InvalidInput("{}: a broken file: reading it ended with signal {} ({})", what, WTERMSIG(status),
                        ::strsignal(WTERMSIG(status)));

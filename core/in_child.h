@@ -10,7 +10,7 @@ namespace evac {
 /// here.
 /// @param what  begins the message, "FILE"
 /// @throws the Error that `work` threw; InvalidInput if it threw something else, crashed or computed for more than a
-///   minute; InternalError if there can be no process
+///   minute; InternalError if there can be no process, or it was stopped from outside
 std::string InChild(const std::string& what, const std::function<std::string()>& work);
 
 }  // namespace evac

@@ -58,6 +58,19 @@ TEST(InChild, AnErrorKeepsItsKindAndItsExitCode) {
   }
 }
 
+TEST(InChild, BeingStoppedFromOutsideIsNoFaultOfTheFile) {
+  try {
+    InChild("a.h5", [] {
+      std::raise(SIGKILL);
+      return std::string();
+    });
+    FAIL();
+  } catch (const Error& error) {
+    EXPECT_EQ(error.exit_code(), ExitCode::kInternal);
+    EXPECT_THAT(error.what(), HasSubstr("stopped from outside"));
+  }
+}
+
 TEST(InChild, ACrashIsARefusal) {
   EXPECT_THAT(Refusal([] {
                 std::raise(SIGSEGV);
