@@ -1,5 +1,5 @@
 // The screen that matters: one clip, one verdict.
-const rating = {player: null, clip: null, film: null, isBusy: false, done: 0, sinceBreak: 0, breakAt: Date.now(), prefetched: null, last: null};
+const rating = {player: null, clip: null, film: null, isBusy: false, done: 0, sinceBreak: 0, breakAt: Date.now(), prefetched: null, last: null, turn: 0};
 
 /** The next clip and its bytes. What was fetched ahead comes first: so a rater goes on while the line is down. */
 async function nextClip() {
@@ -24,9 +24,12 @@ async function fetchNext(held) {
   }
 }
 
+/** Shows what comes next. Of two that are under way (undo while a clip fails to play, say) the later one counts: it asked the server last. */
 async function rate() {
+  const turn = ++rating.turn;
   try {
     const ready = await nextClip();
+    if (turn !== rating.turn) return;
     if (ready.clip.done) return session.me.role === 'adjudicator' ? adjudicated() : finished();
     if (!ready.source) return unplayable(ready.clip, ready.problem);
     showClip(ready.clip, ready.source);

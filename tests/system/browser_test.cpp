@@ -22,7 +22,7 @@ TEST(Browser, ReadsTheReportFiltersItsClipsAndPlaysAFlipInStep) {
   if (const char* screenshots = std::getenv("EVAC_SCREENSHOTS")) words.push_back(screenshots);
   const CommandResult read = RunCommand(words);
   if (read.exit_code == kSkipped) GTEST_SKIP() << read.out;
-  EXPECT_EQ(read.exit_code, 0) << read.out << read.err;
+  EXPECT_EQ(read.exit_code, 0) << read.err << read.out;
   EXPECT_THAT(read.out, testing::HasSubstr("0 failed")) << read.err;
 }
 

@@ -47,8 +47,8 @@ TEST(RatingSession, PeopleRateInRealBrowsersAndNothingIsLost) {
   if (const char* screenshots = std::getenv("EVAC_SCREENSHOTS")) words.push_back(screenshots);
   const CommandResult rated = RunCommand(words);
   if (rated.exit_code == kSkipped) GTEST_SKIP() << rated.out;
-  EXPECT_EQ(rated.exit_code, 0) << rated.out << rated.err;
-  EXPECT_THAT(rated.out, HasSubstr("0 failed")) << rated.err;
+  EXPECT_EQ(rated.exit_code, 0) << rated.err << rated.out;  // what failed comes first: logs get cut
+  EXPECT_THAT(rated.out, HasSubstr("0 failed"));
 }
 
 TEST(RatingSession, ASheetComesInAndLabelsGoBackIntoTheRun) {

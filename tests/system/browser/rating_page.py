@@ -11,6 +11,7 @@ import signal
 import subprocess
 import sys
 import time
+import traceback
 from concurrent.futures import ThreadPoolExecutor
 
 try:
@@ -34,6 +35,7 @@ def check(holds, sentence, found=""):
     print(f"{'ok' if holds else 'failed'}: {sentence}{'' if holds else f' (found {found})'}", flush=True)
     if not holds:
         failures.append(sentence)
+        print(f"failed: {sentence} (found {found})", file=sys.stderr)
 
 
 class Server:
@@ -106,9 +108,29 @@ class Rater:
         self.said[clip] = label
         self.browser.wait(f"!rating.clip || rating.clip.presentation !== {clip!r} || document.querySelector('.feedback') || !document.querySelector('.rate')")
 
+    def sent(self):
+        """Until the server has said that it keeps all verdicts."""
+        self.browser.wait("outbox.waiting.length === 0", 60)
+
+    def is_next_playable(self):
+        """Of the clip that is fetched ahead."""
+        return self.browser.js("""rating.prefetched.then(ready => new Promise(say => {
+            const video = document.createElement('video');
+            video.onloadeddata = () => say(true);
+            video.onerror = () => say(false);
+            video.src = ready.source;
+        }))""")
+
     def fast(self):
         for _ in range(4):
             self.browser.press("]")
+
+    def shown(self):
+        try:
+            return self.browser.js("""JSON.stringify({text: document.body.innerText.slice(0, 300), clip: rating.clip?.presentation,
+                time: document.querySelector('video')?.currentTime, unsent: outbox.waiting.length, isOther: session.isOther})""")
+        except Exception as error:
+            return f"cannot be asked: {error}"
 
     def at_end(self):
         return self.browser.js("Boolean(document.querySelector('.done') || document.querySelector('[data-guess]'))")
@@ -213,12 +235,14 @@ def reload_in_a_clip(ann):
     browser.wait("rating.clip")
     check(ann.clip() == before, "a reload goes on with the same clip", (before, ann.clip()))
     ann.say("s", "success")
+    ann.sent()
     check(current()[before]["interrupted"] == 1, "the verdict knows of the reload")
 
 
 def keys(ann):
     browser = ann.browser
     ann.ready()
+    browser.wait("document.querySelector('video').paused")
     browser.press("Home")
     browser.wait("document.querySelector('video').currentTime < 0.15")
     browser.press(".")
@@ -250,6 +274,7 @@ def keys(ann):
     clip = ann.clip()
     ann.say(";", "failure")
     browser.js("localStorage.removeItem('evac-keys')")
+    ann.sent()
     row = current()[clip]
     check((row["stages"], row["flags"], row["confidence"], row["note"]) == (1, "blur_hides", 2, "sfu"),
           "stages, flags, how sure and note are stored", row)
@@ -283,7 +308,9 @@ def second_tab(ann):
 def line_goes_away(ann, server):
     browser = ann.browser
     ann.ready()
-    time.sleep(1)  # the next clip is fetched ahead
+    while not ann.is_next_playable():  # which is told at once, and asks for another: that needs the line
+        ann.say("s", "success")
+        ann.ready()
     browser.offline(True)
     ann.say("s", "success")
     browser.wait("!document.querySelector('#unsent').hidden")
@@ -382,6 +409,11 @@ def main():
             bad = [c for c in rater.browser.complaints if "ERR_INTERNET_DISCONNECTED" not in c and "ERR_CONNECTION" not in c and "401" not in c]
             print(f"   console of {rater.name}: {bad[:4]}")
             check(not [c for c in bad if "Error:" in c or "Content Security" in c], f"no script of {rater.name}'s page failed", bad[:4])
+    except Exception as error:  # what the pages showed then
+        check(False, f"the session went on: {type(error).__name__} {error}")
+        traceback.print_exc()
+        for rater in people:
+            print(f"   {rater.name}: {rater.shown()}", file=sys.stderr)
     finally:
         for rater in people:
             rater.browser.close()
