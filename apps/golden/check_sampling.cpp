@@ -194,7 +194,7 @@ class Inference {
     // newest.
     const Tensor moved =
         at::cat({samples.narrow(2, 1, config_.memory - 1), samples.narrow(2, config_.Frames() - 1, 1)}, 2);
-    nn::Remember(model_.schedule(), moved, conditioning.concat);
+    nn::Remember(model_, moved, conditioning.concat);
     CompareConditioning(file_, Name(index, "cond."), conditioning, tolerance_, comparison_);
     Remember(index, samples);
   }

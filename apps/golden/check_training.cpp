@@ -66,7 +66,7 @@ class Training {
     concat_.pose_map =
         at::cat({at::zeros_like(maps.narrow(2, 0, config_.memory)), maps.narrow(2, config_.memory, config_.chunk)}, 2);
     concat_.mask = at::ones_like(maps.narrow(1, 0, 1));
-    nn::Remember(model_.schedule(), latents_.narrow(2, 0, config_.memory), concat_);
+    nn::Remember(model_, latents_.narrow(2, 0, config_.memory), concat_);
   }
 
   void Project() {
@@ -106,7 +106,7 @@ class Training {
       const Tensor angle = (noise_[drawn_] * 2 - 1) * 1.57;
       batch.teacher_forcing = nn::TeacherForcing{angle.reshape({Rows(), config_.memory}), divisor, noise_[drawn_ + 1]};
     }
-    return nn::DiffusionLoss(model_.unet(), model_.schedule(), batch);
+    return nn::DiffusionLoss(model_, batch);
   }
 
   void CompareConditioning(const Tensor& tokens) {

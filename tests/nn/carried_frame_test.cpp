@@ -7,6 +7,11 @@
 
 #include <cmath>
 
+#include "tests/nn/support.h"
+#include "worldmodel/nn/diffusion_loss.h"
+#include "worldmodel/nn/latent_pictures.h"
+#include "worldmodel/nn/weights.h"
+
 namespace evac::nn {
 namespace {
 
@@ -34,15 +39,24 @@ Tensor OriginOf(const Camera& camera) {
       .expand({3, kHeight, kWidth});
 }
 
+/// [1, 3, T, h, w] each.
+struct Rays {
+  explicit Rays(const std::vector<Camera>& cameras) {
+    std::vector<Tensor> directions, origins;
+    for (const Camera& camera : cameras) {
+      directions.push_back(DirectionOf(camera));
+      origins.push_back(OriginOf(camera));
+    }
+    direction = at::stack(directions, 1).unsqueeze(0);
+    origin = at::stack(origins, 1).unsqueeze(0);
+  }
+  Tensor direction, origin;
+};
+
 /// The frame of the first camera as the others see it.
 CarriedFrame Carry(const Tensor& frame, const std::vector<Camera>& cameras, double plane_m = 0) {
-  std::vector<Tensor> directions, origins;
-  for (const Camera& camera : cameras) {
-    directions.push_back(DirectionOf(camera));
-    origins.push_back(OriginOf(camera));
-  }
-  return CarryAlongPlane(frame.unsqueeze(0), at::stack(directions, 1).unsqueeze(0), at::stack(origins, 1).unsqueeze(0),
-                         0, 1, plane_m);
+  const Rays rays(cameras);
+  return CarryAlongPlane(frame.unsqueeze(0), rays.direction, rays.origin, 0, 1, plane_m);
 }
 
 Tensor Picture() { return at::rand({2, kHeight, kWidth}); }
@@ -50,15 +64,15 @@ Tensor Picture() { return at::rand({2, kHeight, kWidth}); }
 TEST(CarriedFrame, OfACameraThatStandsStillIsTheFrame) {
   const Tensor frame = Picture();
   const CarriedFrame later = Carry(frame, {{}, {}, {}});
-  ASSERT_EQ(later.latents.sizes(), (std::vector<std::int64_t>{1, 2, 2, kHeight, kWidth}));
-  for (int k = 0; k < 2; ++k) EXPECT_TRUE(at::allclose(later.latents[0].select(1, k), frame, 1e-4, 1e-5));
+  ASSERT_EQ(later.frames.sizes(), (std::vector<std::int64_t>{1, 2, 2, kHeight, kWidth}));
+  for (int k = 0; k < 2; ++k) EXPECT_TRUE(at::allclose(later.frames[0].select(1, k), frame, 1e-4, 1e-5));
   EXPECT_EQ(later.seen.min().item<double>(), 1);
 }
 
 TEST(CarriedFrame, MovesAgainstTheCameraAndRepeatsTheEdgeWhereNothingWasSeen) {
   const Tensor frame = Picture();
   const CarriedFrame later = Carry(frame, {{}, {.x_m = 0.2}, {.y_m = 0.1}});  // two to the right; one up
-  const Tensor right = later.latents[0].select(1, 0), up = later.latents[0].select(1, 1);
+  const Tensor right = later.frames[0].select(1, 0), up = later.frames[0].select(1, 1);
   EXPECT_TRUE(at::allclose(right.narrow(2, 0, kWidth - 2), frame.narrow(2, 2, kWidth - 2), 1e-4, 1e-4));
   EXPECT_TRUE(
       at::allclose(right.narrow(2, kWidth - 2, 2), frame.narrow(2, kWidth - 1, 1).expand({2, kHeight, 2}), 1e-4, 1e-4));
@@ -71,25 +85,25 @@ TEST(CarriedFrame, MovesAgainstTheCameraAndRepeatsTheEdgeWhereNothingWasSeen) {
 
 TEST(CarriedFrame, TurnsAndShrinksWithTheCamera) {
   const Tensor frame = Picture();
-  const Tensor turned = Carry(frame, {{}, {.turn = M_PI}}).latents[0].select(1, 0);
+  const Tensor turned = Carry(frame, {{}, {.turn = M_PI}}).frames[0].select(1, 0);
   EXPECT_TRUE(at::allclose(turned, frame.flip({1, 2}), 1e-4, 1e-4));
   // From twice as high the frame is half as large, in the middle: what was at position 1 of 0 … 7 is at 2.25.
   const Tensor plain = at::arange(kWidth, at::kFloat).reshape({1, 1, kWidth}).expand({2, kHeight, kWidth}).contiguous();
   const CarriedFrame far = Carry(plain, {{}, {.height_m = 2}});
-  EXPECT_NEAR(far.latents[0][0][0][2][2].item<double>(), 3.5 - 2 * 1.5, 1e-4);
+  EXPECT_NEAR(far.frames[0][0][0][2][2].item<double>(), 3.5 - 2 * 1.5, 1e-4);
   EXPECT_EQ(far.seen[0][0][0][2][0].item<double>(), 0);
   EXPECT_EQ(far.seen[0][0][0][2][3].item<double>(), 1);
 }
 
 TEST(CarriedFrame, ThePlaneSaysHowFarThingsMove) {
   const Tensor frame = Picture();
-  const Tensor near = Carry(frame, {{}, {.x_m = 0.1}}, 0.5).latents[0].select(1, 0);  // half as far: twice the motion
+  const Tensor near = Carry(frame, {{}, {.x_m = 0.1}}, 0.5).frames[0].select(1, 0);  // half as far: twice the motion
   EXPECT_TRUE(at::allclose(near.narrow(2, 0, kWidth - 2), frame.narrow(2, 2, kWidth - 2), 1e-4, 1e-4));
 }
 
 TEST(CarriedFrame, WhereNoRayMeetsThePlaneItTurnsWithTheCameraAlone) {
   const Tensor frame = Picture();
-  const Tensor above = Carry(frame, {{}, {.x_m = 3}}, 7.0).latents[0].select(1, 0);  // the plane is behind the cameras
+  const Tensor above = Carry(frame, {{}, {.x_m = 3}}, 7.0).frames[0].select(1, 0);  // the plane is behind the cameras
   EXPECT_TRUE(at::allclose(above, frame, 1e-4, 1e-5));
 }
 
@@ -102,7 +116,38 @@ TEST(CarriedFrame, ARayAlongThePlaneIsFarAway) {
   const Tensor frame = at::rand({2, 5, kWidth});
   const CarriedFrame later = CarryAlongPlane(frame.unsqueeze(0), at::stack({unit, unit}, 1).unsqueeze(0),
                                              at::stack({here, there}, 1).unsqueeze(0), 0, 1, 2.0);
-  EXPECT_TRUE(at::allclose(later.latents[0].select(1, 0).select(1, 2), frame.select(1, 2), 1e-4, 1e-4));
+  EXPECT_TRUE(at::allclose(later.frames[0].select(1, 0).select(1, 2), frame.select(1, 2), 1e-4, 1e-4));
+}
+
+TEST(CarriedFrame, APictureFinerThanItsRaysMovesByItsOwnPixels) {
+  const Tensor picture = at::rand({3, 4 * kHeight, 4 * kWidth});
+  const CarriedFrame later =
+      Carry(picture, {{}, {.x_m = 0.025}, {.x_m = 0.1, .y_m = -0.05}});  // one pixel; four and two
+  ASSERT_EQ(later.frames.sizes(), (std::vector<std::int64_t>{1, 3, 2, 4 * kHeight, 4 * kWidth}));
+  ASSERT_EQ(later.seen.sizes(), (std::vector<std::int64_t>{1, 1, 2, kHeight, kWidth}));
+  const Tensor one = later.frames[0].select(1, 0), more = later.frames[0].select(1, 1);
+  EXPECT_TRUE(at::allclose(one.narrow(2, 0, 4 * kWidth - 1), picture.narrow(2, 1, 4 * kWidth - 1), 1e-4, 1e-4));
+  EXPECT_TRUE(at::allclose(more.narrow(2, 0, 4 * kWidth - 4).narrow(1, 0, 4 * kHeight - 2),
+                           picture.narrow(2, 4, 4 * kWidth - 4).narrow(1, 2, 4 * kHeight - 2), 1e-4, 1e-4));
+}
+
+TEST(CarriedFrame, LatentsGoByWayOfTheirPictureAndWhatStandsStillStays) {
+  ModelConfig config = TinyConfig();
+  config.vae.scale_factor = 0.5;
+  HashWeights weights;
+  const EvacModel model(weights, config);
+  const Rays still({{}, {}}), moved({{}, {.x_m = 0.04, .turn = 0.1}});
+  const Tensor latents = at::rand({2, config.vae.z_channels, kHeight, kWidth}) - 0.5;
+  const CarriedFrame later = CarryLatentsAlongPlane(model, latents, at::cat({still.direction, moved.direction}),
+                                                    at::cat({still.origin, moved.origin}), 0, 1, 0);
+  EXPECT_TRUE(later.frames[0].select(1, 0).equal(latents[0]));
+  EXPECT_EQ(later.seen[0].min().item<double>(), 1);
+  const Tensor picture = DecodeLatents(model, latents.narrow(0, 1, 1)).clamp(-1, 1);
+  const CarriedFrame pictures = CarryAlongPlane(picture, moved.direction, moved.origin, 0, 1, 0);
+  const Tensor wanted = EncodeImages(model, pictures.frames.select(2, 0), Tensor());
+  EXPECT_TRUE(at::allclose(later.frames.narrow(0, 1, 1).select(2, 0), wanted, 1e-4, 1e-5));
+  EXPECT_FALSE(at::allclose(later.frames[1].select(1, 0), latents[1], 1e-2, 1e-2));
+  EXPECT_TRUE(later.seen[1].equal(pictures.seen[0]));
 }
 
 }  // namespace

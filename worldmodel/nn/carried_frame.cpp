@@ -4,48 +4,116 @@
 #include <ATen/ops/linalg_inv.h>
 #include <ATen/ops/where.h>
 
+#include "worldmodel/nn/latent_pictures.h"
+
 namespace evac::nn {
 namespace {
 
-/// The numbers that take a place, seen from the camera, to its position in the frame: times [BV, 3, points], then
-/// divided by the third, x and y in positions from 0 to w - 1 and h - 1. From the rays of the four corners alone: a
-/// pinhole's rays, as long as they are on one plane before it, form a parallelogram.
-/// @param direction  [BV, 3, h, w]
-Tensor FrameFromPlace(const Tensor& direction) {
+constexpr double kStill = 1e-6;  // of a ray or a metre: a camera that has not moved
+
+/// The ray through a position, x and y in places from 0 to w - 1 and h - 1: this times (x, y, 1), of any length. From
+/// the rays of the four corners alone: a pinhole's rays, as long as they are on one plane before it, form a
+/// parallelogram.
+/// @param direction  [N, 3, h, w]
+/// @returns          [N, 3, 3], double
+Tensor RayFromPosition(const Tensor& direction) {
   const std::int64_t h = direction.size(2), w = direction.size(3);
   const Tensor rays = direction.to(at::kDouble);
   const auto corner = [&](std::int64_t y, std::int64_t x) { return rays.select(2, y).select(2, x).unsqueeze(2); };
   const Tensor first = corner(0, 0), right = corner(0, w - 1), below = corner(h - 1, 0), last = corner(h - 1, w - 1);
-  const Tensor lengths = at::matmul(at::linalg_inv(at::cat({right, below, -last}, 2)), first);  // [BV, 3, 1]
+  const Tensor lengths = at::matmul(at::linalg_inv(at::cat({right, below, -last}, 2)), first);  // [N, 3, 1]
   const Tensor across = right * lengths.narrow(1, 0, 1) - first, down = below * lengths.narrow(1, 1, 1) - first;
-  return at::linalg_inv(at::cat({across / static_cast<double>(w - 1), down / static_cast<double>(h - 1), first}, 2));
+  return at::cat({across / static_cast<double>(w - 1), down / static_cast<double>(h - 1), first}, 2);
+}
+
+/// Middles of the pixels of a picture that is `finer` times as fine as the places of its rays, row by row, as
+/// positions among the places. @returns [3, H W]: x, y, 1
+Tensor PixelPositions(std::int64_t h, std::int64_t w, std::int64_t finer, const at::Device& device) {
+  const auto along = [&](std::int64_t side) {
+    return (at::arange(side * finer, at::kDouble) + 0.5) / static_cast<double>(finer) - 0.5;
+  };
+  const std::int64_t height = h * finer, width = w * finer;
+  const Tensor x = along(w).reshape({1, width}).expand({height, width}),
+               y = along(h).reshape({height, 1}).expand({height, width});
+  return at::stack({x.flatten(), y.flatten(), at::ones({height * width}, at::kDouble)}).to(device);
+}
+
+/// Positions among the places of a frame, and how far before its camera they lie.
+struct Found {
+  Tensor x, y, depth;  ///< [BV, K, H W], double
+};
+
+/// Where in the frame `at` the pixels of later frames are looked for.
+Found Find(const Tensor& direction, const Tensor& origin, std::int64_t at, std::int64_t first, double plane_m,
+           std::int64_t finer) {
+  const std::int64_t rows = direction.size(0), h = direction.size(3), w = direction.size(4),
+                     later = direction.size(2) - first;
+  const Tensor corners = direction.narrow(2, first, later).transpose(1, 2).flatten(0, 1);  // [BV K, 3, h, w]
+  const Tensor ray = at::matmul(RayFromPosition(corners), PixelPositions(h, w, finer, direction.device()))
+                         .unflatten(0, {rows, later});  // [BV, K, 3, H W]
+  const auto camera = [&](std::int64_t from, std::int64_t count) {
+    const Tensor all = origin.narrow(2, from, count).narrow(3, 0, 1).narrow(4, 0, 1).to(at::kDouble);
+    return all.transpose(1, 2).flatten(3);  // [BV, count, 3, 1]
+  };
+  const Tensor from = camera(first, later), distance = (plane_m - from.narrow(2, 2, 1)) / ray.narrow(2, 2, 1);
+  constexpr double kFar = 1e4;  // rays' lengths; and a ray along the plane, which meets it nowhere
+  const Tensor place =
+      at::where((distance > 0).logical_and(distance < kFar), from + distance * ray - camera(at, 1), ray);
+  const Tensor found = at::matmul(at::linalg_inv(RayFromPosition(direction.select(2, at))).unsqueeze(1), place);
+  const Tensor depth = found.select(2, 2), safe = depth.clamp_min(1e-9);
+  return {found.select(2, 0) / safe, found.select(2, 1) / safe, depth};
+}
+
+/// [BV] true where no later camera is elsewhere or looks elsewhere than `at`.
+Tensor StandsStill(const Tensor& direction, const Tensor& origin, std::int64_t at, std::int64_t first) {
+  const auto moved = [&](const Tensor& of) {
+    return (of.narrow(2, first, of.size(2) - first) - of.narrow(2, at, 1)).abs().flatten(1).amax(1);
+  };
+  return (moved(direction) < kStill).logical_and(moved(origin) < kStill);
 }
 
 }  // namespace
 
 CarriedFrame CarryAlongPlane(const Tensor& frame, const Tensor& direction, const Tensor& origin, std::int64_t at,
                              std::int64_t first, double plane_m) {
-  const std::int64_t rows = frame.size(0), h = frame.size(2), w = frame.size(3), later = direction.size(2) - first;
-  const Tensor ray = direction.narrow(2, first, later).flatten(2).to(at::kDouble);  // [BV, 3, K h w]
-  const Tensor from = origin.narrow(2, first, later).flatten(2).to(at::kDouble);
-  const Tensor distance = (plane_m - from.narrow(1, 2, 1)) / ray.narrow(1, 2, 1);
-  const Tensor camera = origin.select(2, at).narrow(2, 0, 1).narrow(3, 0, 1).flatten(2).to(at::kDouble);
-  constexpr double kFar_m = 1e4;  // and a ray along the plane, which meets it nowhere
-  const Tensor place = at::where((distance > 0).logical_and(distance < kFar_m), from + distance * ray - camera, ray);
-  const Tensor found = at::matmul(FrameFromPlace(direction.select(2, at)), place);
-  const Tensor depth = found.narrow(1, 2, 1), safe = depth.clamp_min(1e-9);
-  const Tensor x = found.narrow(1, 0, 1) / safe, y = found.narrow(1, 1, 1) / safe;
+  const std::int64_t rows = frame.size(0), h = direction.size(3), w = direction.size(4),
+                     later = direction.size(2) - first, height = frame.size(2), width = frame.size(3),
+                     finer = height / h;
+  CheckShape("a frame to carry", frame, {direction.size(0), -1, h * finer, w * finer});
   const auto within = [](const Tensor& position, std::int64_t side) {
     return (position >= -0.5).logical_and(position <= static_cast<double>(side) - 0.5);
   };
-  const Tensor seen = (depth > 1e-9).logical_and(within(x, w)).logical_and(within(y, h));
-  const auto scaled = [](const Tensor& position, std::int64_t side) {
-    return (position * (2.0 / static_cast<double>(side - 1)) - 1).clamp(-2, 2);
+  const Found places = Find(direction, origin, at, first, plane_m, 1);
+  const Tensor seen =
+      (places.depth > 1e-9).logical_and(within(places.x, w)).logical_and(within(places.y, h)).unsqueeze(1);
+  const Found pixels = finer == 1 ? places : Find(direction, origin, at, first, plane_m, finer);
+  const auto scaled = [](const Tensor& position, std::int64_t side) {  // -1 and 1: the outer edges of the frame
+    return ((position + 0.5) * (2.0 / static_cast<double>(side)) - 1).clamp(-2, 2);
   };
-  const Tensor grid = at::cat({scaled(x, w), scaled(y, h)}, 1).transpose(1, 2).reshape({rows, later * h, w, 2});
+  const Tensor grid = at::stack({scaled(pixels.x, w), scaled(pixels.y, h)}, 3)  // [BV, K, H W, 2]
+                          .reshape({rows, later * height, width, 2});
   constexpr std::int64_t kBilinear = 0, kRepeatEdge = 1;
-  const Tensor read = at::grid_sampler_2d(frame, grid.to(frame.scalar_type()), kBilinear, kRepeatEdge, true);
-  return {read.unflatten(2, {later, h}), seen.to(frame.scalar_type()).reshape({rows, 1, later, h, w})};
+  const Tensor read = at::grid_sampler_2d(frame.to(at::kFloat), grid.to(at::kFloat), kBilinear, kRepeatEdge, false);
+  return {read.to(frame.scalar_type()).unflatten(2, {later, height}),
+          seen.to(frame.scalar_type()).unflatten(3, {h, w})};
+}
+
+CarriedFrame CarryLatentsAlongPlane(const EvacModel& model, const Tensor& latents, const Tensor& direction,
+                                    const Tensor& origin, std::int64_t at, std::int64_t first, double plane_m) {
+  const std::int64_t rows = latents.size(0), h = latents.size(2), w = latents.size(3),
+                     later = direction.size(2) - first;
+  CarriedFrame carried{latents.unsqueeze(2).expand({-1, -1, later, -1, -1}).clone(),
+                       at::ones({rows, 1, later, h, w}, latents.options())};
+  const Tensor moving = StandsStill(direction, origin, at, first).logical_not().nonzero().squeeze(1);
+  if (moving.numel() == 0) return carried;
+  const Tensor picture = DecodeLatents(model, latents.index_select(0, moving)).clamp(-1, 1);
+  const CarriedFrame pictures =
+      CarryAlongPlane(picture, direction.index_select(0, moving), origin.index_select(0, moving), at, first, plane_m);
+  const Tensor encoded = EncodeImages(model, pictures.frames.transpose(1, 2).flatten(0, 1), Tensor());
+  carried.frames.index_copy_(0, moving,
+                             encoded.unflatten(0, {moving.numel(), later}).transpose(1, 2).to(latents.scalar_type()));
+  carried.seen.index_copy_(0, moving, pictures.seen.to(latents.scalar_type()));
+  return carried;
 }
 
 }  // namespace evac::nn

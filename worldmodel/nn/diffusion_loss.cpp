@@ -46,26 +46,18 @@ Tensor WithNoisyMemory(const NoiseSchedule& schedule, const Tensor& latents, con
 
 }  // namespace
 
-void Remember(const NoiseSchedule& schedule, const Tensor& memory, Concat& concat) {
+void Remember(const EvacModel& model, const Tensor& memory, Concat& concat) {
+  const at::NoGradGuard no_gradients;
   const std::int64_t n = memory.size(2), chunk = concat.mask.size(2) - n;
-  std::vector<std::int64_t> shape = memory.sizes().vec();
-  shape[2] = chunk;
-  concat.image = at::cat({memory, memory.narrow(2, n - 1, 1).expand(shape)}, 2) * concat.mask;
-  if (!schedule.carry_plane_m()) return;
-  const CarriedFrame later =
-      CarryAlongPlane(memory.select(2, n - 1), concat.direction, concat.origin, n - 1, n, *schedule.carry_plane_m());
-  concat.carried = at::cat({memory, later.latents}, 2) * concat.mask;
+  const Tensor newest = memory.select(2, n - 1);
+  concat.still = newest.unsqueeze(2).expand({-1, -1, chunk, -1, -1});
+  concat.image = at::cat({memory, concat.still}, 2) * concat.mask;
+  if (!model.schedule().carry_plane_m()) return;
+  const CarriedFrame later = CarryLatentsAlongPlane(model, newest, concat.direction, concat.origin, n - 1, n,
+                                                    *model.schedule().carry_plane_m());
+  concat.still = later.frames;
+  concat.carried = at::cat({memory, later.frames}, 2) * concat.mask;
   concat.seen = at::cat({at::ones_like(concat.mask.narrow(2, 0, n)), later.seen}, 2) * concat.mask;
-}
-
-Tensor NothingChanges(const NoiseSchedule& schedule, const Tensor& memory, const Tensor& direction,
-                      const Tensor& origin) {
-  const std::int64_t n = memory.size(2);
-  if (schedule.carry_plane_m())
-    return CarryAlongPlane(memory.select(2, n - 1), direction, origin, n - 1, n, *schedule.carry_plane_m()).latents;
-  std::vector<std::int64_t> shape = memory.sizes().vec();
-  shape[2] = direction.size(2) - n;
-  return memory.narrow(2, n - 1, 1).expand(shape);
 }
 
 Tensor FromLastFrame(const NoiseSchedule& schedule, const Tensor& v, const Concat& concat, const Tensor& t) {
@@ -82,12 +74,14 @@ Tensor DenoiserInput(const Tensor& x, const Concat& concat) {
   return at::cat(parts, 1);
 }
 
-Tensor DiffusionLoss(const UNet& unet, const NoiseSchedule& schedule, const DiffusionBatch& batch) {
+Tensor DiffusionLoss(const EvacModel& model, const DiffusionBatch& batch) {
+  const UNet& unet = model.unet();
+  const NoiseSchedule& schedule = model.schedule();
   const std::int64_t chunk = batch.latents.size(2) - batch.memory;
   const Tensor latents =
       batch.teacher_forcing ? WithNoisyMemory(schedule, batch.latents, *batch.teacher_forcing) : batch.latents;
   Concat concat = batch.concat;
-  Remember(schedule, latents.narrow(2, 0, batch.memory), concat);
+  if (batch.teacher_forcing || !concat.image.defined()) Remember(model, latents.narrow(2, 0, batch.memory), concat);
   const Tensor t = batch.t.repeat_interleave(batch.context.views, 0);  // [BV]
   const Levels levels = LevelsAt(schedule, t, 5);
   const Tensor x = latents * PerRow(t, 5, [&](std::int64_t step) { return schedule.Scale(step); });

@@ -17,14 +17,14 @@ struct Concat {
   /// [BV, z, T, h, w]: as `image`, but the last memory frame carried to where the camera is; undefined: it is not.
   Tensor carried = {};
   Tensor seen = {};  ///< [BV, 1, T, h, w]: 1 where that frame shows the place; undefined with `carried`
+  /// [BV, z, K, h, w]: the chunk in which nothing changes, whatever the mask: the newest memory frame, repeated or
+  /// carried.
+  Tensor still = {};
 };
 
-/// Fills in `image`, and what is carried if the schedule says so, from the memory [BV, z, N, h, w] and the rest.
-void Remember(const NoiseSchedule& schedule, const Tensor& memory, Concat& concat);
-
-/// The chunk in which nothing changes: the newest memory frame, repeated or carried. @returns [BV, z, K, h, w]
-Tensor NothingChanges(const NoiseSchedule& schedule, const Tensor& memory, const Tensor& direction,
-                      const Tensor& origin);
+/// Fills in `image`, `still`, and what is carried if the schedule says so, from the memory [BV, z, N, h, w] and the
+/// rest; without gradients.
+void Remember(const EvacModel& model, const Tensor& memory, Concat& concat);
 
 /// [BV, in_channels, T, h, w] in the order the network was trained with.
 Tensor DenoiserInput(const Tensor& x, const Concat& concat);
@@ -45,7 +45,7 @@ struct TeacherForcing {
 
 struct DiffusionBatch {
   Tensor latents;  ///< [BV, z, T, h, w], clean
-  Concat concat;   ///< what Remember fills in is worked out here
+  Concat concat;   ///< remembered here, if it is not or if the memory is noised here
   UNet::Context context;
   Tensor t;                 ///< [B] integers
   Tensor noise;             ///< [BV, z, T, h, w]
@@ -55,6 +55,6 @@ struct DiffusionBatch {
 };
 
 /// Mean squared error of v over the frames to imagine, weighted. @returns a number, differentiable.
-Tensor DiffusionLoss(const UNet& unet, const NoiseSchedule& schedule, const DiffusionBatch& batch);
+Tensor DiffusionLoss(const EvacModel& model, const DiffusionBatch& batch);
 
 }  // namespace evac::nn

@@ -3,46 +3,10 @@
 #include <ATen/ops/ones_like.h>
 #include <ATen/ops/zeros_like.h>
 
-#include <algorithm>
-
 #include "worldmodel/nn/dpm_solver.h"
 #include "worldmodel/nn/frame_actions.h"
 
 namespace evac::nn {
-namespace {
-
-constexpr std::int64_t kCodecPixels = std::int64_t{2} * 320 * 512;  // at once: two pictures of the published size
-
-/// `count` pictures of `pixels` each through `function`, so many at a time as memory bears.
-template <typename Function>
-Tensor InBatches(std::int64_t count, std::int64_t pixels, Function function) {
-  const std::int64_t batch = std::max<std::int64_t>(1, kCodecPixels / pixels);
-  std::vector<Tensor> parts;
-  for (std::int64_t from = 0; from < count; from += batch)
-    parts.push_back(function(from, std::min(batch, count - from)));
-  return at::cat(parts, 0);
-}
-
-}  // namespace
-
-Tensor EncodeImages(const EvacModel& model, const Tensor& images, const Tensor& noise) {
-  return InBatches(images.size(0), images.size(2) * images.size(3), [&](std::int64_t from, std::int64_t count) {
-    const Posterior posterior = model.vae().Encode(images.narrow(0, from, count));
-    return posterior.Sample(noise.defined() ? noise.narrow(0, from, count) : noise) * model.vae().scale_factor();
-  });
-}
-
-Tensor EncodePoseMaps(const EvacModel& model, const Tensor& maps, const Tensor& noise) {
-  const Tensor encoded = EncodeImages(model, maps.flatten(0, 1), noise.defined() ? noise.flatten(0, 1) : noise);
-  return encoded.unflatten(0, {maps.size(0), maps.size(1)}).transpose(1, 2).contiguous();
-}
-
-Tensor DecodeLatents(const EvacModel& model, const Tensor& latents) {
-  const std::int64_t stride = model.config().vae.Stride();
-  return InBatches(
-      latents.size(0), latents.size(2) * latents.size(3) * stride * stride,
-      [&](std::int64_t from, std::int64_t count) { return model.vae().Decode(latents.narrow(0, from, count)); });
-}
 
 Conditioning Condition(const EvacModel& model, const ChunkRequest& request) {
   Conditioning conditioning;
@@ -53,7 +17,7 @@ Conditioning Condition(const EvacModel& model, const ChunkRequest& request) {
   concat.mask = at::ones_like(concat.pose_map.narrow(1, 0, 1));
   concat.direction = request.direction;
   concat.origin = request.origin;
-  Remember(model.schedule(), request.memory, concat);
+  Remember(model, request.memory, concat);
   conditioning.tokens = model.ContextTokens(model.ImageTokens(request.image), model.ActionTokens(request.deltas));
   if (model.config().unet.frame_actions) conditioning.frames = FrameActions(request.arms, conditioning.memory);
   return conditioning;
@@ -64,7 +28,7 @@ Conditioning Unconditioned(const EvacModel& model, const ChunkRequest& request, 
   const std::int64_t memory = request.memory.size(2), chunk = request.pose_maps.size(2);
   const Tensor& mask = conditioning.concat.mask;
   without.concat.mask = at::cat({mask.narrow(2, 0, memory), at::zeros_like(mask.narrow(2, memory, chunk))}, 2);
-  Remember(model.schedule(), request.memory, without.concat);
+  Remember(model, request.memory, without.concat);
   without.tokens =
       model.ContextTokens(model.ImageTokens(at::zeros_like(request.image)), model.ActionTokens(request.deltas));
   return without;

@@ -6,6 +6,7 @@
 #include "worldmodel/nn/diffusion_loss.h"
 #include "worldmodel/nn/evac_model.h"
 #include "worldmodel/nn/imagine_options.h"
+#include "worldmodel/nn/latent_pictures.h"
 
 /// One chunk of imagination: conditioning, then denoising. Tensors in, latents out; whose robot it is, is known
 /// elsewhere.
@@ -32,7 +33,7 @@ struct ChunkNoise {
 struct Conditioning {
   std::int64_t views = 1, memory = 0;  ///< V, N
   Concat concat;
-  Tensor tokens;  ///< [BV, image tokens + action tokens, context_dim]
+  Tensor tokens;       ///< [BV, image tokens + action tokens, context_dim]
   Tensor frames = {};  ///< [B, T, kFrameActionNumbers] or undefined
 };
 
@@ -42,13 +43,6 @@ Conditioning Unconditioned(const EvacModel& model, const ChunkRequest& request, 
 
 /// The network with its context worked out, as the samplers want it. `model` must outlive it.
 Denoise MakeDenoise(const EvacModel& model, const Conditioning& conditioning);
-
-/// Pictures [N, 3, H, W] in [-1, 1] → [N, z, h, w], scaled; undefined noise: the posterior's mean. Two at a time.
-Tensor EncodeImages(const EvacModel& model, const Tensor& images, const Tensor& noise);
-/// Pictures [BV, K, 3, H, W] and noise [BV, K, z, h, w] → [BV, z, K, h, w].
-Tensor EncodePoseMaps(const EvacModel& model, const Tensor& maps, const Tensor& noise);
-/// [N, z, h, w] → [N, 3, H, W], not clamped.
-Tensor DecodeLatents(const EvacModel& model, const Tensor& latents);
 
 /// @returns [BV, z, T, h, w]: the memory as given, then the imagined latents.
 Tensor ImagineChunk(const EvacModel& model, const ChunkRequest& request, const ChunkNoise& noise,

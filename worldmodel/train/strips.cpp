@@ -1,5 +1,8 @@
 #include "worldmodel/train/strips.h"
 
+#include <ATen/ops/ones_like.h>
+#include <ATen/ops/zeros_like.h>
+
 #include <algorithm>
 #include <cmath>
 
@@ -10,6 +13,11 @@ namespace evac::train {
 namespace {
 
 enum Stream : std::uint32_t { kStart = 21, kSteps };
+
+/// Latents [V, z, K, h, w] as pictures [V K, 3, H, W] in [-1, 1].
+Tensor Pictures(const nn::EvacModel& model, const Tensor& latents) {
+  return nn::DecodeLatents(model, latents.transpose(1, 2).flatten(0, 1)).clamp(-1, 1);
+}
 
 /// What one window's chunk looks like to the network: [V K, 3, H, W] in [-1, 1].
 Tensor Imagine(const nn::EvacModel& model, const WorldBatch& batch, const StripOptions& options, std::int64_t index) {
@@ -29,7 +37,14 @@ Tensor Imagine(const nn::EvacModel& model, const WorldBatch& batch, const StripO
   sampler.solver = nn::Solver::kDpmSolver;
   sampler.steps = options.steps;
   const Tensor latents = nn::ImagineChunk(model, request, {start.Normal(shape), step}, sampler);
-  return nn::DecodeLatents(model, latents.narrow(2, n, chunk).transpose(1, 2).flatten(0, 1)).clamp(-1, 1);
+  return Pictures(model, latents.narrow(2, n, chunk));
+}
+
+/// The chunk in which nothing changes, as the network is told.
+Tensor NothingChanges(const nn::EvacModel& model, const WorldBatch& batch) {
+  nn::Concat concat{{}, at::ones_like(batch.latents.narrow(1, 0, 1)), {}, batch.direction, batch.origin};
+  nn::Remember(model, batch.latents.narrow(2, 0, batch.memory), concat);
+  return Pictures(model, concat.still);
 }
 
 /// The frames from the newest memory on: [V (1 + K), 3, H, W].
@@ -62,7 +77,9 @@ Strips DrawStrips(const nn::EvacModel& model, const ShardSet& shards, const std:
                   const StripOptions& options) {
   const at::NoGradGuard no_gradients;
   std::vector<Tensor> rows;
-  Tensor error = at::zeros({model.config().views}), copy_error = at::zeros({model.config().views});
+  const bool carries = model.schedule().carry_plane_m().has_value();
+  Tensor error = at::zeros({model.config().views}), copy_error = at::zeros_like(error),
+         carried_error = at::zeros_like(error);
   for (std::size_t i = 0; i < windows.size(); ++i) {
     const WorldBatch batch = MakeWorldBatch(shards, {windows[i]});
     const std::int64_t views = batch.views, chunk = windows[i].chunk;
@@ -71,13 +88,17 @@ Strips DrawStrips(const nn::EvacModel& model, const ShardSet& shards, const std:
     const Tensor newest = truth.narrow(1, 0, 1);
     error += SquaredErrors(imagined, truth.narrow(1, 1, chunk));
     copy_error += SquaredErrors(newest.expand(imagined.sizes()), truth.narrow(1, 1, chunk));
+    if (carries)
+      carried_error +=
+          SquaredErrors(NothingChanges(model, batch).unflatten(0, {views, chunk}), truth.narrow(1, 1, chunk));
     for (std::int64_t view = 0; view < views; ++view) {
       rows.push_back(Row(truth[view], options.every));
       rows.push_back(Row(at::cat({newest[view], imagined[view]}), options.every));
     }
   }
   const auto count = static_cast<double>(windows.size());
-  return {at::cat(rows).contiguous(), Psnr(error / count), Psnr(copy_error / count)};
+  return {at::cat(rows).contiguous(), Psnr(error / count), Psnr(copy_error / count),
+          carries ? Psnr(carried_error / count) : std::vector<double>()};
 }
 
 }  // namespace evac::train

@@ -11,8 +11,9 @@ namespace evac::train {
 /// Windows imagined and set beside the truth.
 struct Strips {
   Tensor picture;  ///< [rows, columns, 3] bytes, RGB: per window a row of truth, and one imagined below it
-  /// One number per view, in dB, colours 0 … 1: of the imagined frames, and of the newest memory frame repeated.
-  std::vector<double> psnr, psnr_copy;
+  /// One number per view, in dB, colours 0 … 1: of the imagined frames, and of the newest memory frame repeated; of
+  /// that frame carried along, if the model's schedule does so.
+  std::vector<double> psnr, psnr_copy, psnr_carried;
 };
 
 struct StripOptions {

@@ -140,7 +140,8 @@ TrainerSummary TrainWorld(const JobPlace& place, const WorldOptions& given, cons
     const Strips strips = DrawStrips(model, holdout, drawn, {.steps = options.strip_steps});
     if (place.say)
       place.say("step " + std::to_string(step) + ": by view, imagined " + Numbers(strips.psnr) + " dB, a frozen copy " +
-                Numbers(strips.psnr_copy) + " dB");
+                Numbers(strips.psnr_copy) + " dB" +
+                (strips.psnr_carried.empty() ? "" : ", carried " + Numbers(strips.psnr_carried) + " dB"));
     if (look) look(step, strips);
   };
   const TrainerSummary summary =

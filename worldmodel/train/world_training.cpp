@@ -102,16 +102,12 @@ Tensor WorldTraining::TokensOf(const WorldBatch& batch) const {
 }
 
 /// [BV, 1, K, h, w], mean 1: by place, and by the step's noise.
-Tensor WorldTraining::Weight(const WorldBatch& batch, const Tensor& t) const {
+Tensor WorldTraining::Weight(const WorldBatch& batch, const Tensor& still, const Tensor& t) const {
   const std::int64_t n = batch.memory, chunk = batch.latents.size(2) - n, h = batch.latents.size(3),
                      w = batch.latents.size(4);
   Tensor weight = at::ones({batch.latents.size(0), 1, chunk, h, w});
   const Tensor frames = batch.latents.narrow(2, n, chunk);
-  if (options_.change_weight > 0)
-    weight += options_.change_weight * (frames - nn::NothingChanges(model_.schedule(), batch.latents.narrow(2, 0, n),
-                                                                    batch.direction, batch.origin))
-                                           .abs()
-                                           .mean(1, true);
+  if (options_.change_weight > 0) weight += options_.change_weight * (frames - still).abs().mean(1, true);
   if (options_.object_weight > 0) {
     const Tensor object = batch.object.narrow(2, n, chunk);                                // [BV, 2, K]
     const Tensor x = at::arange(w, at::kFloat) + 0.5 - object.select(1, 0).unsqueeze(-1);  // [BV, K, w]
@@ -153,8 +149,7 @@ Tensor WorldTraining::LossOf(const WorldBatch& given, const Drops& drops, const 
                           t,
                           dice.Normal(batch.latents.sizes()),
                           n,
-                          std::nullopt,
-                          Weight(batch, t)};
+                          std::nullopt};
   if (step.context.frames.defined()) step.context.frames = step.context.frames * PerRow(drops.actions, 3);
   if (noisy_memory && options_.memory_noise_kind == MemoryNoise::kPublished) {
     std::vector<float> angles;
@@ -171,7 +166,9 @@ Tensor WorldTraining::LossOf(const WorldBatch& given, const Drops& drops, const 
     Tensor memory = step.latents.narrow(2, 0, n);
     memory.add_(dice.Normal(memory.sizes()) * PerRow(deviations, 5));
   }
-  return nn::DiffusionLoss(model_.unet(), model_.schedule(), step);
+  nn::Remember(model_, step.latents.narrow(2, 0, n), step.concat);
+  step.weight = Weight(batch, step.concat.still, t);
+  return nn::DiffusionLoss(model_, step);
 }
 
 Tensor WorldTraining::ImagineOnce(const WorldBatch& batch, Dice& dice) const {
@@ -180,7 +177,7 @@ Tensor WorldTraining::ImagineOnce(const WorldBatch& batch, Dice& dice) const {
   const Tensor memory = batch.latents.narrow(2, 0, n);
   const Tensor mask = at::ones_like(batch.latents.narrow(1, 0, 1));
   nn::Concat concat{{}, mask, batch.pose_maps, batch.direction, batch.origin};
-  nn::Remember(model_.schedule(), memory, concat);
+  nn::Remember(model_, memory, concat);
   const Tensor noise = dice.Normal(batch.latents.sizes());
   const double scale = model_.schedule().Scale(last);
   const Tensor x = at::cat({memory * scale, noise.narrow(2, n, chunk)}, 2);

@@ -36,13 +36,14 @@ struct WorldTrainingOptions {
 
   StepWeight step_weight = StepWeight::kVelocity;
   double step_weight_cap = 3;
-  double object_weight = 0;         ///< more of latents at the object: a bell of `object_radius` latent pixels
+  double object_weight = 0;  ///< more of latents at the object: a bell of `object_radius` latent pixels
   double object_radius = 1;
-  double change_weight = 0;         ///< more of latents that differ from the newest memory frame, per unit
-  std::vector<double> view_weights; ///< how much each view counts beside the others, in the shards' order; empty: alike
+  double change_weight = 0;  ///< more of latents that differ from a chunk in which nothing changes, per unit
+  std::vector<double>
+      view_weights;  ///< how much each view counts beside the others, in the shards' order; empty: alike
 
-  double self_memory_share = 0;  ///< of the samples whose memory the network imagined itself, in one step
-  double self_memory_from = 0.5; ///< after this part of the training
+  double self_memory_share = 0;   ///< of the samples whose memory the network imagined itself, in one step
+  double self_memory_from = 0.5;  ///< after this part of the training
 
   bool train_action_resampler = false;  ///< the paper's page freezes it, its text trains it
   bool train_image_encoder = false;     ///< there is no pretrained one of a small size
@@ -73,7 +74,7 @@ class WorldTraining {
   Tensor LossOf(const WorldBatch& batch, const Drops& drops, const Tensor& t, Dice& dice, bool noisy_memory) const;
   Drops DrawDrops(const WorldBatch& batch, Dice& dice) const;
   std::int64_t DrawStep(Dice& dice) const;
-  Tensor Weight(const WorldBatch& batch, const Tensor& t) const;
+  Tensor Weight(const WorldBatch& batch, const Tensor& still, const Tensor& t) const;
   nn::UNet::Context ContextOf(const Tensor& tokens, const WorldBatch& batch) const;
   Tensor TokensOf(const WorldBatch& batch) const;
   void RememberOwn(const std::vector<Window>& windows, WorldBatch& batch, Dice& dice) const;

@@ -1,0 +1,15 @@
+#pragma once
+
+#include "worldmodel/nn/evac_model.h"
+
+/// Pictures through the codec, so many at a time as memory bears.
+namespace evac::nn {
+
+/// Pictures [N, 3, H, W] in [-1, 1] → [N, z, h, w], scaled; undefined noise: the posterior's mean.
+Tensor EncodeImages(const EvacModel& model, const Tensor& images, const Tensor& noise);
+/// Pictures [BV, K, 3, H, W] and noise [BV, K, z, h, w] → [BV, z, K, h, w].
+Tensor EncodePoseMaps(const EvacModel& model, const Tensor& maps, const Tensor& noise);
+/// [N, z, h, w] → [N, 3, H, W], not clamped.
+Tensor DecodeLatents(const EvacModel& model, const Tensor& latents);
+
+}  // namespace evac::nn
