@@ -3,12 +3,14 @@
 
 #include <Eigen/Geometry>
 #include <algorithm>
+#include <cmath>
 #include <fstream>
 
 #include "tests/nn/support.h"
 #include "tests/support/temp_folder.h"
 #include "tests/train/synthetic_shards.h"
 #include "worldmodel/frame_memory.h"
+#include "worldmodel/nn/dpm_solver.h"
 #include "worldmodel/nn/imagine.h"
 #include "worldmodel/nn/weights.h"
 #include "worldmodel/ray_map.h"
@@ -121,6 +123,22 @@ TEST(TrainWorld, TheLossFallsWithEverythingThatThePaperLacks) {
   EXPECT_LT(after, 0.9 * before);
 }
 
+TEST(TrainWorld, NoiseThatASamplerAsksAboutIsTrained) {
+  const nn::ModelConfig config = nn::TinyConfig();
+  const nn::NoiseSchedule schedule(config.schedule);
+  const WorldTrainingOptions options;
+  for (std::int64_t calls = 2; calls <= 20; ++calls) {
+    const std::vector<std::int64_t> steps = nn::DpmSolverSteps(schedule, calls);
+    for (std::size_t i = 1; i + 1 < steps.size(); ++i) {  // pure noise has a share of its own; step 0 is clean
+      const double alpha_bar = schedule.AlphaBar(steps[i]), ratio = std::sqrt((1 - alpha_bar) / alpha_bar);
+      EXPECT_LE(ratio, options.ratio_to) << calls << " calls, step " << steps[i];
+      if (calls <= 6) {
+        EXPECT_GE(ratio, options.ratio_from) << calls << " calls, step " << steps[i];
+      }
+    }
+  }
+}
+
 TEST(TrainWorld, AViewsErrorsCountAsMuchAsItsWeight) {
   const Prepared at(2);
   ShardSet shards(at.folder / "shards", Split::kTrain);
@@ -145,7 +163,8 @@ TEST(TrainWorld, AViewsErrorsCountAsMuchAsItsWeight) {
   for (const char* wrong : {"1,-1", "1,0", "1,x", "1,,1", "1,inf"}) EXPECT_THROW(loss(wrong), TensorError) << wrong;
   WorldOptions three = Quick(1);
   three.view_weights = "1,1,1";
-  EXPECT_THROW(TrainWorld({at.folder / "shards", at.folder / "out", at.config}, three, {.codec = at.codec()}, {}), TensorError);
+  EXPECT_THROW(TrainWorld({at.folder / "shards", at.folder / "out", at.config}, three, {.codec = at.codec()}, {}),
+               TensorError);
 }
 
 std::string Bytes(const std::filesystem::path& path) {
@@ -225,7 +244,8 @@ TEST(Windows, LieInTheirClipNewestLastAndHoldContactWhenAsked) {
   const TempFolder folder;
   WriteSyntheticShards(folder.path(), {.frames = 12});
   const ShardSet shards(folder.path(), Split::kTrain);
-  const WindowSampler sampler(shards, {.chunk = 3, .memory = 4, .history = 8, .rollout_share = 0.5, .contact_share = 1});
+  const WindowSampler sampler(shards,
+                              {.chunk = 3, .memory = 4, .history = 8, .rollout_share = 0.5, .contact_share = 1});
   Dice dice({1, 0, 0, 0}, 1);
   for (int i = 0; i < 200; ++i) {
     const Window window = sampler.Pick(dice);
@@ -243,16 +263,20 @@ TEST(Windows, ComeFromSuccessesAloneWhenAsked) {
   WriteSyntheticShards(folder.path(), {.frames = 12});
   WriteSyntheticShards(folder.path(), {.clips = 6, .frames = 12, .failures = 4});
   const ShardSet shards(folder.path(), Split::kTrain);
-  const WindowSampler sampler(shards, {.chunk = 3, .memory = 4, .history = 8, .rollout_share = 0.5, .successes_only = true});
+  const WindowSampler sampler(shards,
+                              {.chunk = 3, .memory = 4, .history = 8, .rollout_share = 0.5, .successes_only = true});
   Dice dice({1, 0, 0, 0}, 1);
   for (int i = 0; i < 200; ++i) EXPECT_EQ(sampler.Pick(dice).clip->outcome, 1);
   WriteSyntheticShards(folder.path(), {.clips = 6, .frames = 12, .failures = 6});
-  EXPECT_THROW(WindowSampler(ShardSet(folder.path(), Split::kTrain), {.chunk = 3, .memory = 4, .history = 8, .successes_only = true}), TensorError);
+  EXPECT_THROW(WindowSampler(ShardSet(folder.path(), Split::kTrain),
+                             {.chunk = 3, .memory = 4, .history = 8, .successes_only = true}),
+               TensorError);
 }
 
 TEST(Rays, AreThoseOfTheWorldThatImagines) {
   Eigen::Matrix4f c2w = Eigen::Matrix4f::Identity();
-  c2w.block<3, 3>(0, 0) = (Eigen::AngleAxisf(0.4F, Eigen::Vector3f::UnitX()) * Eigen::AngleAxisf(-1.1F, Eigen::Vector3f::UnitZ())).matrix();
+  c2w.block<3, 3>(0, 0) =
+      (Eigen::AngleAxisf(0.4F, Eigen::Vector3f::UnitX()) * Eigen::AngleAxisf(-1.1F, Eigen::Vector3f::UnitZ())).matrix();
   c2w.block<3, 1>(0, 3) = Eigen::Vector3f(0.2F, -0.5F, 1.1F);
   Eigen::Matrix3f k;
   k << 80, 0, 50, 0, 75, 30, 0, 0, 1;

@@ -29,10 +29,10 @@ struct WorldTrainingOptions {
   double memory_noise = 0.3, memory_noise_share = 0.7;  ///< of kUniform
 
   /// Of the samples at pure noise. The others: uniform over the steps (the paper), or uniform in the logarithm of
-  /// noise / signal between two bounds.
+  /// noise / signal between two bounds. A sampler must not ask in a gap below pure noise where nothing was trained.
   double terminal_share = 0;
   bool log_uniform = false;
-  double ratio_from = 0.006, ratio_to = 2;
+  double ratio_from = 0.3, ratio_to = 166;
 
   StepWeight step_weight = StepWeight::kVelocity;
   double step_weight_cap = 3;
