@@ -9,7 +9,7 @@
 namespace evac {
 namespace {
 
-enum Stream : std::uint32_t { kPick = 11, kChange = 12 };
+enum Stream : std::uint32_t { kPick = 11, kChange = 12, kMove = 13 };
 
 /// Rows of the pictures between first and last, each moved on its own.
 std::vector<std::int64_t> JitteredRows(const PackedClip& clip, double jitter, train::Dice& dice) {
@@ -30,7 +30,31 @@ at::Tensor CrossEntropy(const at::Tensor& logit, const at::Tensor& outcome) {
 
 at::Tensor Indices(const std::vector<std::int64_t>& rows) { return at::tensor(at::ArrayRef<std::int64_t>(rows)); }
 
+/// Which of n rows is shown in each row when all move on by `shift`; the first or last is repeated.
+at::Tensor ShiftedRows(std::int64_t n, std::int64_t shift) {
+  return (at::arange(n, at::kLong) - shift).clamp(0, n - 1);
+}
+
 }  // namespace
+
+SeenClip Moved(const SeenClip& clip, const std::vector<std::array<std::int64_t, 2>>& shift_px, bool is_mirrored) {
+  const at::Tensor& bytes = clip.pictures;
+  const std::int64_t height = bytes.size(2), width = bytes.size(3);
+  std::vector<at::Tensor> pictures, objects;
+  for (std::size_t v = 0; v < shift_px.size(); ++v) {
+    const auto [right, down] = shift_px[v];
+    const auto view = static_cast<std::int64_t>(v);
+    pictures.push_back(
+        bytes[view].index_select(1, ShiftedRows(height, down)).index_select(2, ShiftedRows(width, right)));
+    objects.push_back(clip.objects[view] + at::tensor({static_cast<float>(right), static_cast<float>(down)}));
+  }
+  SeenClip moved{at::stack(pictures), at::stack(objects)};
+  if (is_mirrored) {
+    moved.pictures = moved.pictures.flip(3);
+    moved.objects = moved.objects * at::tensor({-1.0F, 1.0F}) + at::tensor({static_cast<float>(width), 0.0F});
+  }
+  return moved;
+}
 
 train::Settings SettingsOf(JudgeTrainingOptions& options) {
   train::Settings settings = {{"batch", &options.batch},
@@ -39,6 +63,8 @@ train::Settings SettingsOf(JudgeTrainingOptions& options) {
                               {"jitter", &options.jitter},
                               {"object_weight", &options.object_weight},
                               {"reconstructed_share", &options.reconstructed_share},
+                              {"shift_px", &options.shift_px},
+                              {"mirror_share", &options.mirror_share},
                               {"unsure", &options.unsure},
                               {"light", &options.changes.light},
                               {"offset", &options.changes.offset},
@@ -81,10 +107,21 @@ ClassifierClips ForNetwork(const at::Tensor& bytes, const JudgeClips& clips) {
 JudgeTraining::JudgeTraining(const JudgeClipSource& source, const JudgeClips& fit, const JudgeTrainingOptions& options)
     : source_(source), fit_(fit), options_(options) {
   if (options.batch < 1) throw InvalidInput("judge training: batch is {}, wanted at least 1", options.batch);
+  if (options.shift_px < 0) throw InvalidInput("judge training: shift_px is {}, wanted at least 0", options.shift_px);
+}
+
+std::vector<std::array<std::int64_t, 2>> JudgeTraining::DrawShifts(train::Dice& dice, std::int64_t views) const {
+  std::vector<std::array<std::int64_t, 2>> shifts;
+  const std::int64_t choices = 2 * options_.shift_px + 1;
+  for (std::int64_t v = 0; v < views; ++v) {
+    const std::int64_t right = dice.Below(choices) - options_.shift_px;
+    shifts.push_back({right, dice.Below(choices) - options_.shift_px});
+  }
+  return shifts;
 }
 
 JudgeTraining::Batch JudgeTraining::Draw(const train::StepPlace& place) const {
-  train::Dice pick(place, kPick), change(place, kChange);
+  train::Dice pick(place, kPick), change(place, kChange), move(place, kMove);
   JudgeClips clips;
   std::vector<at::Tensor> pictures, objects;
   std::vector<float> successes;
@@ -95,16 +132,19 @@ JudgeTraining::Batch JudgeTraining::Draw(const train::StepPlace& place) const {
     const std::vector<std::int64_t> rows = JitteredRows(clip, options_.jitter, pick);
     if (pick.Chance(options_.drop_view)) present[b].narrow(0, 1, views - 1).zero_();
     const bool is_reconstructed = !source_.Codec().empty() && pick.Chance(options_.reconstructed_share);
-    pictures.push_back(is_reconstructed ? source_.Reconstructed(clip, rows) : source_.Pictures(clip, rows));
-    objects.push_back(source_.Objects(clip, rows));
+    SeenClip seen{is_reconstructed ? source_.Reconstructed(clip, rows) : source_.Pictures(clip, rows),
+                  source_.Objects(clip, rows)};
+    const auto shifts = DrawShifts(move, views);
+    seen = Moved(seen, shifts, move.Chance(options_.mirror_share));
+    pictures.push_back(seen.pictures);
+    objects.push_back(seen.objects);
     successes.push_back(clip.outcome == 1 ? 1.0F : 0.0F);
     clips.push_back(clip);
   }
   Batch batch{ForNetwork(at::stack(pictures), clips), at::tensor(at::ArrayRef<float>(successes)), {}, {}};
   batch.clips.pictures = Changed(batch.clips.pictures, options_.changes, change);
   batch.clips.present = present;
-  const auto size =
-      at::tensor({static_cast<float>(source_.width_px), static_cast<float>(source_.height_px)});
+  const auto size = at::tensor({static_cast<float>(source_.width_px), static_cast<float>(source_.height_px)});
   const at::Tensor object = at::stack(objects) / size;                // [B, V, T, 2]
   const at::Tensor inside = ((object >= 0) * (object <= 1)).all(-1);  // false where it is not a number
   batch.visible = inside.to(at::kFloat) * present.unsqueeze(-1);

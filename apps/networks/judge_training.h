@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <optional>
 #include <vector>
 
@@ -19,10 +20,21 @@ struct JudgeTrainingOptions {
   double jitter = 0.3;               ///< pictures between first and last move by up to this part of their distance
   double object_weight = 1;          ///< of looking where the object is, beside the verdict
   double reconstructed_share = 0.5;  ///< share of clips seen as a codec gives them back; without one, none
-  double unsure = 0.1;               ///< what the card says: closer to the threshold is `cannot tell`
+  std::int64_t shift_px =
+      0;  ///< each view's pictures are moved by up to this, sideways and up or down; the edge is repeated
+  double mirror_share = 0;  ///< of clips that are seen mirrored, left for right, in every view
+  double unsure = 0.1;      ///< what the card says: closer to the threshold is `cannot tell`
   PictureChanges changes;
 };
 train::Settings SettingsOf(JudgeTrainingOptions& options);
+
+/// What a clip shows, moved: the same in all its pictures, so that what happens in it stays the same.
+struct SeenClip {
+  at::Tensor pictures;  ///< [V, T, H, W, 3] bytes
+  at::Tensor objects;   ///< [V, T, 2] pixels: x, y
+};
+/// @param shift_px  per view: right, down
+SeenClip Moved(const SeenClip& clip, const std::vector<std::array<std::int64_t, 2>>& shift_px, bool is_mirrored);
 
 /// Clips to learn from, by initial state: most of them to learn from, the rest to calibrate with.
 struct JudgeSplit {
@@ -50,6 +62,8 @@ class JudgeTraining {
     at::Tensor visible;  ///< [B, V, T] 1 where the object's middle is known, in the picture, and the view present
   };
   Batch Draw(const train::StepPlace& place) const;
+  /// Right and down, of each view.
+  std::vector<std::array<std::int64_t, 2>> DrawShifts(train::Dice& dice, std::int64_t views) const;
 
   const JudgeClipSource& source_;
   const JudgeClips& fit_;

@@ -152,6 +152,46 @@ TEST_F(TrainJudgeTest, APackingThatSaysNothingOfStatesIsRefused) {
               ThrowsMessage<Error>(HasSubstr("wanted states, behaviours and fates per recording")));
 }
 
+TEST(Moved, TheObjectStaysWhereThePicturesShowIt) {
+  at::Tensor pictures = at::zeros({2, 3, 8, 12, 3}, at::kByte);
+  at::Tensor objects = at::zeros({2, 3, 2});
+  const auto put = [&](std::int64_t view, std::int64_t time, std::int64_t x, std::int64_t y) {
+    pictures[view][time][y][x].fill_(255);
+    objects[view][time] = at::tensor({static_cast<float>(x) + 0.5F, static_cast<float>(y) + 0.5F});
+  };
+  for (std::int64_t time = 0; time < 3; ++time) put(0, time, 3 + time, 2), put(1, time, 6, 3 + time);
+  for (const bool is_mirrored : {false, true}) {
+    const SeenClip moved = Moved({pictures, objects}, {{2, -1}, {-3, 2}}, is_mirrored);
+    for (std::int64_t view = 0; view < 2; ++view) {
+      for (std::int64_t time = 0; time < 3; ++time) {
+        const at::Tensor at = moved.objects[view][time].floor().to(at::kLong);
+        EXPECT_EQ(moved.pictures[view][time][at[1].item<std::int64_t>()][at[0].item<std::int64_t>()][0].item<int>(),
+                  255)
+            << view << " " << time << (is_mirrored ? " mirrored" : "");
+        EXPECT_EQ((moved.pictures[view][time] == 255).sum().item<int>(), 3) << "one pixel, three colours";
+      }
+    }
+    const float left = is_mirrored ? 12 - 5.5F : 5.5F;
+    EXPECT_EQ(moved.objects[0][0][0].item<float>(), left);
+    EXPECT_EQ(moved.objects[0][0][1].item<float>(), 1.5F);
+  }
+}
+
+TEST_F(TrainJudgeTest, MovedAndMirroredClipsAreOtherClips) {
+  const auto weights = [&](const std::string& out, std::int64_t shift_px, double mirror_share) {
+    JudgeTrainingOptions options = Quick(2);
+    options.shift_px = shift_px;
+    options.mirror_share = mirror_share;
+    Train(Place(out), options);
+    return Sha256HexOfFile(folder_ / out / "judge.safetensors");
+  };
+  const std::string as_it_is = weights("as_it_is", 0, 0);
+  EXPECT_EQ(weights("again", 0, 0), as_it_is);
+  EXPECT_NE(weights("moved", 1, 0), as_it_is);
+  EXPECT_NE(weights("mirrored", 0, 1), as_it_is);
+  EXPECT_THAT([&] { weights("wrong", -1, 0); }, ThrowsMessage<Error>(HasSubstr("shift_px is -1, wanted at least 0")));
+}
+
 TEST(Calibrate, FindsTheTemperatureThatMadeTheLogitsTooSure) {
   JudgeClips clips;
   std::vector<double> logits;

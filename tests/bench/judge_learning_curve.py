@@ -123,7 +123,9 @@ def main():
     parser.add_argument("--seeds", type=int, default=5)
     parser.add_argument("--labels", default="50,100,200")
     parser.add_argument("--steps", type=int, default=600)
+    parser.add_argument("--holdout", type=float, default=0.1, help="of the labelled states; TEST tells what the judge is worth")
     parser.add_argument("--training", default="apps/configs/desk_training.yaml")
+    parser.add_argument("--set", action="append", default=[], metavar="OPTION=VALUE", help="of the judge's training")
     a = parser.parse_args()
     a.out.mkdir(parents=True, exist_ok=True)
     path = a.out / "curve.csv"
@@ -136,7 +138,8 @@ def main():
             scratch = a.out / f"scratch-{seed}-{labels}"
             judge = label(copy_of(a.labelled, scratch / "labelled"), seed, labels)
             run(a.evac, "judge", "train", scratch / "labelled", "--truth", judge, "--training", a.training, "--steps", a.steps,
-                "--set", f"seed={seed}", "--least", 5, "--out", scratch / "judge")
+                "--set", f"seed={seed}", *(word for pair in a.set for word in ("--set", pair)), "--least", 5,
+                "--holdout", a.holdout, "--out", scratch / "judge")
             for world, (n, kappa) in kappas(a.evac, scratch / "judge" / "judge.safetensors", a.test, scratch).items():
                 rows.append({"seed": seed, "labels_per_task": labels, "world": world, "n": n, "kappa": f"{kappa:.4f}", "steps": a.steps})
                 print(f"seed {seed}, {labels} labels a task, {world}: kappa {kappa:.3f} of {n}", flush=True)
