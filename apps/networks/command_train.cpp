@@ -5,8 +5,8 @@
 #include <opencv2/imgproc.hpp>
 
 #include "apps/commands.h"
-#include "apps/network_parts.h"
 #include "apps/interrupts.h"
+#include "apps/network_parts.h"
 #include "apps/networks/train_arguments.h"
 #include "apps/networks/training_page.h"
 #include "core/file.h"
@@ -31,7 +31,7 @@ ExitCode RunCodec(const TrainArguments& arguments) {
   const train::JobPlace place = PlaceOf(arguments, progress);
   nn::KeepFreedMemory();
   const nn::LibraryThreads threads(LibraryThreadsOf(place, options.job));
-  return End(TrainCodec(place, options), arguments.out, "codec.safetensors");
+  return End(TrainCodec(place, options, arguments.init), arguments.out, "codec.safetensors");
 }
 
 /// OUT/strips/step_00001200.png
@@ -51,7 +51,8 @@ ExitCode RunWorld(const TrainArguments& arguments) {
   train::WorldOptions options;
   ReadTrainingPage(arguments.training, "world", arguments.settings, SettingsOf(options));
   Override(arguments, options.job.trainer);
-  const train::WorldStart start{arguments.codec, arguments.init, arguments.init_except, Sha256HexOfFile(arguments.codec)};
+  const train::WorldStart start{arguments.codec, arguments.init, arguments.init_except,
+                                Sha256HexOfFile(arguments.codec)};
   const CatchInterrupts catch_interrupts;
   TrainingProgress progress(stderr);
   const train::JobPlace place = PlaceOf(arguments, progress);
@@ -61,15 +62,22 @@ ExitCode RunWorld(const TrainArguments& arguments) {
   return End(TrainWorld(place, options, start, look), arguments.out, "weights.safetensors");
 }
 
+void AddInit(CLI::App& command, TrainArguments& arguments, const char* what) {
+  command.add_option("--init", arguments.init, what)->check(CLI::ExistingFile);
+}
+
 void AddCodec(CLI::App& group, ExitCode& exit_code) {
   const auto arguments = std::make_shared<TrainArguments>();
   CLI::App* command = group.add_subcommand("codec", "Train the latent codec on pictures and pose maps.");
   AddShared(*command, arguments);
   AddConfig(*command, arguments)->required();
+  AddInit(*command, *arguments, "a file with a codec (alone or in a whole model) to go on from; every key must fit");
   command->footer(
-      "Example:\n"
-      "  evac train codec out/shards --config apps/configs/desk_model.yaml --training apps/configs/desk_training.yaml \\\n"
+      "Examples:\n"
+      "  evac train codec out/shards --config apps/configs/desk_model.yaml --training apps/configs/desk_training.yaml "
+      "\\\n"
       "                   --minutes 8 --out out/codec\n"
+      "  evac train codec mine/shards --config my_model.yaml --init evac.safetensors --steps 1000 --out out/codec\n"
       "Then: evac encode out/shards --config … --codec out/codec/codec.safetensors. More: docs/train.md");
   command->callback([arguments, &exit_code] { exit_code = RunCodec(*arguments); });
 }
@@ -82,15 +90,15 @@ void AddWorld(CLI::App& group, ExitCode& exit_code) {
   command->add_option("--codec", arguments->codec, "the codec's weights, which encoded the shards")
       ->required()
       ->check(CLI::ExistingFile);
-  command->add_option("--init", arguments->init, "a checkpoint to go on from: fine-tuning; every key must fit")
-      ->check(CLI::ExistingFile);
+  AddInit(*command, *arguments, "a checkpoint to go on from: fine-tuning; every key must fit");
   command
       ->add_option("--init-except", arguments->init_except,
                    "keys that begin so are drawn anew instead, with commas between them")
       ->delimiter(',');
   command->footer(
       "Examples:\n"
-      "  evac train world out/shards --config apps/configs/desk_model.yaml --training apps/configs/desk_training.yaml \\\n"
+      "  evac train world out/shards --config apps/configs/desk_model.yaml --training apps/configs/desk_training.yaml "
+      "\\\n"
       "                   --codec out/codec/codec.safetensors --minutes 40 --out out/world\n"
       "  evac train world mine/shards --config my_model.yaml --codec codec.safetensors --init evac.safetensors \\\n"
       "                   --init-except model.diffusion_model.input_blocks.0 --steps 2000 --out out/mine\n"

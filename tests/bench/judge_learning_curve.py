@@ -1,8 +1,8 @@
 #!/usr/bin/env python3
 """How many labels a lab's own classifier judge needs: judge_learning_curve.py LABELLED TEST OUT [--seeds 5] [--labels 50,100,200]
 
-    evac run apps/configs/demo.yaml --out out/labelled --set 'initial_states={seed: 77, count: 60}'
-    evac run apps/configs/demo.yaml --out out/test
+    evac run apps/configs/demo.yaml --out out/labelled --set 'initial_states={seed: 77, count: 52}'
+    evac run apps/configs/demo.yaml --out out/test --set 'initial_states={seed: 41, count: 12}'
     tests/bench/judge_learning_curve.py out/labelled out/test out/curve
 
 For each seed and number of labels per task: so many clips of LABELLED's real world, drawn at random, keep the oracle's label, 5 % of
@@ -107,7 +107,7 @@ def draw(rows, path):
                 means.append((at, y(sum(values) / len(values))))
         out.append(f'<polyline points="{" ".join(f"{a:.1f},{b:.1f}" for a, b in means)}" fill="none" stroke="{colour}" stroke-width="2"/>')
         if means:
-            out.append(f'<text x="{means[-1][0] + 8:.1f}" y="{means[-1][1] + (18 if k else -8):.1f}" fill="{colour}">{world}</text>')
+            out.append(f'<text x="{means[-1][0] + (10 if k else 28):.1f}" y="{means[-1][1] + (18 if k else -8):.1f}" fill="{colour}">{world}</text>')
     for labels in counts:
         out.append(f'<text x="{x(labels):.1f}" y="{height - bottom + 18}" text-anchor="middle">{labels}</text>')
     out.append(f'<text x="{(left + width - 40) / 2:.0f}" y="{height - 8}" text-anchor="middle">labels per task, {WRONG:.0%} of them wrong</text></svg>')

@@ -50,6 +50,27 @@ struct Prepared {
   nn::ModelConfig config;
 };
 
+TEST(TrainCodec, GoesOnFromACodecThatIsGiven) {
+  Prepared at(1);
+  const auto psnr = [&](const char* out, std::int64_t steps, double rate, const std::filesystem::path& init) {
+    CodecOptions options;
+    options.job.trainer.steps = steps;
+    options.job.trainer.learning_rate = rate;
+    options.job.trainer.clip_norm = 1;
+    options.codec.batch = 8;
+    options.codec.latent_noise = 0.05;
+    TrainCodec({at.folder / "shards", at.folder / out, at.config}, options, init);
+    return std::stod(CheckpointWeights(at.folder / out / "codec.safetensors").file().metadata().at("psnr"));
+  };
+  const std::filesystem::path first = at.folder / "first" / "codec.safetensors";
+  const double learned = psnr("first", 60, 5e-3, {});
+  EXPECT_NEAR(psnr("second", 1, 1e-9, first), learned, 0.1);
+  EXPECT_LT(psnr("fresh", 1, 1e-9, {}), learned - 1);
+  at.config.vae.channels *= 2;
+  EXPECT_THAT([&] { psnr("other", 1, 1e-9, first); },
+              testing::ThrowsMessage<TensorError>(testing::HasSubstr("first_stage_model")));
+}
+
 WorldOptions Quick(std::int64_t steps) {
   WorldOptions options;
   options.job.trainer.steps = steps;

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cstdio>
 #include <deque>
+#include <optional>
 
 #include "worldmodel/nn/weights.h"
 #include "worldmodel/train/weight_files.h"
@@ -21,7 +22,8 @@ void CheckSizes(const ShardSet& shards, const nn::ModelConfig& config) {
                  {-1, config.views, config.image_height_px, config.image_width_px, 3});
 }
 
-void WriteCodec(const std::filesystem::path& path, const std::vector<NamedTensor>& weights, const CodecQuality& quality) {
+void WriteCodec(const std::filesystem::path& path, const std::vector<NamedTensor>& weights,
+                const CodecQuality& quality) {
   std::vector<TensorView> views;
   for (const NamedTensor& weight : weights) views.push_back(nn::ViewOf(weight.name, weight.tensor.detach()));
   WriteTensorFile(path, views,
@@ -33,14 +35,13 @@ void WriteCodec(const std::filesystem::path& path, const std::vector<NamedTensor
 
 /// One copy of the codec that is trained, and its loss.
 struct CodecWorker {
-  CodecWorker(const ShardSet& shards, const nn::ModelConfig& config, const CodecOptions& options)
-      : random(options.job.trainer.seed),
-        weights(random, options.job.bf16 ? at::kBFloat16 : at::kFloat),
+  CodecWorker(nn::ParameterSource& source, const ShardSet& shards, const nn::ModelConfig& config,
+              const CodecOptions& options)
+      : weights(source, options.job.bf16 ? at::kBFloat16 : at::kFloat),
         vae(nn::Scope(weights, kCodecPrefix), config.vae),
         training(shards, config.vae, options.codec) {}
   Tensor Loss(const StepPlace& at) const { return training.Loss(vae, training.Batch(at)); }
 
-  nn::RandomWeights random;
   TrainableWeights weights;
   nn::Vae vae;
   CodecTraining training;
@@ -52,34 +53,40 @@ std::int64_t Workers(const JobPlace& place, const JobOptions& options) {
   return std::clamp<std::int64_t>(place.threads, 1, options.trainer.accumulate);
 }
 
-TrainerSummary TrainCodec(const JobPlace& place, const CodecOptions& given) {
+TrainerSummary TrainCodec(const JobPlace& place, const CodecOptions& given, const std::filesystem::path& init) {
   CodecOptions options = given;
   const ShardSet shards(place.shards, Split::kTrain), holdout(place.shards, Split::kHoldout);
   CheckSizes(shards, place.config);
+  nn::RandomWeights random(options.job.trainer.seed);
+  std::optional<CheckpointWeights> start;
+  if (!init.empty()) start.emplace(init);
+  nn::ParameterSource& source = start ? static_cast<nn::ParameterSource&>(*start) : random;
   std::deque<CodecWorker> workers;
-  for (std::int64_t i = 0; i < Workers(place, options.job); ++i) workers.emplace_back(shards, place.config, options);
+  for (std::int64_t i = 0; i < Workers(place, options.job); ++i)
+    workers.emplace_back(source, shards, place.config, options);
   const TrainableWeights& weights = workers.front().weights;
   const nn::Vae& vae = workers.front().vae;
   options.job.trainer.identity =
       IdentityOf(SettingsOf(options)) + shards.metadata().at("recipe") + " workers " + std::to_string(workers.size());
   Trainer trainer(weights.all(), options.job.trainer, place.out);
   for (std::size_t i = 1; i < workers.size(); ++i)
-    trainer.AddReplica({workers[i].weights.all(), [&worker = workers[i]](const StepPlace& at) { return worker.Loss(at); }});
+    trainer.AddReplica(
+        {workers[i].weights.all(), [&worker = workers[i]](const StepPlace& at) { return worker.Loss(at); }});
   const auto say = [&](const char* when, const CodecQuality& quality) {
     if (place.say)
       place.say(std::string(when) + ": hold-out " + Decibel(quality.psnr) + " dB, around the object " +
                 Decibel(quality.psnr_object) + " dB, maps " + Decibel(quality.psnr_maps) + " dB");
   };
-  TrainerSummary summary =
-      trainer.Run({.loss = [&](const StepPlace& at) { return workers.front().Loss(at); },
-                   .holdout =
-                       [&] {
-                         const CodecQuality quality = MeasureCodec(vae, holdout, options.job.holdout_size);
-                         say("codec", quality);
-                         return -quality.psnr;
-                       },
-                   .interrupted = place.interrupted,
-                   .on_progress = place.on_progress});
+  TrainerSummary summary = trainer.Run({.loss = [&](const StepPlace& at) { return workers.front().Loss(at); },
+                                        .holdout =
+                                            [&] {
+                                              const CodecQuality quality =
+                                                  MeasureCodec(vae, holdout, options.job.holdout_size);
+                                              say("codec", quality);
+                                              return -quality.psnr;
+                                            },
+                                        .interrupted = place.interrupted,
+                                        .on_progress = place.on_progress});
   if (!summary.IsDone()) return summary;
   trainer.WithBest([&] {
     NormaliseLatents(vae, shards, weights.all(), options.codec.latent_noise > 0);

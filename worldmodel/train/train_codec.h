@@ -20,6 +20,9 @@ std::int64_t Workers(const JobPlace& place, const JobOptions& options);
 
 /// Trains the codec and writes OUT/codec.safetensors: its parameters alone, latents normalised, what they are worth in
 /// the metadata (psnr, psnr_object, psnr_maps: dB, hold-out). An interrupted training writes none.
-TrainerSummary TrainCodec(const JobPlace& place, const CodecOptions& options);
+/// @param init  a file that holds a codec, alone or in a whole model, to go on from; empty: from nothing. A training
+///              that OUT holds already goes on from there instead
+/// @throws TensorError naming a key that is missing in `init` or of another shape
+TrainerSummary TrainCodec(const JobPlace& place, const CodecOptions& options, const std::filesystem::path& init = {});
 
 }  // namespace evac::train
