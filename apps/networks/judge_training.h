@@ -20,10 +20,9 @@ struct JudgeTrainingOptions {
   double jitter = 0.3;               ///< pictures between first and last move by up to this part of their distance
   double object_weight = 1;          ///< of looking where the object is, beside the verdict
   double reconstructed_share = 0.5;  ///< share of clips seen as a codec gives them back; without one, none
-  std::int64_t shift_px =
-      0;  ///< each view's pictures are moved by up to this, sideways and up or down; the edge is repeated
-  double mirror_share = 0;  ///< of clips that are seen mirrored, left for right, in every view
-  double unsure = 0.1;      ///< what the card says: closer to the threshold is `cannot tell`
+  std::int64_t shift_px = 0;         ///< each view's pictures are moved by up to this each way; the edge is repeated
+  double mirror_share = 0;           ///< of clips that are seen mirrored, left for right, in every view
+  double unsure = 0.1;               ///< what the card says: closer to the threshold is `cannot tell`
   PictureChanges changes;
 };
 train::Settings SettingsOf(JudgeTrainingOptions& options);
