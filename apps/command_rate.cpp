@@ -10,6 +10,7 @@
 
 #include "apps/interrupts.h"
 #include "apps/network_parts.h"
+#include "apps/progress_display.h"
 #include "apps/rate_resolve.h"
 #include "apps/rate_status.h"
 #include "apps/rate_tables.h"
@@ -49,10 +50,9 @@ void New(RateArguments& arguments) {
     options.round_trip = CodecRoundTrip(arguments.round_trip, arguments.config);
   }
   options.evac_version = kProgram;
-  const StudyMade made = MakeStudy(arguments.study, options, [](std::size_t done, std::size_t of) {
-    fmt::print(stderr, "\r{} of {} clips", done, of);
-    if (done == of) fmt::print(stderr, "\n");
-  });
+  CountDisplay display("clips", stderr);
+  const StudyMade made =
+      MakeStudy(arguments.study, options, [&](std::size_t done, std::size_t of) { display.Show(done, of); });
   fmt::print("{}: {} clips to rate, {} gold, {} practice, {} examples; list {}\n", arguments.study, made.clips,
              made.gold, made.practice, made.examples, made.list_hash.substr(0, 12));
   for (const std::string& sentence : made.left_out) fmt::print("left out: {}\n", sentence);

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 namespace evac {
 namespace {
@@ -82,6 +83,21 @@ void ProgressDisplay::Draw(const std::string& text, int lines) {
 void ProgressDisplay::Erase() {
   if (drawn_lines_ > 0) Print(out_, fmt::format("\033[{}F\033[J", drawn_lines_));
   drawn_lines_ = 0;
+}
+
+CountDisplay::CountDisplay(std::string things, std::FILE* out)
+    : things_(std::move(things)), out_(out), terminal_(::isatty(::fileno(out)) == 1), started_(Clock::now()), last_line_(started_) {}
+
+void CountDisplay::Show(std::size_t done, std::size_t of, Clock::time_point now) {
+  const bool is_last = done >= of;
+  if (!is_last && now - last_line_ < (terminal_ ? Clock::duration(kBetweenDraws) : Clock::duration(kBetweenLines))) return;
+  last_line_ = now;
+  std::string text = fmt::format("{} of {} {}", done, of, things_);
+  if (!is_last && done > 0) {
+    const double each_s = std::chrono::duration<double>(now - started_).count() / static_cast<double>(done);
+    text += fmt::format(", {} left", Duration(each_s * static_cast<double>(of - done)));
+  }
+  Print(out_, terminal_ ? "\r\033[K" + text + (is_last ? "\n" : "") : text + "\n");
 }
 
 }  // namespace evac

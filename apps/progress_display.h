@@ -40,6 +40,21 @@ class ProgressDisplay {
   Clock::time_point started_, last_line_;
 };
 
+/// "12 of 96 clips, 40 s left": redrawn in place on a terminal, a line now and then in a log.
+class CountDisplay {
+ public:
+  using Clock = std::chrono::steady_clock;
+
+  CountDisplay(std::string things, std::FILE* out);
+  void Show(std::size_t done, std::size_t of, Clock::time_point now = Clock::now());
+
+ private:
+  std::string things_;
+  std::FILE* out_;
+  bool terminal_;
+  Clock::time_point started_, last_line_;
+};
+
 /// "42 s", "3 min 05 s", "2 h 07 min".
 std::string Duration(double seconds);
 

@@ -89,7 +89,8 @@ std::vector<std::string> FilesInNoHash(const Suite& suite, const SuitePolicy& po
     const fs::path named = (fs::absolute(suite.path).parent_path() / value).lexically_normal();
     std::error_code ignored;
     const bool is_listed = std::ranges::any_of(policy.files, [&](const std::string& file) {
-      return (named / "").string().starts_with((fs::path(file) / "").string());  // it, or below it
+      const fs::path listed = fs::absolute(file).lexically_normal() / "";
+      return (named / "").string().starts_with(listed.string());  // it, or below it
     });
     if (!is_listed && fs::is_regular_file(named, ignored)) found.push_back(value);
   }

@@ -11,6 +11,8 @@
 namespace evac {
 namespace {
 
+constexpr double kLeastKappa = 0.6;  // as of any judge that is calibrated (docs/vlm_judge.md)
+
 /// What is written at the end, beside the weights.
 struct Judged {
   ClassifierCard card;
@@ -19,9 +21,22 @@ struct Judged {
   std::optional<MeasuredJudge> reconstructed;  ///< where there is a codec
 };
 
+/// Where there is a codec the clips count twice, plain and as it gives them back: what is judged is both, recorded and
+/// imagined.
+ClassifierCard CardOf(const ClassifierNet& net, const JudgeClipSource& learn, JudgeClips calibration, double unsure) {
+  std::vector<double> logits = Logits(net, learn, calibration, {});
+  if (!learn.Codec().empty()) {
+    const std::vector<double> given_back = Logits(net, learn, calibration, {.reconstructed = true});
+    logits.insert(logits.end(), given_back.begin(), given_back.end());
+    const JudgeClips again = calibration;
+    calibration.insert(calibration.end(), again.begin(), again.end());
+  }
+  return Calibrate(logits, calibration, unsure);
+}
+
 Judged MeasureAll(const ClassifierNet& net, const JudgeData& data, const JudgeClips& calibration, double unsure) {
   Judged judged;
-  judged.card = Calibrate(Logits(net, data.learn, calibration, {}), calibration, unsure);
+  judged.card = CardOf(net, data.learn, calibration, unsure);
   const auto measure = [&](const JudgeLook& look) {
     return Measure(Logits(net, data.holdout, data.holdout.clips, look), data.holdout.clips, judged.card);
   };
@@ -40,6 +55,12 @@ void Say(const train::JobPlace& place, const ClassifierNet& net, const JudgeData
   if (judged.reconstructed) place.say("  as the codec gives the pictures back: " + judged.reconstructed->Line());
   const std::vector<double> logits = Logits(net, data.holdout, data.holdout.clips, {});
   place.say("  failures taken for successes: " + MistakesByFate(logits, data.holdout.clips, judged.card));
+  if (!(judged.whole.kappa >= kLeastKappa)) {
+    place.say(
+        fmt::format("warning: it learned too little for its verdicts to be counted: kappa {:.2f}, wanted at least "
+                    "{}. More labels of each kind per task, or more steps",
+                    judged.whole.kappa, kLeastKappa));
+  }
 }
 
 /// Marks of the clips that were learned from or calibrated with.
@@ -57,23 +78,23 @@ TensorMetadata CardText(const Judged& judged, const JudgeClipSource& learn, cons
                         std::int64_t steps) {
   const auto number = [](double value) { return fmt::format("{:.6g}", value); };
   TensorMetadata card = {{"format", "evac-classifier 1"},
-          {"tasks", Joined(learn.tasks)},
-          {"cameras", Joined(learn.cameras)},
-          {"frames", std::to_string(kClassifierFrames)},
-          {"height_px", std::to_string(learn.height_px)},
-          {"width_px", std::to_string(learn.width_px)},
-          {"temperature", number(judged.card.temperature)},
-          {"threshold", number(judged.card.threshold)},
-          {"unsure", number(judged.card.unsure)},
-          {"recipe", learn.recipe},
-          {"seed", std::to_string(options.job.trainer.seed)},
-          {"steps", std::to_string(steps)},
-          {"holdout_clips", std::to_string(judged.whole.clips)},
-          {"auroc", number(judged.whole.auroc)},
-          {"kappa", number(judged.whole.kappa)},
-          {"ece", number(judged.whole.ece)},
-          {"kappa_first_view", number(judged.first_view.kappa)},
-          {"licence", "as the project"}};
+                         {"tasks", Joined(learn.tasks)},
+                         {"cameras", Joined(learn.cameras)},
+                         {"frames", std::to_string(kClassifierFrames)},
+                         {"height_px", std::to_string(learn.height_px)},
+                         {"width_px", std::to_string(learn.width_px)},
+                         {"temperature", number(judged.card.temperature)},
+                         {"threshold", number(judged.card.threshold)},
+                         {"unsure", number(judged.card.unsure)},
+                         {"recipe", learn.recipe},
+                         {"seed", std::to_string(options.job.trainer.seed)},
+                         {"steps", std::to_string(steps)},
+                         {"holdout_clips", std::to_string(judged.whole.clips)},
+                         {"auroc", number(judged.whole.auroc)},
+                         {"kappa", number(judged.whole.kappa)},
+                         {"ece", number(judged.whole.ece)},
+                         {"kappa_first_view", number(judged.first_view.kappa)},
+                         {"licence", "as the project"}};
   if (judged.masked) card["kappa_masked"] = number(judged.masked->kappa);
   if (const std::string marks = MarksOf(learn); !marks.empty()) card["learned_from"] = marks;
   if (judged.reconstructed) {
@@ -85,7 +106,8 @@ TensorMetadata CardText(const Judged& judged, const JudgeClipSource& learn, cons
 
 }  // namespace
 
-train::TrainerSummary TrainJudge(const train::JobPlace& place, const JudgeTrainingOptions& given, const JudgeData& data) {
+train::TrainerSummary TrainJudge(const train::JobPlace& place, const JudgeTrainingOptions& given,
+                                 const JudgeData& data) {
   JudgeTrainingOptions options = given;
   const JudgeSplit split = SplitForJudge(data.learn.clips, options);
   const ClassifierShape shape{data.learn.tasks, data.learn.cameras, data.learn.height_px, data.learn.width_px};
@@ -98,11 +120,10 @@ train::TrainerSummary TrainJudge(const train::JobPlace& place, const JudgeTraini
   const auto loss = [&](const ClassifierNet& of, const train::StepPlace& at) { return training.Loss(of, at); };
   learners.Replicate(trainer, loss);
   const auto holdout = [&] { return LogLoss(Logits(net, data.learn, split.calibration, {}), split.calibration); };
-  const train::TrainerSummary summary =
-      trainer.Run({.loss = [&](const train::StepPlace& at) { return loss(net, at); },
-                   .holdout = holdout,
-                   .interrupted = place.interrupted,
-                   .on_progress = place.on_progress});
+  const train::TrainerSummary summary = trainer.Run({.loss = [&](const train::StepPlace& at) { return loss(net, at); },
+                                                     .holdout = holdout,
+                                                     .interrupted = place.interrupted,
+                                                     .on_progress = place.on_progress});
   if (!summary.IsDone()) return summary;
   trainer.WithBest([&] {
     const Judged judged = MeasureAll(net, data, split.calibration, options.unsure);

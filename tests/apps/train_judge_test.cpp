@@ -19,6 +19,7 @@ namespace evac {
 namespace {
 
 using testing::HasSubstr;
+using testing::Not;
 using testing::ThrowsMessage;
 
 JudgeTrainingOptions Quick(std::int64_t steps) {
@@ -53,7 +54,11 @@ class TrainJudgeTest : public testing::Test {
 };
 
 TEST_F(TrainJudgeTest, ATinyClassifierTellsClipsApartThatItHasNotSeen) {
-  Train(Place("judge"), Quick(150));
+  train::JobPlace place = Place("judge");
+  std::string said;
+  place.say = [&](const std::string& line) { said += line + "\n"; };
+  Train(place, Quick(150));
+  EXPECT_THAT(said, Not(HasSubstr("warning")));
   const WeightFile file(folder_ / "judge" / "judge.safetensors", "evac-classifier 1");
   EXPECT_GT(file.Number("auroc"), 0.95);
   EXPECT_GT(file.Number("kappa"), 0.8);
@@ -61,6 +66,16 @@ TEST_F(TrainJudgeTest, ATinyClassifierTellsClipsApartThatItHasNotSeen) {
   EXPECT_EQ(file.Text("tasks"), "carry");
   EXPECT_EQ(file.Text("recipe"), "carry");
   EXPECT_NO_THROW(ClassifierJudge(folder_ / "judge" / "judge.safetensors", folder_.path()));
+}
+
+TEST_F(TrainJudgeTest, OneThatLearnedNothingIsWarnedOf) {
+  train::JobPlace place = Place("nothing");
+  std::string said;
+  place.say = [&](const std::string& line) { said += line + "\n"; };
+  JudgeTrainingOptions options = Quick(2);
+  options.job.trainer.learning_rate = 1e-9;
+  Train(place, options);
+  EXPECT_THAT(said, HasSubstr("warning: it learned too little for its verdicts to be counted"));
 }
 
 TEST_F(TrainJudgeTest, InterruptedAndGoneOnWithItEndsInTheSameBytes) {

@@ -1,8 +1,8 @@
 #!/usr/bin/env python3
 """How many labels a lab's own classifier judge needs: judge_learning_curve.py LABELLED TEST OUT [--seeds 5] [--labels 50,100,200]
 
-    evac run apps/configs/demo.yaml --out out/labelled --set 'initial_states={seed: 77, count: 52}'
-    evac run apps/configs/demo.yaml --out out/test --set 'initial_states={seed: 41, count: 12}'
+    evac run tests/bench/judge_learning_curve.yaml --out out/labelled --set 'initial_states={seed: 77, count: 52}'
+    evac run tests/bench/judge_learning_curve.yaml --out out/test --set 'initial_states={seed: 41, count: 12}'
     tests/bench/judge_learning_curve.py out/labelled out/test out/curve
 
 For each seed and number of labels per task: so many clips of LABELLED's real world, drawn at random, keep the oracle's label, 5 % of

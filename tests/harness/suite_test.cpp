@@ -117,12 +117,13 @@ policies:
     EXPECT_NE(now, last) << file;
     last = now;
   }
-  const auto unlisted = [&](const std::vector<std::string>& assignments) {
-    const Suite suite = ReadSuite(path, assignments);
+  const auto unlisted = [&](const std::vector<std::string>& assignments, const std::filesystem::path& suite_path) {
+    const Suite suite = ReadSuite(suite_path, assignments);
     return FilesInNoHash(suite, suite.policies[0]);
   };
-  EXPECT_THAT(unlisted({}), testing::IsEmpty());
-  EXPECT_THAT(unlisted({"policies.0.files=[]"}), testing::ElementsAre("policy.py", "net/step_9.bin"));
+  EXPECT_THAT(unlisted({}, path), testing::IsEmpty());
+  EXPECT_THAT(unlisted({}, std::filesystem::relative(path)), testing::IsEmpty());
+  EXPECT_THAT(unlisted({"policies.0.files=[]"}, path), testing::ElementsAre("policy.py", "net/step_9.bin"));
   EXPECT_THAT(Complaint(path, {"policies.0.files=[nowhere]"}), AllOf(HasSubstr("files"), HasSubstr("nowhere")));
 }
 
