@@ -44,10 +44,12 @@ Finding Correlation(const WorldComparison& comparison) {
 Finding Agreement(const WorldComparison& comparison) {
   Finding finding;
   finding.question = fmt::format("Does {} foretell single episodes of {}?", comparison.other, comparison.real);
-  std::int64_t real_only = 0, other_only = 0;
+  PairTable all;
   for (const PairTable& table : comparison.tables) {
-    real_only += table.real_only;
-    other_only += table.other_only;
+    all.both_succeed += table.both_succeed;
+    all.real_only += table.real_only;
+    all.other_only += table.other_only;
+    all.both_fail += table.both_fail;
   }
   const Estimate& share = comparison.agreement;
   if (!share.value) {
@@ -56,9 +58,12 @@ Finding Agreement(const WorldComparison& comparison) {
     return finding;
   }
   finding.answer = fmt::format(
-      "{} of {} pairs with the same initial state end alike, {}; {} only in {}, {} only in {}.",
-      share.n - real_only - other_only, share.n, PercentWithInterval(share), Counted(real_only, "succeeds", "succeed"),
-      comparison.real, Counted(other_only, "succeeds", "succeed"), comparison.other);
+      "{} of {} pairs with the same initial state end alike, {}. Hallucinated: of {} that fail in {}, {} in {}. "
+      "Missed: of "
+      "{} that succeed in {}, {} in {}.",
+      all.both_succeed + all.both_fail, share.n, PercentWithInterval(share), all.other_only + all.both_fail,
+      comparison.real, Counted(all.other_only, "succeeds", "succeed"), comparison.other,
+      all.both_succeed + all.real_only, comparison.real, Counted(all.real_only, "fails", "fail"), comparison.other);
   return finding;
 }
 
@@ -134,8 +139,8 @@ Finding Completeness(const RunSummary& summary) {
   const std::int64_t counted = summary.Count(Outcome::kSuccess) + summary.Count(Outcome::kFailure);
   if (counted == all) {
     finding.decision = Decision::kYes;
-    finding.answer =
-        fmt::format("All {} ran to their end and were judged by {}.", Counted(all, "episode"), JudgeWords(summary.options.judge));
+    finding.answer = fmt::format("All {} ran to their end and were judged by {}.", Counted(all, "episode"),
+                                 JudgeWords(summary.options.judge));
     return finding;
   }
   finding.decision = Decision::kNo;

@@ -140,12 +140,13 @@ Clip MakeClip(const ClipSource& source, const Crop& crop, const ClipOptions& opt
   for (std::size_t step = 0; step < clip.length; ++step) {
     const Arms& arms = source.arms[step];
     AppendArms(step == 0 ? nullptr : &source.arms[step - 1], arms, options, clip);
-    const std::vector<cv::Mat> maps = DrawPoseMaps(arms, cameras, options.pose_map);
+    const Arms seen = SeenArms(step == 0 ? arms : source.arms[step - 1], arms, options.pose_map.lag_frames);
+    const std::vector<cv::Mat> maps = DrawPoseMaps(seen, cameras, options.pose_map);
     for (std::size_t view = 0; view < clip.views; ++view) {
       const Crop& part = parts[view];
       AppendPicture(CropAndResize(source.pictures[step][view], part, size_px), clip.frames);
       AppendPicture(maps[view], clip.maps);
-      AppendCamera(cameras[view], arms, clip);
+      AppendCamera(cameras[view], seen, clip);
       const float* object_px = source.truth.At(step, view);
       clip.object_px.push_back((object_px[0] - static_cast<float>(part.x_px)) * static_cast<float>(size_px.width) /
                                static_cast<float>(part.width_px));

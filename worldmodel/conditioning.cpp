@@ -38,6 +38,19 @@ std::vector<RayMap> Rays(const Arms& arms, std::span<const Camera> cameras, cons
 
 }  // namespace
 
+Arms SeenArms(const Arms& before, const Arms& now, double lag_frames) {
+  if (lag_frames == 0) return now;
+  Arms seen = now;
+  for (std::size_t arm = 0; arm < now.size(); ++arm) {
+    const Eigen::Isometry3d &old = before.at(arm).base_from_gripper, &told = now[arm].base_from_gripper;
+    Eigen::Isometry3d& pose = seen[arm].base_from_gripper;
+    pose.linear() = Eigen::Quaterniond(told.linear()).slerp(lag_frames, Eigen::Quaterniond(old.linear())).matrix();
+    pose.translation() = (1 - lag_frames) * told.translation() + lag_frames * old.translation();
+    seen[arm].closure = (1 - lag_frames) * now[arm].closure + lag_frames * before[arm].closure;
+  }
+  return seen;
+}
+
 std::vector<cv::Mat> DrawPoseMaps(const Arms& arms, std::span<const Camera> cameras, const PoseMapOptions& options) {
   const std::vector<DrawnGripper> drawn = DrawnArms(arms);
   std::vector<cv::Mat> maps;
@@ -68,19 +81,24 @@ ChunkConditioning Condition(const ImaginedScene& scene, std::vector<std::size_t>
   if (targets.empty() || targets.size() > chunk)
     throw InternalError("{} targets in a chunk, wanted 1 … {}", targets.size(), chunk);
   ChunkConditioning conditioning;
-  const auto add = [&](const Arms& arms) {
-    const std::vector<float> row = ActionRow(arms);
+  const auto add = [&](const Arms& told, const Arms& seen) {
+    const std::vector<float> row = ActionRow(told);
     conditioning.arms.insert(conditioning.arms.end(), row.begin(), row.end());
-    conditioning.rays.push_back(Rays(arms, scene.cameras, config));
+    conditioning.rays.push_back(Rays(seen, scene.cameras, config));
   };
-  for (const std::size_t frame : memory) add(scene.frames.at(frame).arms);
+  const double lag_frames = options.pose_map.lag_frames;
+  for (const std::size_t frame : memory) {
+    const Arms& told = scene.frames.at(frame).arms;
+    add(told, SeenArms(frame == 0 ? told : scene.frames[frame - 1].arms, told, lag_frames));
+  }
   const Arms* before = &scene.frames.back().arms;
   for (std::size_t k = 0; k < chunk; ++k) {
     const Arms& arms = targets[std::min(k, targets.size() - 1)];
     const ActionDelta delta = DeltaBetween(GrippersOf(*before), GrippersOf(arms));
     conditioning.deltas.push_back(Normalised(delta, options.statistics, options.stride));
-    conditioning.pose_maps.push_back(DrawPoseMaps(arms, scene.cameras, options.pose_map));
-    add(arms);
+    const Arms seen = SeenArms(*before, arms, lag_frames);
+    conditioning.pose_maps.push_back(DrawPoseMaps(seen, scene.cameras, options.pose_map));
+    add(arms, seen);
     before = &arms;
   }
   conditioning.memory = std::move(memory);

@@ -55,6 +55,10 @@ struct ChunkConditioning {
 ChunkConditioning Condition(const ImaginedScene& scene, std::vector<std::size_t> memory, std::span<const Arms> targets,
                             const nn::ModelConfig& config, const ConditioningOptions& options);
 
+/// Where arms are when they were told `before` a frame ago, are told `now`, and follow `lag_frames` (0 … 1) late: on the
+/// straight way from one to the other.
+Arms SeenArms(const Arms& before, const Arms& now, double lag_frames);
+
 /// The maps of the arms at one moment, one per camera.
 std::vector<cv::Mat> DrawPoseMaps(const Arms& arms, std::span<const Camera> cameras, const PoseMapOptions& options);
 

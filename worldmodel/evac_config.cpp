@@ -108,9 +108,10 @@ void ReadOurSchedule(const Config& page, nn::ScheduleConfig& schedule) {
 }
 
 void ReadPoseMap(const Config& page, nn::PoseMapConfig& pose_map) {
-  page.AllowOnly({"scaled", "drop_line_m", "tool_length_m"});
+  page.AllowOnly({"scaled", "drop_line_m", "tool_length_m", "lag_frames"});
   Read(page, "scaled", pose_map.scaled);
   Read(page, "tool_length_m", pose_map.tool_length_m);
+  Read(page, "lag_frames", pose_map.lag_frames);
   if (page.Has("drop_line_m")) pose_map.drop_line_m = page.Get<double>("drop_line_m");
 }
 

@@ -32,6 +32,27 @@ void MotionSums::Add(const std::vector<Arms>& track) {
   }
 }
 
+void LagSums::Add(const std::vector<Arms>& told, const std::vector<Arms>& measured) {
+  for (std::size_t k = 1; k < std::min(told.size(), measured.size()); ++k) {
+    for (std::size_t arm = 0; arm < std::min(told[k].size(), measured[k].size()); ++arm) {
+      const Eigen::Vector3d now = told[k][arm].base_from_gripper.translation(),
+                            step = now - told[k - 1].at(arm).base_from_gripper.translation();
+      behind_m2 += step.dot(now - measured[k][arm].base_from_gripper.translation());
+      step_m2 += step.squaredNorm();
+    }
+  }
+}
+
+void LagSums::Add(const LagSums& other) {
+  behind_m2 += other.behind_m2;
+  step_m2 += other.step_m2;
+}
+
+std::optional<double> LagSums::Frames() const {
+  if (step_m2 < 1e-8) return std::nullopt;
+  return behind_m2 / step_m2;
+}
+
 ActionStatistics MotionSums::Statistics(const std::string& robot, double delta_frames) const {
   ActionStatistics statistics;
   statistics.robot = robot;

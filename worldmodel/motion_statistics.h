@@ -1,5 +1,6 @@
 #pragma once
 
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -23,6 +24,18 @@ class MotionSums {
  private:
   double steps_ = 0;
   std::array<double, 12> sum_{}, squares_{};
+};
+
+/// How late arms are where they were told to be: sums over many recordings.
+struct LagSums {
+  double behind_m2 = 0;  ///< of how far the arms are behind what they are told, along the step they are told
+  double step_m2 = 0;    ///< of the steps themselves, squared
+
+  /// @param told, measured  [T] of one recording, the same arms
+  void Add(const std::vector<Arms>& told, const std::vector<Arms>& measured);
+  void Add(const LagSums& other);
+  /// Least squares over the grippers' places: shares of a frame. Nothing if nothing moved.
+  std::optional<double> Frames() const;
 };
 
 /// A page as ReadActionStatistics reads it; every number comes back to the last bit.

@@ -133,6 +133,7 @@ PoseMapOptions PoseMapOptions::Of(const nn::ModelConfig& config) {
   PoseMapOptions options = config.pose_map.scaled ? ForHeight(static_cast<int>(config.image_height_px)) : PoseMapOptions();
   options.drop_line_m = config.pose_map.drop_line_m;
   options.tool_length_m = static_cast<float>(config.pose_map.tool_length_m);
+  options.lag_frames = config.pose_map.lag_frames;
   return options;
 }
 

@@ -38,6 +38,7 @@ struct PoseMapOptions {
   float tool_length_m = 0.23F;  ///< from the gripper's pose to where its fingers meet: what is drawn
   /// Height in metres, base frame, to which a line is drawn straight down from each gripper. Not in the paper.
   std::optional<double> drop_line_m = std::nullopt;
+  double lag_frames = 0;  ///< told arms are seen so late (conditioning.h, SeenArms); maps and moving cameras are of them
 
   /// The same in parts of a picture of this height: for other sizes than the published 320.
   static PoseMapOptions ForHeight(int height_px);

@@ -81,7 +81,7 @@ void WriteShard(const std::filesystem::path& path, std::span<const Clip> clips, 
 }
 
 std::string PoseMapWords(const PoseMapOptions& options) {
-  const nn::PoseMapConfig drawn{.drop_line_m = options.drop_line_m, .tool_length_m = options.tool_length_m};
+  const nn::PoseMapConfig drawn{.drop_line_m = options.drop_line_m, .tool_length_m = options.tool_length_m, .lag_frames = options.lag_frames};
   return fmt::format("radius_px={} thickness_px={}{}", options.radius_px, options.thickness_px, drawn.Differences());
 }
 

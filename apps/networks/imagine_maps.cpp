@@ -7,6 +7,7 @@
 #include "apps/networks/imagine_output.h"
 #include "core/file.h"
 #include "core/geometry.h"
+#include "worldmodel/conditioning.h"
 #include "worldmodel/evac_config.h"
 
 namespace evac {
@@ -65,7 +66,8 @@ MapPainter::MapPainter(const ImagineStart& start, const nn::ModelConfig& config,
 }
 
 cv::Mat MapPainter::Paint(std::size_t frame) const {
-  return SideBySide(DrawPoseMaps(start_.arms.at(frame + 1), cameras_, options_));
+  const Arms seen = SeenArms(start_.arms.at(frame), start_.arms.at(frame + 1), options_.lag_frames);
+  return SideBySide(DrawPoseMaps(seen, cameras_, options_));
 }
 
 std::size_t WriteMaps(const MapPainter& painter, std::size_t frames, const std::filesystem::path& out) {

@@ -3,8 +3,10 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <cstdio>
 #include <nlohmann/json.hpp>
+#include <optional>
 
 #include "apps/work_share.h"
 #include "core/error.h"
@@ -23,6 +25,7 @@ namespace fs = std::filesystem;
 using Json = nlohmann::ordered_json;
 
 constexpr double kRawFrames_hz = 30;  // of the statistics
+constexpr double kLagToTell_frames = 0.2;
 
 /// One clip to be made: which recording, and which of its crops.
 struct PlannedClip {
@@ -94,11 +97,25 @@ void LeaveOutOtherRobots(Packing& packing) {
   });
 }
 
+/// Told arms are drawn, and carry their cameras, where the network's page says that they are seen.
+void SayLag(const LagSums& lag, double page_frames) {
+  const std::optional<double> frames = lag.Frames();
+  if (!frames) return;
+  Tell(fmt::format("arms are {:.2f} frames behind what they are told; pose_map.lag_frames is {}{}", *frames, page_frames,
+                   std::abs(*frames - page_frames) > kLagToTell_frames
+                       ? ": pictures and pose maps do not lie on each other"
+                       : ""));
+}
+
 void MeasureMotion(const PackArguments& arguments, Packing& packing) {
   MotionSums sums;
+  LagSums lag;
   for (PackSource& source : packing.sources) {
-    if (!HoldsOut(source, arguments)) sums.Add(source.track);
+    if (HoldsOut(source, arguments)) continue;
+    sums.Add(source.track);
+    lag.Add(source.lag);
   }
+  SayLag(lag, packing.clip.pose_map.lag_frames);
   packing.clip.delta_frames = arguments.period_s * kRawFrames_hz;
   packing.clip.statistics = sums.Statistics("packed", packing.clip.delta_frames);
 }

@@ -60,6 +60,7 @@ PackSource Examine(const fs::path& folder, const SourceOptions& options) {
   source.state = source.row ? source.row->initial_state : source.name;
   source.track = recording.told.empty() ? recording.arms : recording.told;
   source.frames = source.track.size();
+  source.lag.Add(recording.told, recording.arms);
   if (source.frames < options.least_frames) {
     throw InvalidInput("{}: {} steps of {} s, wanted at least {}", folder.string(), source.frames, recording.period_s,
                        options.least_frames)

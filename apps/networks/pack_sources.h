@@ -34,6 +34,7 @@ struct PackSource {
   std::size_t frames = 0;
   std::string sha256;                   ///< of all its files
   std::vector<Arms> track;              ///< the actions; emptied once the statistics are known
+  LagSums lag;                          ///< of what was told, where that is what the track holds
 };
 
 struct LeftOut {

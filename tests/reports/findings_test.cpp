@@ -9,6 +9,7 @@
 namespace evac {
 namespace {
 
+using testing::AllOf;
 using testing::HasSubstr;
 using testing::Not;
 
@@ -19,6 +20,13 @@ TEST(Findings, AWorldThatFollowsIsSaidToFollowWithItsInterval) {
   EXPECT_EQ(finding.decision, Decision::kYes);
   EXPECT_THAT(finding.answer, HasSubstr("sim follows real closely: Pearson 0.9"));
   EXPECT_THAT(finding.answer, HasSubstr("over 8 (task, policy) points"));
+}
+
+TEST(Findings, OfPairsThatEndOtherwiseItIsSaidWhichWay) {
+  const std::vector<Finding> findings = FindingsOf(SampleRun({{"a", "pick", "1", "ssffff", "sfsfff"}}).Summary());
+  EXPECT_THAT(findings.at(1).answer, AllOf(HasSubstr("4 of 6 pairs with the same initial state end alike"),
+                                           HasSubstr("Hallucinated: of 4 that fail in real, 1 succeeds in"),
+                                           HasSubstr("Missed: of 2 that succeed in real, 1 fails in")));
 }
 
 TEST(Findings, AnIntervalThatHoldsZeroIsNotDecided) {

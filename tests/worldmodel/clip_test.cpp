@@ -2,6 +2,7 @@
 
 #include <gmock/gmock.h>
 
+#include <algorithm>
 #include <cmath>
 
 #include "core/file.h"
@@ -96,6 +97,23 @@ TEST(Clip, MapsAreThoseThatAWorldWouldDrawForTheCroppedCamera) {
   EXPECT_TRUE(std::equal(map.datastart, map.dataend, clip.maps.begin() + static_cast<std::ptrdiff_t>(3 * size)));
 }
 
+TEST(Clip, ArmsThatFollowLateAreDrawnAndCarryTheirCamerasWhereTheyAreSeen) {
+  ClipSource source = Source({40.5, 30.5});
+  source.cameras[0].mount = Mount::kRightGripper;
+  source.cameras[0].mount_from_camera = Eigen::Isometry3d(Eigen::Translation3d(0, 0.05, 0.1));
+  ClipOptions options = Options();
+  options.pose_map.lag_frames = 0.25;
+  const Clip clip = MakeClip(source, {0, 0, kWidth_px, kHeight_px}, options);
+  const auto x_m = [&](std::size_t step) { return clip.c2w[step * 16 + 3]; };
+  EXPECT_NEAR(x_m(0), 0.35, 1e-6) << "nothing came before the first";
+  EXPECT_NEAR(x_m(3), 0.35 + 0.75 * 0.09 + 0.25 * 0.04, 1e-6);
+  EXPECT_FLOAT_EQ(clip.actions[3 * 16 + 8], 0.35F + 0.09F) << "told is told";
+  const Arms seen = SeenArms(source.arms[2], source.arms[3], 0.25);
+  const cv::Mat map = DrawPoseMaps(seen, source.cameras, options.pose_map).front();
+  EXPECT_TRUE(std::equal(map.datastart, map.dataend,
+                         clip.maps.begin() + static_cast<std::ptrdiff_t>(3 * map.total() * 3)));
+}
+
 TEST(Clip, DeltasAreTheStepsIntoEachFrameAsTheWorldModelIsTold) {
   const ClipSource source = Source({40.5, 30.5});
   const Clip clip = MakeClip(source, {0, 0, kWidth_px, kHeight_px}, Options());
@@ -121,6 +139,20 @@ TEST(Clip, RandomCropsStayInThePictureAndKeepMostOfIt) {
     EXPECT_GE(crop.width_px, kWidth_px * 3 / 4);
     EXPECT_GE(crop.height_px, kHeight_px * 3 / 4);
   }
+}
+
+TEST(MotionSums, HowFarArmsAreBehindWhatTheyAreToldIsFoundInFrames) {
+  std::vector<Arms> told, measured;
+  for (int step = 0; step < kSteps; ++step) {
+    told.push_back(ArmAt(step));
+    measured.push_back(SeenArms(ArmAt(std::max(0, step - 1)), ArmAt(step), 0.4));
+  }
+  LagSums lag, nothing;
+  lag.Add(told, measured);
+  ASSERT_TRUE(lag.Frames());
+  EXPECT_NEAR(*lag.Frames(), 0.4, 1e-9);
+  nothing.Add({told[0], told[0]}, {told[1], told[1]});
+  EXPECT_FALSE(nothing.Frames()) << "what stands still says nothing";
 }
 
 TEST(MotionStatistics, NormalisedDeltasOfTheSameTrackHaveMeanZeroAndDeviationOne) {

@@ -3,6 +3,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <cmath>
+
 #include "core/error.h"
 #include "core/geometry.h"
 #include "tests/worldmodel/imagined_support.h"
@@ -44,6 +46,33 @@ TEST(Conditioning, AWristCamerasRaysMoveWithTheCommandedGripperAndABaseCamerasSt
     const double moved_m = t < 2 ? 0 : 0.01 * static_cast<double>(t - 1);
     EXPECT_NEAR(told.rays[t][1].origin.x() - told.rays[0][1].origin.x(), moved_m, 1e-6) << t;
   }
+}
+
+TEST(Conditioning, ArmsThatFollowLateCarryTheirCamerasLateToo) {
+  ImaginedScene scene = Started();
+  scene.frames.push_back({{}, Targets(1).front()});  // executed: .01 m further
+  ConditioningOptions options = FewSteps().conditioning;
+  options.pose_map.lag_frames = 0.25;
+  const ChunkConditioning told = Condition(scene, {0, 2}, Targets(3), SmallConfig(), options);
+  const double at_rest_m = told.rays[0][1].origin.x();
+  EXPECT_NEAR(told.rays[1][1].origin.x() - at_rest_m, 0.0075, 1e-6) << "a remembered frame, seen as it was seen";
+  EXPECT_NEAR(told.rays[2][1].origin.x() - at_rest_m, 0.01, 1e-6) << "told the same twice: there by now";
+  EXPECT_NEAR(told.rays[3][1].origin.x() - at_rest_m, 0.0175, 1e-6);
+  const std::vector<Arms> far = {ArmsAt(0.6)};
+  const ChunkConditioning late = Condition(scene, {0, 2}, far, SmallConfig(), options),
+                          at_once = Condition(scene, {0, 2}, far, SmallConfig(), FewSteps().conditioning);
+  EXPECT_EQ(late.deltas, at_once.deltas);
+  EXPECT_EQ(late.arms, at_once.arms);
+  EXPECT_NE(cv::norm(late.pose_maps[0][0], at_once.pose_maps[0][0], cv::NORM_INF), 0);
+  EXPECT_EQ(cv::norm(late.pose_maps[1][0], at_once.pose_maps[1][0], cv::NORM_INF), 0) << "there by then";
+}
+
+TEST(Conditioning, ATurnIsSeenOnTheShortWay) {
+  Arms before(1), now(1);
+  before[0].base_from_gripper = Eigen::AngleAxisd(3.0, Eigen::Vector3d::UnitZ());
+  now[0].base_from_gripper = Eigen::AngleAxisd(-3.0, Eigen::Vector3d::UnitZ());
+  const Eigen::Isometry3d seen = SeenArms(before, now, 0.5)[0].base_from_gripper;
+  EXPECT_NEAR(RotationBetween(seen, Eigen::Isometry3d(Eigen::AngleAxisd(M_PI, Eigen::Vector3d::UnitZ()))), 0, 1e-6);
 }
 
 TEST(Conditioning, DeltasLeadFromEachFrameToTheNext) {

@@ -72,7 +72,8 @@ std::string Field(const char* name, double value) {
 std::string PoseMapConfig::Differences() const {
   const PoseMapConfig published;
   return (drop_line_m ? Field("drop_line_m", *drop_line_m) : "") +
-         (std::fabs(tool_length_m - published.tool_length_m) > 1e-6 ? Field("tool_length_m", tool_length_m) : "");
+         (std::fabs(tool_length_m - published.tool_length_m) > 1e-6 ? Field("tool_length_m", tool_length_m) : "") +
+         (lag_frames > 0 ? Field("lag_frames", lag_frames) : "");
 }
 
 void ModelConfig::Check() const {
@@ -102,6 +103,8 @@ void ModelConfig::Check() const {
               std::to_string(inputs));
   if (schedule.carry_plane_m && !schedule.from_last_frame)
     throw TensorError("schedule.carry_plane_m: wanted schedule.from_last_frame: true as well");
+  if (!(pose_map.lag_frames >= 0 && pose_map.lag_frames <= 1))
+    throw TensorError("pose_map.lag_frames: found" + Field("", pose_map.lag_frames).substr(2) + ", wanted 0 … 1");
   Require(unet.out_channels == vae.z_channels, "unet.out_channels", unet.out_channels, "vae.z_channels");
   Require(domain >= 0 && domain < unet.domains, "domain", domain, "a row of unet.domains");
   const std::int64_t multiple = vae.Stride() << (unet.channel_mult.size() - 1);

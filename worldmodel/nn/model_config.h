@@ -95,6 +95,10 @@ struct PoseMapConfig {
   /// From the recorded pose to where the fingers meet, along the tool axis: what the disc is drawn at. AgiBot records
   /// the flange; 0 for robots whose poses are the fingertips'.
   double tool_length_m = 0.23;
+  /// Arms that are told where to be follow late: a picture shows them where they were told to be this share of a frame
+  /// before, 0 … 1. Maps and the cameras that move with a gripper are drawn so. Not in the paper, whose arms are
+  /// measured.
+  double lag_frames = 0;
 
   /// What is not as published, for files that were drawn so: " drop_line_m=0 tool_length_m=0", or nothing.
   std::string Differences() const;
