@@ -58,9 +58,8 @@ Finding Agreement(const WorldComparison& comparison) {
     return finding;
   }
   finding.answer = fmt::format(
-      "{} of {} pairs with the same initial state end alike, {}. Hallucinated: of {} that fail in {}, {} in {}. "
-      "Missed: of "
-      "{} that succeed in {}, {} in {}.",
+      "{} of {} pairs with the same initial state end alike, {}. "
+      "Hallucinated: of {} that fail in {}, {} in {}. Missed: of {} that succeed in {}, {} in {}.",
       all.both_succeed + all.both_fail, share.n, PercentWithInterval(share), all.other_only + all.both_fail,
       comparison.real, Counted(all.other_only, "succeeds", "succeed"), comparison.other,
       all.both_succeed + all.real_only, comparison.real, Counted(all.real_only, "fails", "fail"), comparison.other);
