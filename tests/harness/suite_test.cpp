@@ -67,12 +67,15 @@ TEST_F(SuiteTest, ASecondRealWorldOrATwinPolicyIsRefused) {
 }
 
 TEST_F(SuiteTest, AWorldMayTryTheFirstOfTheInitialStatesAlone) {
-  const auto read = [](const std::vector<std::string>& set) { return ReadSuite(EVAC_SOURCE_DIR "/apps/configs/demo.yaml", set); };
-  const Suite suite = read({"worlds.1.initial_states=3"});
+  const auto read = [](std::vector<std::string> set) {
+    set.insert(set.begin(), "initial_states.count=20");
+    return ReadSuite(EVAC_SOURCE_DIR "/apps/configs/demo.yaml", set);
+  };
+  const Suite suite = read({"worlds.1.initial_states=5"});
   EXPECT_EQ(StatesOf(suite, suite.worlds[0]).size(), suite.initial_states.size());
-  ASSERT_EQ(StatesOf(suite, suite.worlds[1]).size(), 3u);
-  EXPECT_EQ(StatesOf(suite, suite.worlds[1])[2].id, suite.initial_states[2].id);
-  EXPECT_EQ(AllJobs(suite, suite.worlds[1], suite.policies[0]).size(), 3 * suite.tasks.size() * suite.seeds.size());
+  ASSERT_EQ(StatesOf(suite, suite.worlds[1]).size(), 5u);
+  EXPECT_EQ(StatesOf(suite, suite.worlds[1])[4].id, suite.initial_states[4].id);
+  EXPECT_EQ(AllJobs(suite, suite.worlds[1], suite.policies[0]).size(), 5 * suite.tasks.size() * suite.seeds.size());
   EXPECT_NE(suite.hash, read({}).hash);
   for (const char* wrong : {"0", "-1", "21"}) EXPECT_THROW(read({fmt::format("worlds.1.initial_states={}", wrong)}), Error) << wrong;
 }
