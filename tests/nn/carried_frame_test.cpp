@@ -138,8 +138,9 @@ TEST(CarriedFrame, LatentsGoByWayOfTheirPictureAndWhatStandsStillStays) {
   const EvacModel model(weights, config);
   const Rays still({{}, {}}), moved({{}, {.x_m = 0.04, .turn = 0.1}});
   const Tensor latents = at::rand({2, config.vae.z_channels, kHeight, kWidth}) - 0.5;
-  const CarriedFrame later = CarryLatentsAlongPlane(model, latents, at::cat({still.direction, moved.direction}),
-                                                    at::cat({still.origin, moved.origin}), 0, 1, 0);
+  const CarriedFrame later =
+      CarryLatentsAlongPlane(model, latents.unsqueeze(2), at::cat({still.direction, moved.direction}),
+                             at::cat({still.origin, moved.origin}), 1, 0);
   EXPECT_TRUE(later.frames[0].select(1, 0).equal(latents[0]));
   EXPECT_EQ(later.seen[0].min().item<double>(), 1);
   const Tensor picture = DecodeLatents(model, latents.narrow(0, 1, 1)).clamp(-1, 1);
@@ -148,6 +149,64 @@ TEST(CarriedFrame, LatentsGoByWayOfTheirPictureAndWhatStandsStillStays) {
   EXPECT_TRUE(at::allclose(later.frames.narrow(0, 1, 1).select(2, 0), wanted, 1e-4, 1e-5));
   EXPECT_FALSE(at::allclose(later.frames[1].select(1, 0), latents[1], 1e-2, 1e-2));
   EXPECT_TRUE(later.seen[1].equal(pictures.seen[0]));
+}
+
+/// Two frames to carry from and one to carry to, of a codec whose latents are as fine as its pictures.
+struct TwoFrames {
+  TwoFrames() {
+    config.vae.scale_factor = 0.5;
+    latents = at::rand({1, config.vae.z_channels, 2, kHeight, kWidth}) - 0.5;
+  }
+  CarriedFrame Carry(const Rays& rays, std::int64_t frames) const {
+    return CarryLatentsAlongPlane(model, latents.narrow(2, 2 - frames, frames), rays.direction, rays.origin, 2, 0);
+  }
+
+  HashWeights weights;
+  ModelConfig config = TinyConfig();
+  EvacModel model{weights, config};
+  Tensor latents;
+};
+
+TEST(CarriedFrame, AnOlderFrameShowsWhatTheNewestDoesNot) {
+  const TwoFrames given;
+  const Rays rays({{.x_m = 0.4}, {}, {.x_m = 0.2}});  // the last is between both: two places to the side of each
+  const CarriedFrame one = given.Carry(rays, 1), two = given.Carry(rays, 2);
+  const Tensor seen_by_newest = one.seen[0][0][0], seen = two.seen[0][0][0];
+  EXPECT_EQ(seen_by_newest.narrow(1, 0, kWidth - 2).min().item<double>(), 1);
+  EXPECT_EQ(seen_by_newest.narrow(1, kWidth - 2, 2).max().item<double>(), 0);
+  EXPECT_TRUE(seen.narrow(1, 0, kWidth - 2).equal(seen_by_newest.narrow(1, 0, kWidth - 2)));
+  EXPECT_TRUE((seen.narrow(1, kWidth - 2, 2) == kOlder).all().item<bool>());
+  // What is encoded is one picture made of both.
+  const auto picture = [&](std::int64_t frame) {
+    return DecodeLatents(given.model, given.latents.select(2, frame)).clamp(-1, 1);
+  };
+  const CarriedFrame from_newest = CarryAlongPlane(picture(1), rays.direction, rays.origin, 1, 2, 0),
+                     from_older = CarryAlongPlane(picture(0), rays.direction, rays.origin, 0, 2, 0);
+  const Tensor both = at::where(from_newest.shown, from_newest.frames, from_older.frames);
+  EXPECT_TRUE(
+      at::allclose(two.frames.select(2, 0), EncodeImages(given.model, both.select(2, 0), Tensor()), 1e-4, 1e-5));
+  EXPECT_FALSE(at::allclose(two.frames, one.frames, 1e-2, 1e-2));
+}
+
+TEST(CarriedFrame, AnOlderFrameAddsNothingToWhatTheNewestShows) {
+  const TwoFrames given;
+  for (const Rays& rays : {Rays({{.x_m = 0.4}, {}, {}}), Rays({{}, {}, {.x_m = 0.2}})}) {
+    const CarriedFrame one = given.Carry(rays, 1), two = given.Carry(rays, 2);
+    EXPECT_TRUE(two.frames.equal(one.frames));
+    EXPECT_TRUE(two.seen.equal(one.seen));
+  }
+}
+
+TEST(CarriedFrame, NoMoreAreCarriedThanAreRemembered) {
+  ModelConfig config = TinyConfig();
+  config.schedule.carry_frames = 2;
+  EXPECT_THROW(config.Check(), TensorError) << "along no plane";
+  config.schedule.from_last_frame = true;
+  config.schedule.carry_plane_m = 0;
+  config.unet.in_channels += config.vae.z_channels + 1;
+  EXPECT_NO_THROW(config.Check());
+  config.schedule.carry_frames = config.memory + 1;
+  EXPECT_THROW(config.Check(), TensorError);
 }
 
 }  // namespace

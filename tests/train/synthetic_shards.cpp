@@ -63,6 +63,7 @@ void Fill(const SyntheticShards& o, const Tensors& t, Dice& dice) {
       if (i > 0) y = std::clamp(y + dice.Uniform(-3, 3), 4.0, static_cast<double>(o.height_px) - 4);
       t.deltas[row][7] = (x - before_x) / 2;
       t.deltas[row][8] = (y - before_y) / 2;
+      t.actions[row][15] = clip == 1 && o.closes_at > 0 && i >= o.closes_at ? 120 : 0;
       t.contact[row] = i == o.frames / 2 ? 1 : 0;
       Draw(o, t, row, {x, y, ground});
     }

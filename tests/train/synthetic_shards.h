@@ -12,6 +12,7 @@ struct SyntheticShards {
   std::int64_t clips = 6;        ///< of each split
   std::int64_t frames = 9;       ///< of a clip
   std::int64_t failures = 0;     ///< of the clips of each split; the others are successes
+  std::int64_t closes_at = 0;    ///< above 0: the second clip's hand is told to close at this frame, no other is
   std::int64_t views = 1;
   std::int64_t height_px = 16, width_px = 24;
   std::uint64_t seed = 1;

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <fstream>
+#include <set>
 
 #include "tests/nn/support.h"
 #include "tests/support/temp_folder.h"
@@ -128,6 +129,8 @@ TEST(TrainWorld, TheLossFallsWithEverythingThatThePaperLacks) {
   options.world.terminal_share = 0.3;
   options.world.log_uniform = true;
   options.step_weight = "clean";
+  options.world.windows.closing_share = 0.5;
+  options.world.reach_weight = 4;
   options.world.object_weight = 4;
   options.world.change_weight = 2;
   options.world.self_memory_share = 0.5;
@@ -277,6 +280,28 @@ TEST(Windows, LieInTheirClipNewestLastAndHoldContactWhenAsked) {
     const Tensor contact = shards.shards()[window.clip->shard].contact;
     EXPECT_GT(contact.narrow(0, window.clip->first + window.last + 1, 3).sum().item<std::int64_t>(), 0);
   }
+}
+
+TEST(Windows, ShowWhatComesOfAHandThatClosesWhenAsked) {
+  const TempFolder folder;
+  constexpr std::int64_t kClosing = 17, kChunk = 8;
+  WriteSyntheticShards(folder.path(), {.clips = 4, .frames = 40, .closes_at = kClosing});
+  const ShardSet shards(folder.path(), Split::kTrain);
+  WindowOptions options{.chunk = kChunk, .memory = 4, .history = 8, .closing_share = 1};  // one hand closes, once
+  Dice dice({1, 0, 0, 0}, 1);
+  std::set<std::int64_t> seen;
+  for (const double rollout_share : {0.0, 1.0}) {
+    options.rollout_share = rollout_share;
+    const WindowSampler sampler(shards, options);
+    for (int i = 0; i < 200; ++i) {
+      const Window window = sampler.Pick(dice);
+      EXPECT_EQ(window.clip->first, 40);
+      EXPECT_LE(std::abs(window.last - kClosing), kChunk / 2);
+      EXPECT_TRUE(rollout_share == 0 || window.last == 16) << window.last;
+      seen.insert(window.last);
+    }
+  }
+  EXPECT_EQ(seen.size(), kChunk) << "every place of it that the options name";
 }
 
 TEST(Windows, ComeFromSuccessesAloneWhenAsked) {

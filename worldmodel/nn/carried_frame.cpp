@@ -4,6 +4,8 @@
 #include <ATen/ops/linalg_inv.h>
 #include <ATen/ops/where.h>
 
+#include <cmath>
+
 #include "worldmodel/nn/latent_pictures.h"
 
 namespace evac::nn {
@@ -64,12 +66,24 @@ Found Find(const Tensor& direction, const Tensor& origin, std::int64_t at, std::
   return {found.select(2, 0) / safe, found.select(2, 1) / safe, depth};
 }
 
-/// [BV] true where no later camera is elsewhere or looks elsewhere than `at`.
-Tensor StandsStill(const Tensor& direction, const Tensor& origin, std::int64_t at, std::int64_t first) {
+/// [BV] true where none of `count` cameras from `first` on is elsewhere or looks elsewhere than `at`.
+Tensor StandsStill(const Tensor& direction, const Tensor& origin, std::int64_t at, std::int64_t first,
+                   std::int64_t count) {
   const auto moved = [&](const Tensor& of) {
-    return (of.narrow(2, first, of.size(2) - first) - of.narrow(2, at, 1)).abs().flatten(1).amax(1);
+    return (of.narrow(2, first, count) - of.narrow(2, at, 1)).abs().flatten(1).amax(1);
   };
   return (moved(direction) < kStill).logical_and(moved(origin) < kStill);
+}
+
+Tensor Indices(const Tensor& chosen) { return chosen.nonzero().squeeze(1); }
+
+/// What an older frame shows, in these rows, where `of` shows nothing yet.
+void FillIn(CarriedFrame& of, const CarriedFrame& older, const Tensor& rows) {
+  const Tensor frames = of.frames.index_select(0, rows), shown = of.shown.index_select(0, rows),
+               seen = of.seen.index_select(0, rows);
+  of.frames.index_copy_(0, rows, at::where(older.shown.logical_and(shown.logical_not()), older.frames, frames));
+  of.seen.index_copy_(0, rows, at::max(seen, kOlder * older.seen));
+  of.shown.index_copy_(0, rows, shown.logical_or(older.shown));
 }
 
 }  // namespace
@@ -87,6 +101,7 @@ CarriedFrame CarryAlongPlane(const Tensor& frame, const Tensor& direction, const
   const Tensor seen =
       (places.depth > 1e-9).logical_and(within(places.x, w)).logical_and(within(places.y, h)).unsqueeze(1);
   const Found pixels = finer == 1 ? places : Find(direction, origin, at, first, plane_m, finer);
+  const Tensor shown = (pixels.depth > 1e-9).logical_and(within(pixels.x, w)).logical_and(within(pixels.y, h));
   const auto scaled = [](const Tensor& position, std::int64_t side) {  // -1 and 1: the outer edges of the frame
     return ((position + 0.5) * (2.0 / static_cast<double>(side)) - 1).clamp(-2, 2);
   };
@@ -94,26 +109,59 @@ CarriedFrame CarryAlongPlane(const Tensor& frame, const Tensor& direction, const
                           .reshape({rows, later * height, width, 2});
   constexpr std::int64_t kBilinear = 0, kRepeatEdge = 1;
   const Tensor read = at::grid_sampler_2d(frame.to(at::kFloat), grid.to(at::kFloat), kBilinear, kRepeatEdge, false);
-  return {read.to(frame.scalar_type()).unflatten(2, {later, height}),
-          seen.to(frame.scalar_type()).unflatten(3, {h, w})};
+  return {read.to(frame.scalar_type()).unflatten(2, {later, height}), seen.to(frame.scalar_type()).unflatten(3, {h, w}),
+          shown.unsqueeze(1).unflatten(3, {height, width})};
 }
 
 CarriedFrame CarryLatentsAlongPlane(const EvacModel& model, const Tensor& latents, const Tensor& direction,
-                                    const Tensor& origin, std::int64_t at, std::int64_t first, double plane_m) {
-  const std::int64_t rows = latents.size(0), h = latents.size(2), w = latents.size(3),
-                     later = direction.size(2) - first;
-  CarriedFrame carried{latents.unsqueeze(2).expand({-1, -1, later, -1, -1}).clone(),
-                       at::ones({rows, 1, later, h, w}, latents.options())};
-  const Tensor moving = StandsStill(direction, origin, at, first).logical_not().nonzero().squeeze(1);
+                                    const Tensor& origin, std::int64_t first, double plane_m) {
+  const std::int64_t rows = latents.size(0), frames = latents.size(2), h = latents.size(3), w = latents.size(4),
+                     later = direction.size(2) - first, newest = first - 1;
+  const Tensor last = latents.select(2, frames - 1);
+  CarriedFrame carried{last.unsqueeze(2).expand({-1, -1, later, -1, -1}).clone(),
+                       at::ones({rows, 1, later, h, w}, latents.options()),
+                       {}};
+  const Tensor moving = Indices(StandsStill(direction, origin, newest, first, later).logical_not());
   if (moving.numel() == 0) return carried;
-  const Tensor picture = DecodeLatents(model, latents.index_select(0, moving)).clamp(-1, 1);
-  const CarriedFrame pictures =
-      CarryAlongPlane(picture, direction.index_select(0, moving), origin.index_select(0, moving), at, first, plane_m);
+  const Tensor moving_direction = direction.index_select(0, moving), moving_origin = origin.index_select(0, moving);
+  const auto carry = [&](std::int64_t frame, const Tensor& of) {  // indices among those that move
+    const Tensor picture =
+        DecodeLatents(model, latents.select(2, frame).index_select(0, moving.index_select(0, of))).clamp(-1, 1);
+    return CarryAlongPlane(picture, moving_direction.index_select(0, of), moving_origin.index_select(0, of),
+                           first - frames + frame, first, plane_m);
+  };
+  CarriedFrame pictures = carry(frames - 1, at::arange(moving.numel(), moving.options()));
+  for (std::int64_t frame = frames - 2; frame >= 0; --frame) {
+    const std::int64_t at = first - frames + frame;
+    const Tensor elsewhere = StandsStill(moving_direction, moving_origin, at, at + 1, 1).logical_not();
+    const Tensor adds = Indices(elsewhere.logical_and(pictures.shown.flatten(1).all(1).logical_not()));
+    if (adds.numel() > 0) FillIn(pictures, carry(frame, adds), adds);
+  }
   const Tensor encoded = EncodeImages(model, pictures.frames.transpose(1, 2).flatten(0, 1), Tensor());
   carried.frames.index_copy_(0, moving,
                              encoded.unflatten(0, {moving.numel(), later}).transpose(1, 2).to(latents.scalar_type()));
   carried.seen.index_copy_(0, moving, pictures.seen.to(latents.scalar_type()));
   return carried;
+}
+
+Tensor SeenAt(const Tensor& points_m, const Tensor& direction, const Tensor& origin) {
+  const std::int64_t rows = direction.size(0), frames = direction.size(2);
+  const Tensor position_from_ray = at::linalg_inv(RayFromPosition(direction.transpose(1, 2).flatten(0, 1)))
+                                       .unflatten(0, {rows, frames});                      // [BV, T, 3, 3]
+  const Tensor camera = origin.select(4, 0).select(3, 0).to(at::kDouble).transpose(1, 2);  // [BV, T, 3]
+  const Tensor rays = points_m.to(at::kDouble).unsqueeze(1) - camera.unsqueeze(2);         // [BV, T, P, 3]
+  const Tensor found = at::matmul(rays, position_from_ray.transpose(2, 3));
+  const Tensor depth = found.narrow(3, 2, 1);
+  return at::cat({found.narrow(3, 0, 2) / depth, depth}, 3);
+}
+
+Tensor PointOnPlane(const Tensor& places, const Tensor& direction, const Tensor& origin, std::int64_t at,
+                    double plane_m) {
+  const Tensor position = at::cat({places.to(at::kDouble), at::ones({places.size(0), 1}, at::kDouble)}, 1);
+  const Tensor ray = at::matmul(RayFromPosition(direction.select(2, at)), position.unsqueeze(2)).squeeze(2);
+  const Tensor camera = origin.select(2, at).select(3, 0).select(2, 0).to(at::kDouble);  // [BV, 3]
+  const Tensor distance = (plane_m - camera.narrow(1, 2, 1)) / ray.narrow(1, 2, 1);
+  return at::where(distance > 0, camera + distance * ray, at::full({1, 1}, std::nan(""), at::kDouble));
 }
 
 }  // namespace evac::nn

@@ -9,6 +9,7 @@ namespace evac::nn {
 struct CarriedFrame {
   Tensor frames;  ///< [BV, c, K, H, W]: the frame as each later camera would see it
   Tensor seen;    ///< [BV, 1, K, h, w]: 1 where the frame shows the place, 0 where its nearest edge is repeated
+  Tensor shown;   ///< [BV, 1, K, H, W], of bools: the same of each pixel
 };
 
 /// Carries a frame to later cameras as if all it shows lay in the plane z = `plane_m` of the base frame (a table's
@@ -22,9 +23,26 @@ struct CarriedFrame {
 CarriedFrame CarryAlongPlane(const Tensor& frame, const Tensor& direction, const Tensor& origin, std::int64_t at,
                              std::int64_t first, double plane_m);
 
-/// The same for latents [BV, z, h, w], by way of their picture: a latent is a square of pixels, and what moved by half
-/// of one is another latent, not the mean of two. Decoded, carried, encoded; what stands still stays what it is.
+/// The same for latents, by way of their pictures: a latent is a square of pixels, and what moved by half of one is
+/// another latent, not the mean of two. Decoded, carried, encoded; what a camera that stands still shows stays what it
+/// is. Of several frames, the newest last, each pixel is of the newest that shows it; where only older ones show a
+/// place, `seen` is kOlder. `shown` is not defined.
+/// @param latents  [BV, z, M, h, w]: the M frames before `first`
 CarriedFrame CarryLatentsAlongPlane(const EvacModel& model, const Tensor& latents, const Tensor& direction,
-                                    const Tensor& origin, std::int64_t at, std::int64_t first, double plane_m);
+                                    const Tensor& origin, std::int64_t first, double plane_m);
+inline constexpr double kOlder = 0.5;
+
+/// Where points are seen.
+/// @param points_m   [BV, P, 3] metres, base frame
+/// @param direction  [BV, 3, T, h, w] and origin as above
+/// @returns [BV, T, P, 3], double: x and y among the places (the first one's middle is 0), and how far before the
+///   camera, in rays' lengths: not above 0 for what lies behind it
+Tensor SeenAt(const Tensor& points_m, const Tensor& direction, const Tensor& origin);
+
+/// The point of the plane z = `plane_m` that is seen at a place of frame `at`.
+/// @param places  [BV, 2]: x and y among the places
+/// @returns [BV, 3], double, metres, base frame; not a number where the ray does not meet the plane
+Tensor PointOnPlane(const Tensor& places, const Tensor& direction, const Tensor& origin, std::int64_t at,
+                    double plane_m);
 
 }  // namespace evac::nn

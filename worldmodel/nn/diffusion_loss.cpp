@@ -53,8 +53,9 @@ void Remember(const EvacModel& model, const Tensor& memory, Concat& concat) {
   concat.still = newest.unsqueeze(2).expand({-1, -1, chunk, -1, -1});
   concat.image = at::cat({memory, concat.still}, 2) * concat.mask;
   if (!model.schedule().carry_plane_m()) return;
-  const CarriedFrame later = CarryLatentsAlongPlane(model, newest, concat.direction, concat.origin, n - 1, n,
-                                                    *model.schedule().carry_plane_m());
+  const std::int64_t carried = model.schedule().carry_frames();
+  const CarriedFrame later = CarryLatentsAlongPlane(model, memory.narrow(2, n - carried, carried), concat.direction,
+                                                    concat.origin, n, *model.schedule().carry_plane_m());
   concat.still = later.frames;
   concat.carried = at::cat({memory, later.frames}, 2) * concat.mask;
   concat.seen = at::cat({at::ones_like(concat.mask.narrow(2, 0, n)), later.seen}, 2) * concat.mask;

@@ -103,6 +103,10 @@ void ModelConfig::Check() const {
               std::to_string(inputs));
   if (schedule.carry_plane_m && !schedule.from_last_frame)
     throw TensorError("schedule.carry_plane_m: wanted schedule.from_last_frame: true as well");
+  if (schedule.carry_frames != 1 && !schedule.carry_plane_m)
+    throw TensorError("schedule.carry_frames: wanted schedule.carry_plane_m as well");
+  Require(schedule.carry_frames >= 1 && schedule.carry_frames <= memory, "schedule.carry_frames", schedule.carry_frames,
+          "1 … memory = " + std::to_string(memory));
   if (!(pose_map.lag_frames >= 0 && pose_map.lag_frames <= 1))
     throw TensorError("pose_map.lag_frames: found" + Field("", pose_map.lag_frames).substr(2) + ", wanted 0 … 1");
   Require(unet.out_channels == vae.z_channels, "unet.out_channels", unet.out_channels, "vae.z_channels");

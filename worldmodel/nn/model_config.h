@@ -83,6 +83,9 @@ struct ScheduleConfig {
   /// camera will be, as if all it shows lay in the plane z = this many metres of the base frame (carried_frame.h). The
   /// network is shown that too: z + 1 channels more. Not in the paper.
   std::optional<double> carry_plane_m;
+  /// How many memory frames are carried, 1 … ModelConfig::memory: what the newest does not show is looked for in the one
+  /// before it, and so on. Of such places `seen` is one half.
+  std::int64_t carry_frames = 1;
 };
 
 /// How pose maps are drawn (spec 2).

@@ -64,7 +64,8 @@ std::vector<float> ScaleBuffer(const ScheduleConfig& config) {
 NoiseSchedule::NoiseSchedule(const ScheduleConfig& config)
     : betas_(SquareRootSpaced(config.linear_start, config.linear_end, config.steps)),
       from_last_frame_(config.from_last_frame),
-      carry_plane_m_(config.carry_plane_m) {
+      carry_plane_m_(config.carry_plane_m),
+      carry_frames_(config.carry_frames) {
   if (config.zero_terminal_snr) betas_ = WithZeroTerminal(betas_);
   exact_alphas_cumprod_ = CumulativeProduct(betas_);
   alphas_cumprod_ = Rounded(exact_alphas_cumprod_);

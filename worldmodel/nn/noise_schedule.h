@@ -20,6 +20,7 @@ class NoiseSchedule {
   double Scale(std::int64_t t) const { return scales_[Index(t)]; }
   bool from_last_frame() const { return from_last_frame_; }
   std::optional<double> carry_plane_m() const { return carry_plane_m_; }
+  std::int64_t carry_frames() const { return carry_frames_; }
 
   /// A buffer that a checkpoint carries: the key and its float values.
   struct Buffer {
@@ -40,6 +41,7 @@ class NoiseSchedule {
   std::vector<float> scale_buffer_;
   bool from_last_frame_;
   std::optional<double> carry_plane_m_;
+  std::int64_t carry_frames_;
 };
 
 /// v-prediction (Salimans and Ho 2022): three ways to say the same of x_t = √ā x0 + √(1 - ā) ε.

@@ -10,6 +10,21 @@ bool HasContact(const Shard& shard, const Clip& clip, std::int64_t from, std::in
   return std::any_of(contact, contact + count, [](std::uint8_t value) { return value != 0; });
 }
 
+/// The frames of a clip at which a hand is told to close beyond half, from below it.
+std::vector<std::int64_t> Closings(const Shard& shard, const Clip& clip) {
+  constexpr float kHalfClosed = 60;  // 0 open … 120 closed
+  const Tensor actions = shard.actions.narrow(0, clip.first, clip.frames).to(at::kFloat).contiguous();
+  const float* numbers = actions.data_ptr<float>();
+  std::vector<std::int64_t> frames;
+  for (std::int64_t frame = 1; frame < clip.frames; ++frame) {
+    for (const std::int64_t hand : {7, 15}) {
+      if (numbers[16 * frame + hand] > kHalfClosed && numbers[16 * (frame - 1) + hand] <= kHalfClosed)
+        frames.push_back(frame);
+    }
+  }
+  return frames;
+}
+
 }  // namespace
 
 std::vector<std::int64_t> RolloutMemory(std::int64_t last, std::int64_t memory) {
@@ -36,12 +51,18 @@ WindowSampler::WindowSampler(const ShardSet& shards, const WindowOptions& option
 
 void WindowSampler::AddClip(const ShardSet& shards, const Clip& clip) {
   const Shard& shard = shards.shards()[clip.shard];
+  const std::vector<std::int64_t> closings = Closings(shard, clip);
+  const std::int64_t half = options_.chunk / 2;
   for (std::int64_t last = 0; last + options_.chunk < clip.frames; ++last) {
+    const bool closes = std::any_of(closings.begin(), closings.end(),
+                                    [&](std::int64_t frame) { return frame > last - half && frame <= last + half; });
     const bool starts = last % options_.chunk == 0, touches = HasContact(shard, clip, last + 1, options_.chunk);
     any_.push_back({&clip, last});
     if (starts) rollout_.push_back({&clip, last});
     if (touches) any_contact_.push_back({&clip, last});
     if (starts && touches) rollout_contact_.push_back({&clip, last});
+    if (closes) any_closing_.push_back({&clip, last});
+    if (starts && closes) rollout_closing_.push_back({&clip, last});
   }
 }
 
@@ -63,6 +84,8 @@ Window WindowSampler::Pick(Dice& dice) const {
   const std::vector<Start>* pool = rollout ? &rollout_ : &any_;
   const std::vector<Start>& touching = rollout ? rollout_contact_ : any_contact_;
   if (contact && !touching.empty()) pool = &touching;
+  const std::vector<Start>& closing = rollout ? rollout_closing_ : any_closing_;
+  if (options_.closing_share > 0 && dice.Chance(options_.closing_share) && !closing.empty()) pool = &closing;
   const Start& start = (*pool)[static_cast<std::size_t>(dice.Below(static_cast<std::int64_t>(pool->size())))];
   Window window{start.clip, {}, start.last, options_.chunk, 0};
   window.memory = rollout ? RolloutMemory(start.last, options_.memory) : RandomMemory(start.last, dice);

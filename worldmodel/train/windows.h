@@ -25,6 +25,9 @@ struct WindowOptions {
   /// Of the samples that begin where rollouts do (frame 0, K, 2K, …) and remember what rollouts do (4.6). The paper: 0.
   double rollout_share = 0;
   double contact_share = 0;         ///< of the samples whose chunk holds a frame in contact. The paper: 0
+  /// Of the samples in which a hand is told to close, in the chunk's first half or half a chunk before it: what comes of
+  /// it is seen, and whether it holds something or not is no part of the choice. The paper: 0
+  double closing_share = 0;
   bool successes_only = false;      ///< from clips that ended in success, as a lab that keeps no failures would have. The paper: both
   bool first_image = false;         ///< the image encoder sees the oldest memory, as when imagining; else any of it
 };
@@ -51,7 +54,7 @@ class WindowSampler {
   void AddClip(const ShardSet& shards, const Clip& clip);
 
   WindowOptions options_;
-  std::vector<Start> any_, rollout_, any_contact_, rollout_contact_;
+  std::vector<Start> any_, rollout_, any_contact_, rollout_contact_, any_closing_, rollout_closing_;
 };
 
 }  // namespace evac::train

@@ -5,6 +5,7 @@
 
 #include "worldmodel/nn/frame_actions.h"
 #include "worldmodel/nn/weight_keys.h"
+#include "worldmodel/train/reach.h"
 
 namespace evac::train {
 namespace {
@@ -107,6 +108,8 @@ Tensor WorldTraining::Weight(const WorldBatch& batch, const Tensor& still, const
                      w = batch.latents.size(4);
   Tensor weight = at::ones({batch.latents.size(0), 1, chunk, h, w});
   const Tensor frames = batch.latents.narrow(2, n, chunk);
+  if (options_.reach_weight > 0)
+    weight += options_.reach_weight * WithinReach(batch, model_.config(), options_.object_radius);
   if (options_.change_weight > 0) weight += options_.change_weight * (frames - still).abs().mean(1, true);
   if (options_.object_weight > 0) {
     const Tensor object = batch.object.narrow(2, n, chunk);                                // [BV, 2, K]
