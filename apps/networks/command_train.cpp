@@ -51,7 +51,7 @@ ExitCode RunWorld(const TrainArguments& arguments) {
   train::WorldOptions options;
   ReadTrainingPage(arguments.training, "world", arguments.settings, SettingsOf(options));
   Override(arguments, options.job.trainer);
-  const train::WorldStart start{arguments.codec, arguments.init, arguments.init_except,
+  const train::WorldStart start{arguments.codec, arguments.init, arguments.init_except, arguments.init_widen,
                                 Sha256HexOfFile(arguments.codec)};
   const CatchInterrupts catch_interrupts;
   TrainingProgress progress(stderr);
@@ -95,6 +95,8 @@ void AddWorld(CLI::App& group, ExitCode& exit_code) {
       ->add_option("--init-except", arguments->init_except,
                    "keys that begin so are drawn anew instead, with commas between them")
       ->delimiter(',');
+  command->add_flag("--init-widen", arguments->init_widen,
+                    "the checkpoint is of a model that was shown less: what is new counts nothing at first");
   command->footer(
       "Examples:\n"
       "  evac train world out/shards --config apps/configs/desk_model.yaml --training apps/configs/desk_training.yaml "

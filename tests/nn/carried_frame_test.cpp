@@ -140,7 +140,7 @@ TEST(CarriedFrame, LatentsGoByWayOfTheirPictureAndWhatStandsStillStays) {
   const Tensor latents = at::rand({2, config.vae.z_channels, kHeight, kWidth}) - 0.5;
   const CarriedFrame later =
       CarryLatentsAlongPlane(model, latents.unsqueeze(2), at::cat({still.direction, moved.direction}),
-                             at::cat({still.origin, moved.origin}), 1, 0);
+                             at::cat({still.origin, moved.origin}), 0, 1, 0);
   EXPECT_TRUE(later.frames[0].select(1, 0).equal(latents[0]));
   EXPECT_EQ(later.seen[0].min().item<double>(), 1);
   const Tensor picture = DecodeLatents(model, latents.narrow(0, 1, 1)).clamp(-1, 1);
@@ -158,7 +158,8 @@ struct TwoFrames {
     latents = at::rand({1, config.vae.z_channels, 2, kHeight, kWidth}) - 0.5;
   }
   CarriedFrame Carry(const Rays& rays, std::int64_t frames) const {
-    return CarryLatentsAlongPlane(model, latents.narrow(2, 2 - frames, frames), rays.direction, rays.origin, 2, 0);
+    return CarryLatentsAlongPlane(model, latents.narrow(2, 2 - frames, frames), rays.direction, rays.origin, 2 - frames,
+                                  2, 0);
   }
 
   HashWeights weights;
@@ -207,6 +208,36 @@ TEST(CarriedFrame, NoMoreAreCarriedThanAreRemembered) {
   EXPECT_NO_THROW(config.Check());
   config.schedule.carry_frames = config.memory + 1;
   EXPECT_THROW(config.Check(), TensorError);
+}
+
+TEST(CarriedFrame, TheFirstPictureStandsBesideTheNewest) {
+  ModelConfig config = TinyConfig();
+  config.schedule.from_last_frame = true;
+  config.schedule.carry_plane_m = 0;
+  config.schedule.carry_first = true;
+  EXPECT_THROW(config.Check(), TensorError) << "too few channels";
+  config.unet.in_channels += 2 * (config.vae.z_channels + 1);
+  config.memory = 2;
+  config.Check();
+  HashWeights weights;
+  const EvacModel model(weights, config);
+  const Rays rays({{.x_m = 0.4}, {}, {.x_m = 0.2}});
+  const Tensor memory = at::rand({1, config.vae.z_channels, 2, kHeight, kWidth}) - 0.5,
+               mask = at::ones({1, 1, 3, kHeight, kWidth}),
+               x = at::rand({1, config.vae.z_channels, 3, kHeight, kWidth});
+  Concat concat{{}, mask, at::zeros_like(x), rays.direction, rays.origin};
+  Remember(model, memory, concat);
+  const CarriedFrame first =
+      CarryLatentsAlongPlane(model, memory.narrow(2, 0, 1), rays.direction, rays.origin, 0, 2, 0);
+  const Tensor input = DenoiserInput(x, concat);
+  ASSERT_EQ(input.size(1), config.unet.in_channels);
+  const std::int64_t z = config.vae.z_channels;
+  const Tensor shown = input.narrow(1, input.size(1) - z - 1, z), seen = input.narrow(1, input.size(1) - 1, 1);
+  EXPECT_TRUE(shown.narrow(2, 0, 2).equal(memory));
+  EXPECT_TRUE(at::allclose(shown.narrow(2, 2, 1), first.frames, 1e-5, 1e-6));
+  EXPECT_TRUE(seen.narrow(2, 2, 1).equal(first.seen));
+  EXPECT_EQ(first.seen[0][0][0].narrow(1, 0, 2).max().item<double>(), 0) << "it looked elsewhere";
+  EXPECT_FALSE(concat.carried.narrow(2, 2, 1).equal(concat.first.narrow(2, 2, 1)));
 }
 
 }  // namespace

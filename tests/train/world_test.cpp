@@ -230,6 +230,30 @@ TEST(TrainWorld, GoesOnFromAnotherModelStrictlyButForWhatIsExcepted) {
   EXPECT_EQ(TrainWorld(place, Quick(1), start, {}).why, "done");
 }
 
+TEST(TrainWorld, GoesOnFromAModelThatWasShownLess) {
+  Prepared at(1);
+  at.config.schedule.from_last_frame = true;
+  at.config.schedule.carry_plane_m = 0;
+  at.config.unet.in_channels += at.config.vae.z_channels + 1;
+  const auto end = [&](const char* out, const nn::ModelConfig& config, double rate, const WorldStart& start) {
+    WorldOptions options = Quick(rate > 1e-9 ? 20 : 1);
+    options.job.trainer.learning_rate = rate;
+    options.job.trainer.holdout_every = options.job.trainer.steps;
+    return TrainWorld({at.folder / "shards", at.folder / out, config}, options, start, {}).best.value();
+  };
+  WorldStart start{at.codec()};
+  const double before = end("first", at.config, 3e-3, start);
+  start.init = at.folder / "first" / "weights.safetensors";
+  nn::ModelConfig more = at.config;
+  more.schedule.carry_first = true;
+  more.unet.in_channels += at.config.vae.z_channels + 1;
+  EXPECT_THROW(end("strict", more, 1e-12, start), TensorError) << "not without being asked";
+  start.init_widen = true;
+  EXPECT_NEAR(end("widened", more, 1e-12, start), before, 1e-5 * before);
+  start.init = at.folder / "widened" / "weights.safetensors";
+  EXPECT_THROW(end("narrow", at.config, 1e-12, start), TensorError) << "nothing is left out";
+}
+
 TEST(TrainWorld, RefusesLatentsOfAnotherCodec) {
   const Prepared at(1);
   WorldStart start{at.codec()};

@@ -114,9 +114,9 @@ CarriedFrame CarryAlongPlane(const Tensor& frame, const Tensor& direction, const
 }
 
 CarriedFrame CarryLatentsAlongPlane(const EvacModel& model, const Tensor& latents, const Tensor& direction,
-                                    const Tensor& origin, std::int64_t first, double plane_m) {
+                                    const Tensor& origin, std::int64_t at, std::int64_t first, double plane_m) {
   const std::int64_t rows = latents.size(0), frames = latents.size(2), h = latents.size(3), w = latents.size(4),
-                     later = direction.size(2) - first, newest = first - 1;
+                     later = direction.size(2) - first, newest = at + frames - 1;
   const Tensor last = latents.select(2, frames - 1);
   CarriedFrame carried{last.unsqueeze(2).expand({-1, -1, later, -1, -1}).clone(),
                        at::ones({rows, 1, later, h, w}, latents.options()),
@@ -127,13 +127,12 @@ CarriedFrame CarryLatentsAlongPlane(const EvacModel& model, const Tensor& latent
   const auto carry = [&](std::int64_t frame, const Tensor& of) {  // indices among those that move
     const Tensor picture =
         DecodeLatents(model, latents.select(2, frame).index_select(0, moving.index_select(0, of))).clamp(-1, 1);
-    return CarryAlongPlane(picture, moving_direction.index_select(0, of), moving_origin.index_select(0, of),
-                           first - frames + frame, first, plane_m);
+    return CarryAlongPlane(picture, moving_direction.index_select(0, of), moving_origin.index_select(0, of), at + frame,
+                           first, plane_m);
   };
   CarriedFrame pictures = carry(frames - 1, at::arange(moving.numel(), moving.options()));
   for (std::int64_t frame = frames - 2; frame >= 0; --frame) {
-    const std::int64_t at = first - frames + frame;
-    const Tensor elsewhere = StandsStill(moving_direction, moving_origin, at, at + 1, 1).logical_not();
+    const Tensor elsewhere = StandsStill(moving_direction, moving_origin, at + frame, at + frame + 1, 1).logical_not();
     const Tensor adds = Indices(elsewhere.logical_and(pictures.shown.flatten(1).all(1).logical_not()));
     if (adds.numel() > 0) FillIn(pictures, carry(frame, adds), adds);
   }

@@ -27,9 +27,10 @@ CarriedFrame CarryAlongPlane(const Tensor& frame, const Tensor& direction, const
 /// another latent, not the mean of two. Decoded, carried, encoded; what a camera that stands still shows stays what it
 /// is. Of several frames, the newest last, each pixel is of the newest that shows it; where only older ones show a
 /// place, `seen` is kOlder. `shown` is not defined.
-/// @param latents  [BV, z, M, h, w]: the M frames before `first`
+/// @param latents  [BV, z, M, h, w]
+/// @param at       index in T of the rays of the first of them; the others follow
 CarriedFrame CarryLatentsAlongPlane(const EvacModel& model, const Tensor& latents, const Tensor& direction,
-                                    const Tensor& origin, std::int64_t first, double plane_m);
+                                    const Tensor& origin, std::int64_t at, std::int64_t first, double plane_m);
 inline constexpr double kOlder = 0.5;
 
 /// Where points are seen.

@@ -54,11 +54,22 @@ void Remember(const EvacModel& model, const Tensor& memory, Concat& concat) {
   concat.image = at::cat({memory, concat.still}, 2) * concat.mask;
   if (!model.schedule().carry_plane_m()) return;
   const std::int64_t carried = model.schedule().carry_frames();
-  const CarriedFrame later = CarryLatentsAlongPlane(model, memory.narrow(2, n - carried, carried), concat.direction,
-                                                    concat.origin, n, *model.schedule().carry_plane_m());
+  const auto carry = [&](std::int64_t from, std::int64_t count) {
+    return CarryLatentsAlongPlane(model, memory.narrow(2, from, count), concat.direction, concat.origin, from, n,
+                                  *model.schedule().carry_plane_m());
+  };
+  const auto behind_memory = [&](const Tensor& before, const Tensor& later) {
+    return at::cat({before, later}, 2) * concat.mask;
+  };
+  const Tensor all_seen = at::ones_like(concat.mask.narrow(2, 0, n));
+  const CarriedFrame later = carry(n - carried, carried);
   concat.still = later.frames;
-  concat.carried = at::cat({memory, later.frames}, 2) * concat.mask;
-  concat.seen = at::cat({at::ones_like(concat.mask.narrow(2, 0, n)), later.seen}, 2) * concat.mask;
+  concat.carried = behind_memory(memory, later.frames);
+  concat.seen = behind_memory(all_seen, later.seen);
+  if (!model.schedule().carry_first()) return;
+  const CarriedFrame first = carry(0, 1);
+  concat.first = behind_memory(memory, first.frames);
+  concat.first_seen = behind_memory(all_seen, first.seen);
 }
 
 Tensor FromLastFrame(const NoiseSchedule& schedule, const Tensor& v, const Concat& concat, const Tensor& t) {
@@ -72,6 +83,7 @@ Tensor FromLastFrame(const NoiseSchedule& schedule, const Tensor& v, const Conca
 Tensor DenoiserInput(const Tensor& x, const Concat& concat) {
   std::vector<Tensor> parts = {x, concat.image, concat.mask, concat.pose_map, concat.direction, concat.origin};
   if (concat.carried.defined()) parts.insert(parts.end(), {concat.carried, concat.seen});
+  if (concat.first.defined()) parts.insert(parts.end(), {concat.first, concat.first_seen});
   return at::cat(parts, 1);
 }
 

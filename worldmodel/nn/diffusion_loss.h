@@ -17,6 +17,7 @@ struct Concat {
   /// [BV, z, T, h, w]: as `image`, but the last memory frame carried to where the camera is; undefined: it is not.
   Tensor carried = {};
   Tensor seen = {};  ///< [BV, 1, T, h, w]: 1 where that frame shows the place; undefined with `carried`
+  Tensor first = {}, first_seen = {};  ///< the same of the oldest memory frame; undefined: it is not carried
   /// [BV, z, K, h, w]: the chunk in which nothing changes, whatever the mask: the newest memory frame, repeated or
   /// carried.
   Tensor still = {};

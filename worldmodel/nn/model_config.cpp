@@ -95,16 +95,17 @@ void ModelConfig::Check() const {
           image_resampler.embedding_dim, "clip.width = " + std::to_string(image_encoder.width));
   Require(action_resampler.embedding_dim >= 14 && action_resampler.embedding_dim % 2 == 0,
           "action resampler embedding_dim", action_resampler.embedding_dim, "14, or more by an even number");
-  const std::int64_t carried = schedule.carry_plane_m ? vae.z_channels + 1 : 0,
-                     inputs = 3 * vae.z_channels + 7 + carried;
+  const std::int64_t carried = (schedule.carry_plane_m ? 1 : 0) + (schedule.carry_first ? 1 : 0),
+                     inputs = 3 * vae.z_channels + 7 + carried * (vae.z_channels + 1);
   Require(unet.in_channels == inputs, "unet.in_channels", unet.in_channels,
           "3 latents, a mask and 6 of the rays" +
-              std::string(carried > 0 ? ", with carry_plane_m a latent and a mask more" : "") + ": " +
+              std::string(carried > 0 ? ", of each carried frame a latent and a mask more" : "") + ": " +
               std::to_string(inputs));
   if (schedule.carry_plane_m && !schedule.from_last_frame)
     throw TensorError("schedule.carry_plane_m: wanted schedule.from_last_frame: true as well");
-  if (schedule.carry_frames != 1 && !schedule.carry_plane_m)
-    throw TensorError("schedule.carry_frames: wanted schedule.carry_plane_m as well");
+  if ((schedule.carry_frames != 1 || schedule.carry_first) && !schedule.carry_plane_m)
+    throw TensorError(std::string(schedule.carry_first ? "schedule.carry_first" : "schedule.carry_frames") +
+                      ": wanted schedule.carry_plane_m as well");
   Require(schedule.carry_frames >= 1 && schedule.carry_frames <= memory, "schedule.carry_frames", schedule.carry_frames,
           "1 … memory = " + std::to_string(memory));
   if (!(pose_map.lag_frames >= 0 && pose_map.lag_frames <= 1))

@@ -11,7 +11,8 @@ namespace evac::nn {
 /// The denoiser (EVAC, Sec. 3; a latent video UNet after DynamiCrafter).
 struct UNetConfig {
   std::int64_t in_channels = 19;  ///< 4 noisy latent, 4 image latent, 1 mask, 4 pose map latent, 3 ray direction, 3 ray
-                                  ///< origin; with schedule.carry_plane_m 4 carried latent, 1 seen
+                                  ///< origin; with schedule.carry_plane_m 4 carried latent, 1 seen;
+                                  ///< with carry_first 4 and 1 more
   std::int64_t out_channels = 4;
   std::int64_t model_channels = 320;                            ///< a multiple of 32: the groups of every normalisation
   std::vector<std::int64_t> channel_mult = {1, 2, 4, 4};        ///< one per level, finest first
@@ -86,6 +87,9 @@ struct ScheduleConfig {
   /// How many memory frames are carried, 1 … ModelConfig::memory: what the newest does not show is looked for in the one
   /// before it, and so on. Of such places `seen` is one half.
   std::int64_t carry_frames = 1;
+  /// The oldest memory frame is carried too and shown beside: z + 1 channels more. In a rollout that is the first picture,
+  /// which nobody imagined: what was seen then need not be passed on from one imagined picture to the next.
+  bool carry_first = false;
 };
 
 /// How pose maps are drawn (spec 2).

@@ -21,6 +21,7 @@ class NoiseSchedule {
   bool from_last_frame() const { return from_last_frame_; }
   std::optional<double> carry_plane_m() const { return carry_plane_m_; }
   std::int64_t carry_frames() const { return carry_frames_; }
+  bool carry_first() const { return carry_first_; }
 
   /// A buffer that a checkpoint carries: the key and its float values.
   struct Buffer {
@@ -42,6 +43,7 @@ class NoiseSchedule {
   bool from_last_frame_;
   std::optional<double> carry_plane_m_;
   std::int64_t carry_frames_;
+  bool carry_first_;
 };
 
 /// v-prediction (Salimans and Ho 2022): three ways to say the same of x_t = √ā x0 + √(1 - ā) ε.

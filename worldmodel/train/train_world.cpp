@@ -2,6 +2,7 @@
 
 #include <cstdio>
 #include <deque>
+#include <memory>
 
 #include "worldmodel/nn/weight_keys.h"
 #include "worldmodel/nn/weights.h"
@@ -23,15 +24,18 @@ struct Sources {
       routes.push_back({"", &random});
       return routes;
     }
-    init.emplace(start.init);
+    if (start.init_widen)
+      init = std::make_unique<WidenedWeights>(start.init);
+    else
+      init = std::make_unique<CheckpointWeights>(start.init);
     for (const std::string& prefix : start.init_except) routes.push_back({prefix, &random});
-    routes.push_back({"", &*init});
+    routes.push_back({"", init.get()});
     return routes;
   }
 
   nn::RandomWeights random;
   CheckpointWeights codec;
-  std::optional<CheckpointWeights> init;
+  std::unique_ptr<nn::ParameterSource> init;
   RoutedWeights routed;
 };
 

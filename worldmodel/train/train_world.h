@@ -11,6 +11,7 @@ struct WorldStart {
   std::filesystem::path init = {};  ///< a checkpoint to go on from, every key of which must fit; empty: random
   /// Of `init`: keys that begin so are drawn anew ("model.diffusion_model.out." for another number of channels).
   std::vector<std::string> init_except = {};
+  bool init_widen = false;  ///< `init` is of a model that was shown less (WidenedWeights)
   std::string codec_sha256 = {};  ///< what the latents must have been made with; empty: not asked
 };
 

@@ -1,6 +1,11 @@
 #include "worldmodel/train/weight_files.h"
 
 namespace evac::train {
+namespace {
+
+constexpr const char* kFirstLayer = "model.diffusion_model.input_blocks.0.0.weight";
+
+}  // namespace
 
 CheckpointWeights::CheckpointWeights(const std::filesystem::path& path) : tensors_(TensorFile::OpenCheckpoint(path)) {}
 
@@ -8,6 +13,17 @@ Tensor CheckpointWeights::Take(const std::string& key, at::IntArrayRef shape) {
   const Tensor tensor = tensors_.Get(key);
   nn::CheckShape(file().name() + ": " + key, tensor, shape);
   return tensor.to(at::kFloat);
+}
+
+WidenedWeights::WidenedWeights(const std::filesystem::path& path) : tensors_(TensorFile::OpenCheckpoint(path)) {}
+
+Tensor WidenedWeights::Take(const std::string& key, at::IntArrayRef shape) {
+  Tensor tensor = tensors_.Get(key).to(at::kFloat);
+  const std::int64_t lacks = tensor.dim() == 4 && shape.size() == 4 ? shape[1] - tensor.size(1) : 0;
+  if (key == kFirstLayer && lacks > 0)
+    tensor = at::cat({tensor, at::zeros({tensor.size(0), lacks, tensor.size(2), tensor.size(3)})}, 1);
+  nn::CheckShape(tensors_.file().name() + ": " + key, tensor, shape);
+  return tensor;
 }
 
 Tensor RoutedWeights::Take(const std::string& key, at::IntArrayRef shape) {

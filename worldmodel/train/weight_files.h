@@ -22,6 +22,17 @@ class CheckpointWeights final : public nn::ParameterSource {
   nn::MappedTensors tensors_;
 };
 
+/// The same, of a model that is shown more than the one in the file was: what the first layer's weights lack for the
+/// channels behind is 0, so that the new model begins as the old one was.
+class WidenedWeights final : public nn::ParameterSource {
+ public:
+  explicit WidenedWeights(const std::filesystem::path& path);
+  Tensor Take(const std::string& key, at::IntArrayRef shape) override;
+
+ private:
+  nn::MappedTensors tensors_;
+};
+
 /// Several sources, each for the keys that begin with its prefix; the first that fits is asked.
 class RoutedWeights final : public nn::ParameterSource {
  public:
