@@ -32,14 +32,28 @@ ExitCode RunLearner(const TrainArguments& arguments, const std::string& section,
   return End(train(place, options), arguments.out, (section + ".safetensors").c_str());
 }
 
+std::optional<ShardCodec> CodecOf(const TrainArguments& arguments, const train::JobPlace& place) {
+  if (arguments.codec.empty()) return std::nullopt;
+  return std::optional<ShardCodec>(std::in_place, arguments.codec, place.config.vae);
+}
+
+/// Adds --codec, and --config with it. @param whose  pictures are shown
+void AddCodec(CLI::App& command, const std::shared_ptr<TrainArguments>& arguments, const std::string& whose) {
+  CLI::Option* codec = command.add_option("--codec", arguments->codec,
+                                          "half of the " + whose +
+                                              " are shown as this codec, which encoded the shards, "
+                                              "gives them back: how a world model would draw them");
+  codec->check(CLI::ExistingFile)->needs(AddConfig(command, arguments));
+}
+
 ExitCode RunJudge(const TrainArguments& arguments) {
-  return RunLearner<JudgeTrainingOptions>(arguments, "judge", [&](const train::JobPlace& place, const JudgeTrainingOptions& options) {
-    std::optional<JudgeCodec> codec;
-    if (!arguments.codec.empty()) codec.emplace(arguments.codec, place.config.vae);
-    const ShardClips learn(place.shards, train::Split::kTrain, codec ? &*codec : nullptr),
-        holdout(place.shards, train::Split::kHoldout, codec ? &*codec : nullptr);
-    return TrainJudge(place, options, {learn, holdout});
-  });
+  return RunLearner<JudgeTrainingOptions>(
+      arguments, "judge", [&](const train::JobPlace& place, const JudgeTrainingOptions& options) {
+        const std::optional<ShardCodec> codec = CodecOf(arguments, place);
+        const ShardClips learn(place.shards, train::Split::kTrain, codec ? &*codec : nullptr),
+            holdout(place.shards, train::Split::kHoldout, codec ? &*codec : nullptr);
+        return TrainJudge(place, options, {learn, holdout});
+      });
 }
 
 struct LabelledArguments {
@@ -48,20 +62,21 @@ struct LabelledArguments {
 };
 
 ExitCode RunJudgeFromLabels(const LabelledArguments& arguments) {
-  return RunLearner<JudgeTrainingOptions>(
-      arguments.training, "judge", [&](const train::JobPlace& place, const JudgeTrainingOptions& options) {
-        LabelledRuns runs = arguments.runs;
-        runs.seed = options.job.trainer.seed;
-        const LabelledClips clips = ReadLabelledClips(runs, place.say);
-        return TrainJudge(place, options, {*clips.learn, *clips.holdout});
-      });
+  return RunLearner<JudgeTrainingOptions>(arguments.training, "judge",
+                                          [&](const train::JobPlace& place, const JudgeTrainingOptions& options) {
+                                            LabelledRuns runs = arguments.runs;
+                                            runs.seed = options.job.trainer.seed;
+                                            const LabelledClips clips = ReadLabelledClips(runs, place.say);
+                                            return TrainJudge(place, options, {*clips.learn, *clips.holdout});
+                                          });
 }
 
 ExitCode RunPolicy(const TrainArguments& arguments) {
-  return RunLearner<PolicyOptions>(arguments, "policy",
-                                   [&](const train::JobPlace& place, const PolicyOptions& options) {
-                                     return TrainPolicy(place, options, arguments.keep_steps);
-                                   });
+  return RunLearner<PolicyOptions>(
+      arguments, "policy", [&](const train::JobPlace& place, const PolicyOptions& options) {
+        const std::optional<ShardCodec> codec = CodecOf(arguments, place);
+        return TrainPolicy(place, options, codec ? &*codec : nullptr, arguments.keep_steps);
+      });
 }
 
 }  // namespace
@@ -70,13 +85,11 @@ void AddTrainJudge(CLI::App& group, ExitCode& exit_code) {
   const auto arguments = std::make_shared<TrainArguments>();
   CLI::App* command = group.add_subcommand("judge", "Train the classifier judge on clips with a known outcome.");
   AddShared(*command, arguments);
-  CLI::Option* codec = command->add_option("--codec", arguments->codec,
-                                           "half of the clips are shown as this codec, which encoded the shards, gives "
-                                           "them back: how a world model's clips look");
-  codec->check(CLI::ExistingFile)->needs(AddConfig(*command, arguments));
+  AddCodec(*command, arguments, "clips");
   command->footer(
       "Example:\n"
-      "  evac train judge out/shards --training apps/configs/desk_training.yaml --config apps/configs/desk_model.yaml \\\n"
+      "  evac train judge out/shards --training apps/configs/desk_training.yaml --config apps/configs/desk_model.yaml "
+      "\\\n"
       "                   --codec out/codec/codec.safetensors --out out/judge\n"
       "OUT: judge.safetensors with its card (docs/classifier_judge.md), metrics.csv, holdout.csv");
   command->callback([arguments, &exit_code] { exit_code = RunJudge(*arguments); });
@@ -85,8 +98,7 @@ void AddTrainJudge(CLI::App& group, ExitCode& exit_code) {
 void AddJudgeTrain(CLI::App& judge, ExitCode& exit_code) {
   const auto arguments = std::make_shared<LabelledArguments>();
   LabelledRuns& runs = arguments->runs;
-  CLI::App* command =
-      judge.add_subcommand(kJudgeTrainCommand.name, kJudgeTrainCommand.what);
+  CLI::App* command = judge.add_subcommand(kJudgeTrainCommand.name, kJudgeTrainCommand.what);
   command->add_option("RUNS", runs.runs, "folders of runs; their clips are what it learns from")
       ->required()
       ->check(CLI::ExistingDirectory);
@@ -99,12 +111,13 @@ void AddJudgeTrain(CLI::App& judge, ExitCode& exit_code) {
   command->add_option("--least", runs.least, "labels of each kind that a task must have")
       ->check(CLI::Range(1, 1000000))
       ->capture_default_str();
-  const auto side = CLI::Range(8, 1024) & CLI::Validator(
-                                              [](const std::string& text) {
-                                                return std::stoi(text) % 8 == 0 ? "" : "wanted a multiple of 8";
-                                              },
-                                              "multiple of 8");
-  command->add_option("--height-px", runs.height_px, "of a picture as the judge sees it")->check(side)->capture_default_str();
+  const auto side =
+      CLI::Range(8, 1024) &
+      CLI::Validator([](const std::string& text) { return std::stoi(text) % 8 == 0 ? "" : "wanted a multiple of 8"; },
+                     "multiple of 8");
+  command->add_option("--height-px", runs.height_px, "of a picture as the judge sees it")
+      ->check(side)
+      ->capture_default_str();
   command->add_option("--width-px", runs.width_px, "likewise")->check(side)->capture_default_str();
   AddTraining(*command, std::shared_ptr<TrainArguments>(arguments, &arguments->training));
   command->footer(
@@ -120,13 +133,16 @@ void AddTrainPolicy(CLI::App& group, ExitCode& exit_code) {
   const auto arguments = std::make_shared<TrainArguments>();
   CLI::App* command = group.add_subcommand("policy", "Train a policy to imitate recordings that succeeded.");
   AddShared(*command, arguments);
+  AddCodec(*command, arguments, "moments");
   command
       ->add_option("--keep-steps", arguments->keep_steps,
                    "steps after which a checkpoint is kept beside the last, with commas between them")
       ->delimiter(',');
   command->footer(
       "Example:\n"
-      "  evac train policy out/shards --training apps/configs/desk_training.yaml --keep-steps 500,1000,2000 --out out/policy\n"
+      "  evac train policy out/shards --training apps/configs/desk_training.yaml --config apps/configs/desk_model.yaml "
+      "\\\n"
+      "                    --codec out/codec/codec.safetensors --keep-steps 500,1000,2000 --out out/policy\n"
       "OUT: policy.safetensors and policy_<step>.safetensors, each with its card (docs/learned_policy.md)\n"
       "Then: evac-policy learned --checkpoint out/policy/policy.safetensors");
   command->callback([arguments, &exit_code] { exit_code = RunPolicy(*arguments); });

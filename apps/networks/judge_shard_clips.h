@@ -1,7 +1,7 @@
 #pragma once
 
 #include "apps/networks/judge_clips.h"
-#include "apps/networks/judge_codec.h"
+#include "apps/networks/shard_codec.h"
 
 namespace evac {
 
@@ -9,8 +9,8 @@ namespace evac {
 class ShardClips final : public JudgeClipSource {
  public:
   /// @param codec  whose latents lie beside the shards, or null; outlives this
-  /// @throws as PackedSet and JudgeCodec::Open
-  ShardClips(const std::filesystem::path& shards, train::Split split, const JudgeCodec* codec);
+  /// @throws as PackedSet and ShardCodec::Open
+  ShardClips(const std::filesystem::path& shards, train::Split split, const ShardCodec* codec);
 
   at::Tensor Pictures(const PackedClip& clip, const std::vector<std::int64_t>& rows) const override;
   at::Tensor Objects(const PackedClip& clip, const std::vector<std::int64_t>& rows) const override;
@@ -21,7 +21,7 @@ class ShardClips final : public JudgeClipSource {
   const train::Shard& ShardOf(const PackedClip& clip) const { return set_.shards.shards()[clip.shard]; }
 
   PackedSet set_;
-  const JudgeCodec* codec_;
+  const ShardCodec* codec_;
 };
 
 }  // namespace evac

@@ -68,7 +68,8 @@ train::Settings SettingsOf(JudgeTrainingOptions& options) {
                               {"unsure", &options.unsure},
                               {"light", &options.changes.light},
                               {"offset", &options.changes.offset},
-                              {"blur_share", &options.changes.blur_share}};
+                              {"blur_share", &options.changes.blur_share},
+                              {"blur_times", &options.changes.blur_times}};
   const train::Settings shared = SettingsOf(options.job.trainer);
   settings.insert(settings.end(), shared.begin(), shared.end());
   return settings;
@@ -107,6 +108,8 @@ ClassifierClips ForNetwork(const at::Tensor& bytes, const JudgeClips& clips) {
 JudgeTraining::JudgeTraining(const JudgeClipSource& source, const JudgeClips& fit, const JudgeTrainingOptions& options)
     : source_(source), fit_(fit), options_(options) {
   if (options.batch < 1) throw InvalidInput("judge training: batch is {}, wanted at least 1", options.batch);
+  if (options.changes.blur_times < 1)
+    throw InvalidInput("judge training: blur_times is {}, wanted at least 1", options.changes.blur_times);
   if (options.shift_px < 0) throw InvalidInput("judge training: shift_px is {}, wanted at least 0", options.shift_px);
 }
 

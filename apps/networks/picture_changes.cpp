@@ -30,7 +30,10 @@ at::Tensor Changed(const at::Tensor& pictures, const PictureChanges& changes, tr
     }
     at::Tensor sample =
         pictures[b].flatten(0, -4) * at::tensor(at::ArrayRef<float>(gain)) + at::tensor(at::ArrayRef<float>(offset));
-    if (dice.Chance(changes.blur_share)) sample = Blurred(sample);
+    if (dice.Chance(changes.blur_share)) {
+      const std::int64_t times = changes.blur_times > 1 ? 1 + dice.Below(changes.blur_times) : 1;
+      for (std::int64_t i = 0; i < times; ++i) sample = Blurred(sample);
+    }
     samples.push_back(sample.reshape(pictures[b].sizes()));
   }
   return at::stack(samples);

@@ -53,6 +53,14 @@ Camera CameraAt(const train::Shard& shard, std::int64_t row, std::int64_t view) 
           .cy_px = k[5]};
 }
 
+Mount MountOf(const std::string& camera) {
+  if (camera == "hand_left") return Mount::kLeftGripper;
+  return camera == "hand_right" ? Mount::kRightGripper : Mount::kBase;
+}
+
+/// One row of `actions`: the arm that carries a camera. @param mount  not kBase
+ArmState CarrierOf(const float* row, Mount mount) { return ArmOf(row + (mount == Mount::kLeftGripper ? 0 : 8)); }
+
 bool HoldsContact(const train::Shard& shard, std::int64_t first, std::int64_t end) {
   const auto* contact = shard.contact.data_ptr<std::uint8_t>();
   return std::any_of(contact + first, contact + end, [](std::uint8_t c) { return c != 0; });
@@ -66,19 +74,33 @@ train::Settings SettingsOf(PolicyOptions& options) {
                               {"contact_share", &options.contact_share},
                               {"arm_noise_m", &options.arm_noise_m},
                               {"object_weight", &options.object_weight},
+                              {"reconstructed_share", &options.reconstructed_share},
                               {"light", &options.changes.light},
                               {"offset", &options.changes.offset},
-                              {"blur_share", &options.changes.blur_share}};
+                              {"blur_share", &options.changes.blur_share},
+                              {"blur_times", &options.changes.blur_times}};
   const train::Settings shared = SettingsOf(options.job.trainer);
   settings.insert(settings.end(), shared.begin(), shared.end());
   return settings;
 }
 
+Eigen::Isometry3d ToldCamera(const train::Shard& shard, std::int64_t clip_first, std::int64_t row, std::int64_t view,
+                             Mount mount) {
+  if (mount == Mount::kBase) return PoseFrom(shard.c2w[clip_first + row][view]);
+  const auto told = [&](std::int64_t at) {
+    const at::Tensor numbers = shard.actions[at].to(at::kFloat).contiguous();
+    return CarrierOf(numbers.data_ptr<float>(), mount).base_from_gripper;
+  };
+  return told(clip_first + row) * told(clip_first).inverse() * PoseFrom(shard.c2w[clip_first][view]);
+}
+
 std::vector<std::string> ArmsOf(const PackedSet& set) { return NamesIn(set.shards.metadata().at("arms")); }
 
-PolicyTraining::PolicyTraining(const PackedSet& set, const PolicyOptions& options)
-    : set_(set), options_(options), arms_(ArmsOf(set)) {
+PolicyTraining::PolicyTraining(const PackedSet& set, const PolicyOptions& options, const ShardCodec* codec)
+    : set_(set), options_(options), codec_(codec), arms_(ArmsOf(set)) {
   if (options.batch < 1) throw InvalidInput("policy training: batch is {}, wanted at least 1", options.batch);
+  if (options.changes.blur_times < 1)
+    throw InvalidInput("policy training: blur_times is {}, wanted at least 1", options.changes.blur_times);
   const std::vector<std::string> names = NamesIn(options.behaviours);
   const std::set<std::string> wanted(names.begin(), names.end());
   for (const train::Shard& shard : set.shards.shards()) actions_.push_back(ActionsOf(shard.path));
@@ -114,8 +136,9 @@ void PolicyTraining::PutMoment(const Moment& moment, std::int64_t b, Batch& batc
   const train::Shard& shard = set_.shards.shards()[clip.shard];
   const std::int64_t row = clip.first + moment.row;
   for (std::int64_t v = 0; v < set_.shards.views(); ++v)
-    PutRays(CameraAt(shard, row, v), PoseFrom(shard.c2w[row][v]), batch.input.rays[b][v].data_ptr<float>(),
-            batch.input.eyes[b][v].data_ptr<float>());
+    PutRays(CameraAt(shard, row, v),
+            ToldCamera(shard, clip.first, moment.row, v, MountOf(set_.cameras[static_cast<std::size_t>(v)])),
+            batch.input.rays[b][v].data_ptr<float>(), batch.input.eyes[b][v].data_ptr<float>());
   const Arms now = ArmsAt(clip, moment.row);
   for (std::size_t a = 0; a < arms_.size(); ++a) {
     const auto arm = static_cast<std::int64_t>(a);
@@ -127,6 +150,13 @@ void PolicyTraining::PutMoment(const Moment& moment, std::int64_t b, Batch& batc
     }
   }
   batch.input.task[b] = clip.task;
+}
+
+at::Tensor PolicyTraining::Seen(const Moment& moment) const {
+  const PackedClip& clip = set_.clips[moment.clip];
+  const train::Shard& shard = set_.shards.shards()[clip.shard];
+  const std::int64_t row = clip.first + moment.row;
+  return moment.is_reconstructed ? codec_->Reconstructed(shard, {row}).select(1, 0) : shard.frames[row];
 }
 
 PolicyTraining::Batch PolicyTraining::BatchOf(const std::vector<Moment>& moments) const {
@@ -146,7 +176,7 @@ PolicyTraining::Batch PolicyTraining::BatchOf(const std::vector<Moment>& moments
     const Moment& moment = moments[static_cast<std::size_t>(i)];
     const PackedClip& clip = set_.clips[moment.clip];
     const train::Shard& shard = set_.shards.shards()[clip.shard];
-    pictures.push_back(shard.frames[clip.first + moment.row]);
+    pictures.push_back(Seen(moment));
     objects.push_back(shard.object_px[clip.first + moment.row]);
     PutMoment(moment, i, batch);
   }
@@ -169,7 +199,10 @@ at::Tensor PolicyTraining::Distance(const LearnedOutput& output, const Batch& ba
 at::Tensor PolicyTraining::Loss(const LearnedNet& net, const train::StepPlace& place) const {
   train::Dice pick(place, kPick), change(place, kChange), arms(place, kArms);
   std::vector<Moment> moments;
-  for (std::int64_t i = 0; i < options_.batch; ++i) moments.push_back(Draw(pick));
+  for (std::int64_t i = 0; i < options_.batch; ++i) {
+    moments.push_back(Draw(pick));
+    if (codec_) moments.back().is_reconstructed = change.Chance(options_.reconstructed_share);
+  }
   Batch batch = BatchOf(moments);
   batch.input.pictures = Changed(batch.input.pictures, options_.changes, change);
   at::Tensor xyz_m = batch.input.arms.narrow(-1, 0, 3);
@@ -203,13 +236,12 @@ std::vector<Camera> CamerasOf(const PackedSet& set) {
   for (std::size_t v = 0; v < set.cameras.size(); ++v) {
     Camera camera = CameraAt(shard, clip.first, static_cast<std::int64_t>(v));
     camera.name = set.cameras[v];
-    camera.mount = camera.name == "hand_left"    ? Mount::kLeftGripper
-                   : camera.name == "hand_right" ? Mount::kRightGripper
-                                                 : Mount::kBase;
+    camera.mount = MountOf(camera.name);
     const Eigen::Isometry3d base_from_camera = PoseFrom(shard.c2w[clip.first][static_cast<std::int64_t>(v)]);
-    const float* arm = actions.data_ptr<float>() + 16 * clip.first + (camera.mount == Mount::kLeftGripper ? 0 : 8);
-    camera.mount_from_camera =
-        camera.mount == Mount::kBase ? base_from_camera : ArmOf(arm).base_from_gripper.inverse() * base_from_camera;
+    const float* told = actions.data_ptr<float>() + 16 * clip.first;
+    camera.mount_from_camera = camera.mount == Mount::kBase
+                                   ? base_from_camera
+                                   : CarrierOf(told, camera.mount).base_from_gripper.inverse() * base_from_camera;
     cameras.push_back(camera);
   }
   return cameras;

@@ -31,19 +31,22 @@ TensorMetadata CardText(const PackedSet& set, const PolicyOptions& options, std:
 
 }  // namespace
 
-train::TrainerSummary TrainPolicy(const train::JobPlace& place, const PolicyOptions& given,
+train::TrainerSummary TrainPolicy(const train::JobPlace& place, const PolicyOptions& given, const ShardCodec* codec,
                                   const std::vector<std::int64_t>& keep_steps) {
   PolicyOptions options = given;
-  const PackedSet set(place.shards, train::Split::kTrain), holdout(place.shards, train::Split::kHoldout);
+  PackedSet set(place.shards, train::Split::kTrain);
+  const PackedSet holdout(place.shards, train::Split::kHoldout);
+  if (codec) codec->Open(set.shards);
   const LearnedShape shape{set.tasks, set.cameras, ArmsOf(set), static_cast<int>(set.shards.height_px()),
                            static_cast<int>(set.shards.width_px())};
   const Learners<LearnedNet> learners(shape, options.job.trainer.seed, Workers(place, options.job));
   const LearnedNet& net = learners.net();
-  const PolicyTraining training(set, options), measuring(holdout, options);
+  const PolicyTraining training(set, options, codec), measuring(holdout, options, nullptr);
   TensorMetadata card = CardText(set, options, training.clips());
   if (place.say) place.say(fmt::format("{} clips to imitate, {} to measure with", training.clips(), measuring.clips()));
-  options.job.trainer.identity = IdentityOf(SettingsOf(options)) + set.shards.metadata().at("recipe") + " workers " +
-                                 std::to_string(learners.count());
+  if (codec) card["codec"] = set.shards.codec();
+  options.job.trainer.identity = IdentityOf(SettingsOf(options)) + set.shards.metadata().at("recipe") + " " +
+                                 (codec ? set.shards.codec() : "") + " workers " + std::to_string(learners.count());
   train::Trainer trainer(learners.weights().all(), options.job.trainer, place.out);
   const auto loss = [&](const LearnedNet& of, const train::StepPlace& at) { return training.Loss(of, at); };
   learners.Replicate(trainer, loss);
@@ -54,13 +57,12 @@ train::TrainerSummary TrainPolicy(const train::JobPlace& place, const PolicyOpti
     learners.Write(place.out / file, card);
   };
   const auto keep = [&](std::int64_t step) { write(fmt::format("policy_{:06}.safetensors", step), step); };
-  const train::TrainerSummary summary =
-      trainer.Run({.loss = [&](const train::StepPlace& at) { return loss(net, at); },
-                   .holdout = measure,
-                   .keep_steps = keep_steps,
-                   .keep = keep,
-                   .interrupted = place.interrupted,
-                   .on_progress = place.on_progress});
+  const train::TrainerSummary summary = trainer.Run({.loss = [&](const train::StepPlace& at) { return loss(net, at); },
+                                                     .holdout = measure,
+                                                     .keep_steps = keep_steps,
+                                                     .keep = keep,
+                                                     .interrupted = place.interrupted,
+                                                     .on_progress = place.on_progress});
   if (!summary.IsDone()) return summary;
   trainer.WithBest([&] { write("policy.safetensors", summary.step); });
   return summary;

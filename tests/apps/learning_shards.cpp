@@ -4,8 +4,12 @@
 #include <string>
 
 #include "core/file.h"
+#include "core/hash.h"
 #include "core/seed.h"
 #include "worldmodel/nn/tensor.h"
+#include "worldmodel/train/encode_shards.h"
+#include "worldmodel/train/train_codec.h"
+#include "worldmodel/train/weight_files.h"
 
 namespace evac {
 namespace {
@@ -126,6 +130,33 @@ void WriteLearningShards(const std::filesystem::path& folder, const LearningShar
   }
   WriteFileAtomically(folder / "shards.json",
                       nlohmann::json{{"states", states}, {"behaviours", behaviours}, {"fates", fates}}.dump());
+}
+
+nn::VaeConfig LearningCodec() {
+  return {
+      .channels = 32, .channel_mult = {1, 1}, .num_res_blocks = 1, .z_channels = 8, .scale_factor = 1, .patch_px = 2};
+}
+
+std::filesystem::path EncodeLearningShards(const std::filesystem::path& folder, const std::filesystem::path& out) {
+  train::CodecOptions options;
+  options.job.trainer.steps = 60;
+  options.job.trainer.learning_rate = 5e-3;
+  options.job.trainer.clip_norm = 1;
+  options.codec.batch = 8;
+  train::JobPlace place;
+  place.shards = folder;
+  place.out = out;
+  place.config.vae = LearningCodec();
+  place.config.views = 2;
+  place.config.image_height_px = 16;
+  place.config.image_width_px = 24;
+  train::TrainCodec(place, options);
+  const std::filesystem::path codec = out / "codec.safetensors";
+  train::CheckpointWeights weights(codec);
+  const nn::Vae vae(nn::Scope(weights, train::kCodecPrefix), place.config.vae);
+  for (const auto& shard : train::ShardPaths(folder))
+    train::EncodeShard(vae, shard, {Sha256HexOfFile(codec), Sha256HexOfFile(shard)});
+  return codec;
 }
 
 }  // namespace evac

@@ -3,6 +3,8 @@
 #include <cstdint>
 #include <filesystem>
 
+#include "worldmodel/nn/vae.h"
+
 namespace evac {
 
 /// A packing that is small enough to learn from in a test. A bright square, the object, either goes from left to right
@@ -16,5 +18,11 @@ struct LearningShards {
 
 /// Writes a training and a hold-out shard and shards.json, as docs/formats/shards.md says.
 void WriteLearningShards(const std::filesystem::path& folder, const LearningShards& options);
+
+/// The codec that EncodeLearningShards trains.
+nn::VaeConfig LearningCodec();
+/// Trains a codec on two views of 16x24 for a few steps and puts latents beside the shards.
+/// @param out  of the training. @returns the codec's weights
+std::filesystem::path EncodeLearningShards(const std::filesystem::path& folder, const std::filesystem::path& out);
 
 }  // namespace evac

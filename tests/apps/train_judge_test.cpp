@@ -45,7 +45,7 @@ class TrainJudgeTest : public testing::Test {
     return place;
   }
   train::TrainerSummary Train(const train::JobPlace& place, const JudgeTrainingOptions& options,
-                              const JudgeCodec* codec = nullptr) const {
+                              const ShardCodec* codec = nullptr) const {
     const ShardClips learn(folder_ / "shards", train::Split::kTrain, codec),
         holdout(folder_ / "shards", train::Split::kHoldout, codec);
     return TrainJudge(place, options, {learn, holdout});
@@ -94,31 +94,15 @@ class CodedJudgeTest : public TrainJudgeTest {
  protected:
   void SetUp() override {
     TrainJudgeTest::SetUp();
-    config_ = {
-        .channels = 32, .channel_mult = {1, 1}, .num_res_blocks = 1, .z_channels = 8, .scale_factor = 1, .patch_px = 2};
-    train::CodecOptions options;
-    options.job.trainer.steps = 60;
-    options.job.trainer.learning_rate = 5e-3;
-    options.job.trainer.clip_norm = 1;
-    options.codec.batch = 8;
-    train::JobPlace place = Place("codec");
-    place.config.vae = config_;
-    place.config.views = 2;
-    place.config.image_height_px = 16;
-    place.config.image_width_px = 24;
-    train::TrainCodec(place, options);
-    train::CheckpointWeights weights(codec());
-    const nn::Vae vae(nn::Scope(weights, train::kCodecPrefix), config_);
-    for (const auto& shard : train::ShardPaths(folder_ / "shards"))
-      train::EncodeShard(vae, shard, {Sha256HexOfFile(codec()), Sha256HexOfFile(shard)});
+    codec_ = EncodeLearningShards(folder_ / "shards", folder_ / "codec");
   }
-  std::filesystem::path codec() const { return folder_ / "codec" / "codec.safetensors"; }
-  nn::VaeConfig config_;
+  const nn::VaeConfig config_ = LearningCodec();
+  std::filesystem::path codec_;
 };
 
 TEST_F(CodedJudgeTest, ItLearnsFromClipsAsTheCodecGivesThemBackAndIsMeasuredOnThem) {
-  const JudgeCodec judge_codec(codec(), config_);
-  const ShardClips set(folder_ / "shards", train::Split::kTrain, &judge_codec);
+  const ShardCodec shard_codec(codec_, config_);
+  const ShardClips set(folder_ / "shards", train::Split::kTrain, &shard_codec);
   const PackedClip& clip = set.clips[3];
   const std::vector<std::int64_t> rows = RowsOf(clip);
   const at::Tensor whole = set.Pictures(clip, rows).to(at::kFloat);
@@ -128,20 +112,20 @@ TEST_F(CodedJudgeTest, ItLearnsFromClipsAsTheCodecGivesThemBackAndIsMeasuredOnTh
   EXPECT_GT(off, 0.5) << "it is not the picture itself";
   EXPECT_LT(off, 0.5 * (whole.flip(0) - whole).abs().mean().item<double>() + 12) << "but like it, view by view";
 
-  Train(Place("judge"), Quick(150), &judge_codec);
+  Train(Place("judge"), Quick(150), &shard_codec);
   const WeightFile file(folder_ / "judge" / "judge.safetensors", "evac-classifier 1");
-  EXPECT_EQ(file.Text("codec"), Sha256HexOfFile(codec()));
+  EXPECT_EQ(file.Text("codec"), Sha256HexOfFile(codec_));
   EXPECT_GT(file.Number("kappa"), 0.8);
   EXPECT_GT(file.Number("kappa_reconstructed"), 0.8);
 }
 
 TEST_F(CodedJudgeTest, LatentsOfAnotherCodecAreRefused) {
   for (const auto& shard : train::ShardPaths(folder_ / "shards")) {
-    train::CheckpointWeights weights(codec());
+    train::CheckpointWeights weights(codec_);
     train::EncodeShard(nn::Vae(nn::Scope(weights, train::kCodecPrefix), config_), shard, {"another", "shard"});
   }
-  const JudgeCodec judge_codec(codec(), config_);
-  EXPECT_THAT([&] { Train(Place("judge"), Quick(2), &judge_codec); },
+  const ShardCodec shard_codec(codec_, config_);
+  EXPECT_THAT([&] { Train(Place("judge"), Quick(2), &shard_codec); },
               ThrowsMessage<TensorError>(HasSubstr("did not make the shards' latents")));
 }
 

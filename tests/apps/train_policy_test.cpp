@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "apps/networks/learners.h"
 #include "core/error.h"
 #include "core/hash.h"
 #include "core/weight_file.h"
@@ -10,6 +11,7 @@
 #include "policies/learned_policy.h"
 #include "tests/apps/learning_shards.h"
 #include "tests/support/temp_folder.h"
+#include "worldmodel/train/encode_shards.h"
 
 namespace evac {
 namespace {
@@ -43,7 +45,7 @@ class TrainPolicyTest : public testing::Test {
 };
 
 TEST_F(TrainPolicyTest, CheckpointsOfOneTrainingGetBetter) {
-  TrainPolicy(Place("policy"), Quick(60), {2, 20});
+  TrainPolicy(Place("policy"), Quick(60), nullptr, {2, 20});
   EXPECT_LT(Holdout("policy/policy_000020.safetensors"), Holdout("policy/policy_000002.safetensors"));
   EXPECT_LT(Holdout("policy/policy.safetensors"), 0.8 * Holdout("policy/policy_000020.safetensors"));
   const LearnedPolicy policy(folder_ / "policy" / "policy_000020.safetensors", 8);
@@ -52,12 +54,12 @@ TEST_F(TrainPolicyTest, CheckpointsOfOneTrainingGetBetter) {
 }
 
 TEST_F(TrainPolicyTest, InterruptedAndGoneOnWithItEndsInTheSameBytes) {
-  TrainPolicy(Place("whole"), Quick(10), {4});
+  TrainPolicy(Place("whole"), Quick(10), nullptr, {4});
   train::JobPlace place = Place("parts");
   int steps = 0;
   place.interrupted = [&] { return ++steps % 4 == 0; };
   int runs = 0;
-  while (!TrainPolicy(place, Quick(10), {4}).IsDone()) ++runs;
+  while (!TrainPolicy(place, Quick(10), nullptr, {4}).IsDone()) ++runs;
   EXPECT_EQ(runs, 3);
   for (const char* file : {"policy.safetensors", "policy_000004.safetensors"})
     EXPECT_EQ(Sha256HexOfFile(folder_ / "parts" / file), Sha256HexOfFile(folder_ / "whole" / file)) << file;
@@ -65,12 +67,12 @@ TEST_F(TrainPolicyTest, InterruptedAndGoneOnWithItEndsInTheSameBytes) {
 
 TEST_F(TrainPolicyTest, OnlySuccessesOfTheWantedBehavioursAreImitated) {
   const PackedSet set(folder_ / "shards", train::Split::kTrain);
-  EXPECT_EQ(PolicyTraining(set, Quick(1)).clips(), set.clips.size() / 2);
+  EXPECT_EQ(PolicyTraining(set, Quick(1), nullptr).clips(), set.clips.size() / 2);
   PolicyOptions options = Quick(1);
   options.behaviours = "";
-  EXPECT_EQ(PolicyTraining(set, options).clips(), set.clips.size() / 2) << "all behaviours, successes alone";
+  EXPECT_EQ(PolicyTraining(set, options, nullptr).clips(), set.clips.size() / 2) << "all behaviours, successes alone";
   options.behaviours = "push,roam";
-  EXPECT_THAT([&] { PolicyTraining(set, options); },
+  EXPECT_THAT([&] { PolicyTraining(set, options, nullptr); },
               ThrowsMessage<Error>(HasSubstr("none of 24 clips is a success of behaviours 'push,roam'")));
 }
 
@@ -82,6 +84,52 @@ TEST_F(TrainPolicyTest, TheCardKeepsTheCamerasOfTheShards) {
   EXPECT_EQ(cameras[1].mount, Mount::kRightGripper);
   // The gripper, at (.3, 0, .1) and upside down, carries a camera that stands at (.4, 0, 1).
   EXPECT_TRUE(cameras[1].mount_from_camera.translation().isApprox(Eigen::Vector3d(0.1, 0, -0.9), 1e-5));
+}
+
+TEST_F(TrainPolicyTest, ItIsShownWhatTheCodecGivesBackAndNoOtherCodecsLatents) {
+  const std::filesystem::path weights = EncodeLearningShards(folder_ / "shards", folder_ / "codec");
+  const ShardCodec codec(weights, LearningCodec());
+  PackedSet set(folder_ / "shards", train::Split::kTrain);
+  codec.Open(set.shards);
+  const LearnedShape shape{set.tasks, set.cameras, ArmsOf(set), 16, 24};
+  const Learners<LearnedNet> learners(shape, 3, 1);
+  const auto loss = [&](double share) {
+    PolicyOptions options = Quick(1);
+    options.reconstructed_share = share;
+    return PolicyTraining(set, options, &codec).Loss(learners.net(), {3, 1, 0, 0}).item<double>();
+  };
+  PolicyOptions without = Quick(1);
+  without.reconstructed_share = 1;
+  const double as_seen = PolicyTraining(set, without, nullptr).Loss(learners.net(), {3, 1, 0, 0}).item<double>();
+  EXPECT_NE(loss(0), loss(1));
+  EXPECT_NE(as_seen, loss(1));
+
+  TrainPolicy(Place("policy"), Quick(2), &codec, {});
+  EXPECT_EQ(WeightFile(folder_ / "policy" / "policy.safetensors", kLearnedFormat).Text("codec"),
+            Sha256HexOfFile(weights));
+  for (const auto& shard : train::ShardPaths(folder_ / "shards")) {
+    train::CheckpointWeights again(weights);
+    train::EncodeShard(nn::Vae(nn::Scope(again, train::kCodecPrefix), LearningCodec()), shard, {"another", "shard"});
+  }
+  EXPECT_THAT([&] { TrainPolicy(Place("refused"), Quick(2), &codec, {}); },
+              ThrowsMessage<TensorError>(HasSubstr("did not make the shards' latents")));
+}
+
+TEST_F(TrainPolicyTest, ACarriedCameraGoesWithTheToldGripperHoweverLateTheShardsAre) {
+  const PackedSet set(folder_ / "shards", train::Split::kTrain);
+  const train::Shard& shard = set.shards.shards().front();
+  const std::int64_t first = set.clips.front().first, last = set.clips.front().frames - 1;
+  const auto right_m = [&](std::int64_t row) {
+    const auto xyz = shard.actions[first + row].narrow(0, 8, 3);
+    return Eigen::Vector3d(xyz[0].item<double>(), xyz[1].item<double>(), xyz[2].item<double>());
+  };
+  const Eigen::Vector3d went_m = right_m(last) - right_m(0);
+  ASSERT_GT(went_m.norm(), 0.05);  // the shards' c2w stands still
+  const auto eye_m = [&](std::int64_t row, std::int64_t view, Mount mount) {
+    return ToldCamera(shard, first, row, view, mount).translation().eval();
+  };
+  EXPECT_TRUE(eye_m(last, 0, Mount::kBase).isApprox(eye_m(0, 0, Mount::kBase), 1e-6));
+  EXPECT_TRUE((eye_m(last, 1, Mount::kRightGripper) - eye_m(0, 1, Mount::kRightGripper)).isApprox(went_m, 1e-4));
 }
 
 }  // namespace

@@ -1,21 +1,21 @@
-#include "apps/networks/judge_codec.h"
+#include "apps/networks/shard_codec.h"
 
 #include "core/hash.h"
 #include "worldmodel/nn/pictures.h"
 
 namespace evac {
 
-JudgeCodec::JudgeCodec(const std::filesystem::path& weights, const nn::VaeConfig& config)
+ShardCodec::ShardCodec(const std::filesystem::path& weights, const nn::VaeConfig& config)
     : path_(weights), config_(config), weights_(weights), vae_(nn::Scope(weights_, train::kCodecPrefix), config) {}
 
-void JudgeCodec::Open(train::ShardSet& shards) const {
+void ShardCodec::Open(train::ShardSet& shards) const {
   shards.OpenLatents(config_.z_channels, config_.Stride());
   if (shards.codec() != Sha256HexOfFile(path_))
     throw TensorError(path_.string() + " did not make the shards' latents (they are of codec " + shards.codec() +
                       "): wanted `evac encode` with this codec");
 }
 
-at::Tensor JudgeCodec::Reconstructed(const train::Shard& shard, const std::vector<std::int64_t>& rows) const {
+at::Tensor ShardCodec::Reconstructed(const train::Shard& shard, const std::vector<std::int64_t>& rows) const {
   const at::NoGradGuard no_gradients;
   const at::Tensor latents = shard.latents.index_select(0, at::tensor(at::ArrayRef<std::int64_t>(rows)));
   const at::Tensor pictures = vae_.Decode(latents.flatten(0, 1).to(at::kFloat));  // [T V, 3, H, W]

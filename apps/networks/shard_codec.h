@@ -9,11 +9,11 @@
 
 namespace evac {
 
-/// The codec whose latents lie beside shards: shows clips as a world model would draw them, were it never wrong.
-class JudgeCodec {
+/// The codec whose latents lie beside shards: shows recordings as a world model would draw them, were it never wrong.
+class ShardCodec {
  public:
   /// @param weights  of the codec, alone or in a checkpoint
-  JudgeCodec(const std::filesystem::path& weights, const nn::VaeConfig& config);
+  ShardCodec(const std::filesystem::path& weights, const nn::VaeConfig& config);
 
   /// Opens the latents of shards that are to be reconstructed. @throws TensorError if they are another codec's
   void Open(train::ShardSet& shards) const;
