@@ -1,0 +1,36 @@
+#!/usr/bin/env bash
+# Everything under worldmodel/weights/desk from nothing: recordings, shards, codec, judge, policy, world model, and the
+# page that says how true it is. Every step goes on where it was killed, and one that is done says so at once.
+#   apps/train_desk.sh EVAC OUT [LAST [CONFIGS]]
+# EVAC: the program. LAST: the step to end after (default: fidelity). CONFIGS: a folder of other pages.
+# OUT/time.csv gets a line for each start of a step: step, seconds, peak memory of its largest process in KiB, how it
+# ended. A step that was killed together with this script has none.
+set -euo pipefail
+evac=$1 out=$2 last=${3:-fidelity} configs=${4:-$(dirname "${BASH_SOURCE[0]}")/configs}
+model=$configs/desk_model.yaml training=$configs/desk_training.yaml codec=$out/codec/codec.safetensors
+case $last in
+  collect | pack | codec | encode | judge | policy | world | fidelity) ;;
+  *) echo "train_desk: the last step is '$last', wanted collect, pack, codec, encode, judge, policy, world or fidelity" >&2; exit 2 ;;
+esac
+
+finish() {
+  awk -F, '{seconds += $2; if ($3 > peak) peak = $3}
+    END {printf "%d starts of steps took %.1f minutes in all, no process more than %.1f GiB of memory (time.csv)\n", NR, seconds / 60, peak / 1048576}' "$out/time.csv"
+  exit 0
+}
+step() {  # NAME evac's words …
+  /usr/bin/time -a -o "$out/time.csv" -q -f "$1,%e,%M,%x" "$evac" "${@:2}"
+  if [ "$1" = "$last" ]; then finish; fi
+}
+learn() { step "$1" train "$1" "$out/shards" --config "$model" --training "$training" --out "$out/$1" "${@:2}"; }
+
+mkdir -p "$out"
+step collect collect "$configs/desk_recipe.yaml" --seed 7 --out "$out/recordings"
+step pack pack "$out/recordings" --config "$model" --out "$out/shards"
+learn codec
+step encode encode "$out/shards" --config "$model" --codec "$codec" --bf16
+learn judge --codec "$codec"
+learn policy --codec "$codec" --keep-steps 500,1000,2000,4000
+learn world --codec "$codec"
+step fidelity fidelity "$configs/fidelity.yaml" --set "worlds.2.weights=$out/world/weights.safetensors" \
+  --set "worlds.2.statistics=$out/shards/statistics.yaml" --classifier "$out/judge/judge.safetensors" --out "$out/fidelity"
