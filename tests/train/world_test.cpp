@@ -34,8 +34,8 @@ nn::ModelConfig SmallConfig(std::int64_t views) {
 
 /// Shards, a codec and its latents: where the training of a world model begins.
 struct Prepared {
-  explicit Prepared(std::int64_t views) : config(SmallConfig(views)) {
-    WriteSyntheticShards(folder / "shards", {.views = views});
+  explicit Prepared(std::int64_t views, std::int64_t frames = 9) : config(SmallConfig(views)) {
+    WriteSyntheticShards(folder / "shards", {.frames = frames, .views = views});
     CodecOptions options;
     options.job.trainer.steps = 2;
     options.job.trainer.learning_rate = 1e-3;
@@ -189,6 +189,32 @@ TEST(TrainWorld, AViewsErrorsCountAsMuchAsItsWeight) {
   three.view_weights = "1,1,1";
   EXPECT_THROW(TrainWorld({at.folder / "shards", at.folder / "out", at.config}, three, {.codec = at.codec()}, {}),
                TensorError);
+}
+
+TEST(TrainWorld, MemoryIsImaginedSoManyChunksDeep) {
+  const Prepared at(1, 10);
+  ShardSet shards(at.folder / "shards", Split::kTrain);
+  shards.OpenLatents(at.config.vae.z_channels, at.config.vae.Stride());
+  nn::RandomWeights random(3);
+  TrainableWeights weights(random);
+  const nn::EvacModel model(weights, at.config);
+  const auto loss = [&](std::int64_t chunks, double share) {
+    WorldOptions options = Quick(1);
+    options.world.windows.rollout_share = 1;
+    options.world.self_memory_share = share;
+    options.world.self_memory_chunks = chunks;
+    options.Resolve();
+    options.world.windows.chunk = at.config.chunk;
+    options.world.windows.memory = at.config.memory;
+    return WorldTraining(model, shards, options.world).Loss({5, 0, 0, 1}).item<double>();
+  };
+  const std::int64_t deepest = (shards.clips().front().frames - 1) / at.config.chunk - 1;
+  ASSERT_EQ(deepest, 2) << "or there is no chunk before the one before";
+  EXPECT_NE(loss(1, 1), loss(1, 0));
+  EXPECT_NE(loss(2, 1), loss(1, 1));
+  EXPECT_EQ(loss(2, 1), loss(7, 1)) << "before the first chunk nothing was imagined";
+  EXPECT_EQ(loss(2, 0), loss(1, 0));
+  EXPECT_THROW(loss(0, 1), TensorError);
 }
 
 std::string Bytes(const std::filesystem::path& path) {

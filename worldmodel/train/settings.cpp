@@ -116,6 +116,7 @@ Settings SettingsOf(WorldOptions& options) {
                        {"view_weights", &options.view_weights},
                        {"self_memory_share", &w.self_memory_share},
                        {"self_memory_from", &w.self_memory_from},
+                       {"self_memory_chunks", &w.self_memory_chunks},
                        {"train_action_resampler", &w.train_action_resampler},
                        {"train_image_encoder", &w.train_image_encoder},
                        {"strip_steps", &options.strip_steps}};

@@ -28,6 +28,9 @@ void Check(const WorldTrainingOptions& o, const nn::ModelConfig& config) {
     throw TensorError("world training: windows of " + std::to_string(o.windows.memory) + " + " +
                       std::to_string(o.windows.chunk) + " frames, the model has " + std::to_string(config.memory) +
                       " + " + std::to_string(config.chunk));
+  if (o.self_memory_chunks < 1)
+    throw TensorError("world training: self_memory_chunks is " + std::to_string(o.self_memory_chunks) +
+                      ", wanted at least 1");
   if (o.log_uniform && !(o.ratio_from > 0 && o.ratio_to > o.ratio_from))
     throw TensorError("world training: noise / signal from " + std::to_string(o.ratio_from) + " to " +
                       std::to_string(o.ratio_to) + ", wanted 0 < from < to");
@@ -191,12 +194,13 @@ Tensor WorldTraining::ImagineOnce(const WorldBatch& batch, Dice& dice) const {
   return nn::CleanFrom(x, v, model_.schedule().AlphaBar(last)).narrow(2, n, chunk) / scale;
 }
 
-void WorldTraining::RememberOwn(const std::vector<Window>& windows, WorldBatch& batch, Dice& dice) const {
+void WorldTraining::RememberOwn(const std::vector<Window>& windows, double share, std::int64_t chunks,
+                                WorldBatch& batch, Dice& dice) const {
   std::vector<Window> before;
   std::vector<std::int64_t> scenes;
   const std::int64_t chunk = options_.windows.chunk, views = batch.views;
   for (std::size_t i = 0; i < windows.size(); ++i) {
-    const bool own = dice.Chance(options_.self_memory_share);
+    const bool own = share >= 1 || dice.Chance(share);
     if (!own || windows[i].last < chunk) continue;
     Window window = windows[i];
     window.last -= chunk;
@@ -206,7 +210,9 @@ void WorldTraining::RememberOwn(const std::vector<Window>& windows, WorldBatch& 
     scenes.push_back(static_cast<std::int64_t>(i));
   }
   if (before.empty()) return;
-  const Tensor imagined = ImagineOnce(MakeWorldBatch(shards_, before), dice);  // [B'V, z, K, h, w]
+  WorldBatch batch_before = MakeWorldBatch(shards_, before);
+  if (chunks > 1) RememberOwn(before, 1, chunks - 1, batch_before, dice);
+  const Tensor imagined = ImagineOnce(batch_before, dice);  // [B'V, z, K, h, w]
   for (std::size_t i = 0; i < before.size(); ++i) {
     const std::vector<std::int64_t>& memory = windows[static_cast<std::size_t>(scenes[i])].memory;
     for (std::size_t j = 0; j < memory.size(); ++j) {
@@ -230,7 +236,8 @@ Tensor WorldTraining::Loss(const StepPlace& place) const {
     t.push_back(DrawStep(steps));
   }
   WorldBatch batch = MakeWorldBatch(shards_, windows);
-  if (options_.self_memory_share > 0 && place.done >= options_.self_memory_from) RememberOwn(windows, batch, self);
+  if (options_.self_memory_share > 0 && place.done >= options_.self_memory_from)
+    RememberOwn(windows, options_.self_memory_share, options_.self_memory_chunks, batch, self);
   return LossOf(batch, DrawDrops(batch, dropouts), at::tensor(t, at::kLong), noise, true);
 }
 

@@ -45,6 +45,8 @@ struct WorldTrainingOptions {
 
   double self_memory_share = 0;   ///< of the samples whose memory the network imagined itself, in one step
   double self_memory_from = 0.5;  ///< after this part of the training
+  std::int64_t self_memory_chunks =
+      1;  ///< so many chunks back; the chunk before the last one imagined is remembered as it was
 
   bool train_action_resampler = false;  ///< the paper's page freezes it, its text trains it
   bool train_image_encoder = false;     ///< there is no pretrained one of a small size
@@ -78,7 +80,10 @@ class WorldTraining {
   Tensor Weight(const WorldBatch& batch, const Tensor& still, const Tensor& t) const;
   nn::UNet::Context ContextOf(const Tensor& tokens, const WorldBatch& batch) const;
   Tensor TokensOf(const WorldBatch& batch) const;
-  void RememberOwn(const std::vector<Window>& windows, WorldBatch& batch, Dice& dice) const;
+  /// Puts what the network imagines of the chunk before each window into the window's memory.
+  /// @param share  of the windows; their own memory is put in first, `chunks` - 1 deep
+  void RememberOwn(const std::vector<Window>& windows, double share, std::int64_t chunks, WorldBatch& batch,
+                   Dice& dice) const;
 
   const nn::EvacModel& model_;
   const ShardSet& shards_;
