@@ -75,7 +75,7 @@ std::vector<double> Logits(const ClassifierNet& net, const JudgeClipSource& sour
                           clips.begin() + static_cast<std::ptrdiff_t>(std::min(begin + kBatch, clips.size())));
     std::vector<at::Tensor> pictures;
     for (const PackedClip& clip : some) {
-      const std::vector<std::int64_t> rows = RowsOf(clip);
+      const std::vector<std::int64_t> rows = RowsOf(clip, look.longer);
       pictures.push_back(look.reconstructed ? source.Reconstructed(clip, rows) : source.Pictures(clip, rows).clone());
       if (look.masks_object) MaskObject(source.Objects(clip, rows), look.mask_radius, pictures.back());
     }

@@ -15,6 +15,7 @@ struct JudgeLook {
   bool first_view_only = false;
   double mask_radius = 0.2;
   bool reconstructed = false;  ///< the clips are shown as their codec gives them back
+  double longer = 1;           ///< as RowsOf has it
 };
 
 /// The network's logits of success, in the order of the clips.

@@ -12,9 +12,10 @@ namespace {
 enum Stream : std::uint32_t { kPick = 11, kChange = 12, kMove = 13 };
 
 /// Rows of the pictures between first and last, each moved on its own.
-std::vector<std::int64_t> JitteredRows(const PackedClip& clip, double jitter, train::Dice& dice) {
+std::vector<std::int64_t> JitteredRows(const PackedClip& clip, const JudgeTrainingOptions& options, train::Dice& dice) {
   std::vector<std::int64_t> rows;
-  const double step = static_cast<double>(clip.frames - 1) / static_cast<double>(kClassifierFrames - 1);
+  const double longer = options.longest > 1 ? std::pow(options.longest, dice.Uniform()) : 1, jitter = options.jitter;
+  const double step = longer * static_cast<double>(clip.frames - 1) / static_cast<double>(kClassifierFrames - 1);
   for (std::int64_t i = 0; i < kClassifierFrames; ++i) {
     const bool is_inner = i > 0 && i + 1 < kClassifierFrames;
     const double at = (static_cast<double>(i) + (is_inner ? dice.Uniform(-jitter, jitter) : 0)) * step;
@@ -61,6 +62,7 @@ train::Settings SettingsOf(JudgeTrainingOptions& options) {
                               {"calibration", &options.calibration},
                               {"drop_view", &options.drop_view},
                               {"jitter", &options.jitter},
+                              {"longest", &options.longest},
                               {"object_weight", &options.object_weight},
                               {"reconstructed_share", &options.reconstructed_share},
                               {"shift_px", &options.shift_px},
@@ -92,12 +94,16 @@ JudgeSplit SplitForJudge(const JudgeClips& clips, const JudgeTrainingOptions& op
   return split;
 }
 
-std::vector<std::int64_t> RowsOf(const PackedClip& clip) {
+std::vector<std::int64_t> RowsOf(const PackedClip& clip, double longer) {
   std::vector<std::int64_t> rows;
-  constexpr std::int64_t last = kClassifierFrames - 1;
-  for (std::int64_t i = 0; i <= last; ++i) rows.push_back(clip.first + (i * (clip.frames - 1) + last / 2) / last);
+  const std::int64_t last = clip.frames - 1;
+  const double step = longer * static_cast<double>(last) / static_cast<double>(kClassifierFrames - 1);
+  for (std::int64_t i = 0; i < kClassifierFrames; ++i)
+    rows.push_back(clip.first + std::min<std::int64_t>(last, std::llround(step * static_cast<double>(i))));
   return rows;
 }
+
+double MiddleLength(const JudgeTrainingOptions& options) { return (1 + options.longest) / 2; }
 
 ClassifierClips ForNetwork(const at::Tensor& bytes, const JudgeClips& clips) {
   std::vector<std::int64_t> tasks;
@@ -108,6 +114,7 @@ ClassifierClips ForNetwork(const at::Tensor& bytes, const JudgeClips& clips) {
 JudgeTraining::JudgeTraining(const JudgeClipSource& source, const JudgeClips& fit, const JudgeTrainingOptions& options)
     : source_(source), fit_(fit), options_(options) {
   if (options.batch < 1) throw InvalidInput("judge training: batch is {}, wanted at least 1", options.batch);
+  if (!(options.longest >= 1)) throw InvalidInput("judge training: longest is {}, wanted at least 1", options.longest);
   if (options.changes.blur_times < 1)
     throw InvalidInput("judge training: blur_times is {}, wanted at least 1", options.changes.blur_times);
   if (options.shift_px < 0) throw InvalidInput("judge training: shift_px is {}, wanted at least 0", options.shift_px);
@@ -132,7 +139,7 @@ JudgeTraining::Batch JudgeTraining::Draw(const train::StepPlace& place) const {
   at::Tensor present = at::ones({options_.batch, views});
   for (std::int64_t b = 0; b < options_.batch; ++b) {
     const PackedClip& clip = fit_[static_cast<std::size_t>(pick.Below(static_cast<std::int64_t>(fit_.size())))];
-    const std::vector<std::int64_t> rows = JitteredRows(clip, options_.jitter, pick);
+    const std::vector<std::int64_t> rows = JitteredRows(clip, options_, pick);
     if (pick.Chance(options_.drop_view)) present[b].narrow(0, 1, views - 1).zero_();
     const bool is_reconstructed = !source_.Codec().empty() && pick.Chance(options_.reconstructed_share);
     SeenClip seen{is_reconstructed ? source_.Reconstructed(clip, rows) : source_.Pictures(clip, rows),

@@ -13,12 +13,13 @@
 namespace evac {
 
 struct JudgeTrainingOptions {
-  train::JobOptions job;             ///< of it the trainer's alone: a classifier is trained in floats
-  std::int64_t batch = 32;           ///< clips
-  double calibration = 0.15;         ///< share of the training split's initial states that only calibrates
-  double drop_view = 0.5;            ///< share of clips of which the first view alone is shown
-  double jitter = 0.3;               ///< pictures between first and last move by up to this part of their distance
-  double object_weight = 1;          ///< of looking where the object is, beside the verdict
+  train::JobOptions job;      ///< of it the trainer's alone: a classifier is trained in floats
+  std::int64_t batch = 32;    ///< clips
+  double calibration = 0.15;  ///< share of the training split's initial states that only calibrates
+  double drop_view = 0.5;     ///< share of clips of which the first view alone is shown
+  double jitter = 0.3;        ///< pictures between first and last move by up to this part of their distance
+  double longest = 1;         ///< clips are seen as up to so many times as long, as if they had stood still at the end
+  double object_weight = 1;   ///< of looking where the object is, beside the verdict
   double reconstructed_share = 0.5;  ///< share of clips seen as a codec gives them back; without one, none
   std::int64_t shift_px = 0;         ///< each view's pictures are moved by up to this each way; the edge is repeated
   double mirror_share = 0;           ///< of clips that are seen mirrored, left for right, in every view
@@ -43,7 +44,10 @@ struct JudgeSplit {
 JudgeSplit SplitForJudge(const JudgeClips& clips, const JudgeTrainingOptions& options);
 
 /// The rows that a classifier sees, evenly spaced.
-std::vector<std::int64_t> RowsOf(const PackedClip& clip);
+/// @param longer  at least 1: had the clip stood still at the end until it was so many times as long
+std::vector<std::int64_t> RowsOf(const PackedClip& clip, double longer = 1);
+/// How much longer than they are clips are when it is measured what the training for longer ones was worth.
+double MiddleLength(const JudgeTrainingOptions& options);
 /// Bytes of clips [B, V, T, H, W, 3] as the network takes them, all views present.
 ClassifierClips ForNetwork(const at::Tensor& bytes, const JudgeClips& clips);
 

@@ -19,24 +19,39 @@ struct Judged {
   MeasuredJudge whole, first_view;
   std::optional<MeasuredJudge> masked;         ///< where it is known where the objects are
   std::optional<MeasuredJudge> reconstructed;  ///< where there is a codec
+  std::optional<MeasuredJudge> longer;         ///< where it was trained for longer clips than it was shown
 };
 
-/// Where there is a codec the clips count twice, plain and as it gives them back: what is judged is both, recorded and
-/// imagined.
-ClassifierCard CardOf(const ClassifierNet& net, const JudgeClipSource& learn, JudgeClips calibration, double unsure) {
-  std::vector<double> logits = Logits(net, learn, calibration, {});
-  if (!learn.Codec().empty()) {
-    const std::vector<double> given_back = Logits(net, learn, calibration, {.reconstructed = true});
-    logits.insert(logits.end(), given_back.begin(), given_back.end());
-    const JudgeClips again = calibration;
-    calibration.insert(calibration.end(), again.begin(), again.end());
+/// The ways in which clips are seen by turns: plain and as the codec gives them back, where there is one; and both as
+/// longer clips, where it is trained for them. What is judged is all of these, recorded and imagined.
+std::vector<JudgeLook> LooksOf(const JudgeClipSource& learn, const JudgeTrainingOptions& options) {
+  std::vector<JudgeLook> looks = {{}};
+  if (!learn.Codec().empty()) looks.push_back({.reconstructed = true});
+  if (options.longest > 1) {
+    for (std::size_t i = looks.size(); i-- > 0;) {
+      looks.push_back(looks[i]);
+      looks.back().longer = MiddleLength(options);
+    }
   }
-  return Calibrate(logits, calibration, unsure);
+  return looks;
 }
 
-Judged MeasureAll(const ClassifierNet& net, const JudgeData& data, const JudgeClips& calibration, double unsure) {
+ClassifierCard CardOf(const ClassifierNet& net, const JudgeClipSource& learn, const JudgeClips& calibration,
+                      const JudgeTrainingOptions& options) {
+  std::vector<double> logits;
+  JudgeClips clips;
+  for (const JudgeLook& look : LooksOf(learn, options)) {
+    const std::vector<double> some = Logits(net, learn, calibration, look);
+    logits.insert(logits.end(), some.begin(), some.end());
+    clips.insert(clips.end(), calibration.begin(), calibration.end());
+  }
+  return Calibrate(logits, clips, options.unsure);
+}
+
+Judged MeasureAll(const ClassifierNet& net, const JudgeData& data, const JudgeClips& calibration,
+                  const JudgeTrainingOptions& options) {
   Judged judged;
-  judged.card = CardOf(net, data.learn, calibration, unsure);
+  judged.card = CardOf(net, data.learn, calibration, options);
   const auto measure = [&](const JudgeLook& look) {
     return Measure(Logits(net, data.holdout, data.holdout.clips, look), data.holdout.clips, judged.card);
   };
@@ -44,6 +59,7 @@ Judged MeasureAll(const ClassifierNet& net, const JudgeData& data, const JudgeCl
   judged.first_view = measure({.first_view_only = true});
   if (data.holdout.KnowsObjects()) judged.masked = measure({.masks_object = true});
   if (!data.holdout.Codec().empty()) judged.reconstructed = measure({.reconstructed = true});
+  if (options.longest > 1) judged.longer = measure({.longer = MiddleLength(options)});
   return judged;
 }
 
@@ -53,6 +69,7 @@ void Say(const train::JobPlace& place, const ClassifierNet& net, const JudgeData
   place.say("  first view alone: " + judged.first_view.Line());
   if (judged.masked) place.say("  object masked: " + judged.masked->Line());
   if (judged.reconstructed) place.say("  as the codec gives the pictures back: " + judged.reconstructed->Line());
+  if (judged.longer) place.say("  as longer clips: " + judged.longer->Line());
   const std::vector<double> logits = Logits(net, data.holdout, data.holdout.clips, {});
   place.say("  failures taken for successes: " + MistakesByFate(logits, data.holdout.clips, judged.card));
   if (!(judged.whole.kappa >= kLeastKappa)) {
@@ -97,6 +114,10 @@ TensorMetadata CardText(const Judged& judged, const JudgeClipSource& learn, cons
                          {"licence", "as the project"}};
   if (judged.masked) card["kappa_masked"] = number(judged.masked->kappa);
   if (const std::string marks = MarksOf(learn); !marks.empty()) card["learned_from"] = marks;
+  if (judged.longer) {
+    card["longer"] = number(MiddleLength(options));
+    card["kappa_longer"] = number(judged.longer->kappa);
+  }
   if (judged.reconstructed) {
     card["codec"] = learn.Codec();
     card["kappa_reconstructed"] = number(judged.reconstructed->kappa);
@@ -119,14 +140,20 @@ train::TrainerSummary TrainJudge(const train::JobPlace& place, const JudgeTraini
   train::Trainer trainer(learners.weights().all(), options.job.trainer, place.out);
   const auto loss = [&](const ClassifierNet& of, const train::StepPlace& at) { return training.Loss(of, at); };
   learners.Replicate(trainer, loss);
-  const auto holdout = [&] { return LogLoss(Logits(net, data.learn, split.calibration, {}), split.calibration); };
+  const std::vector<JudgeLook> looks = LooksOf(data.learn, options);
+  const auto holdout = [&] {
+    double sum = 0;
+    for (const JudgeLook& look : looks)
+      sum += LogLoss(Logits(net, data.learn, split.calibration, look), split.calibration);
+    return sum / static_cast<double>(looks.size());
+  };
   const train::TrainerSummary summary = trainer.Run({.loss = [&](const train::StepPlace& at) { return loss(net, at); },
                                                      .holdout = holdout,
                                                      .interrupted = place.interrupted,
                                                      .on_progress = place.on_progress});
   if (!summary.IsDone()) return summary;
   trainer.WithBest([&] {
-    const Judged judged = MeasureAll(net, data, split.calibration, options.unsure);
+    const Judged judged = MeasureAll(net, data, split.calibration, options);
     Say(place, net, data, judged);
     learners.Write(place.out / "judge.safetensors", CardText(judged, data.learn, options, summary.step));
   });

@@ -15,6 +15,7 @@ struct JudgeData {
 /// Where the clips have a codec, `reconstructed_share` of them are shown as it gives them back, which is how a world
 /// model's clips look. An interrupted training writes none.
 /// @param place  of it `shards` and `config` are not read
-train::TrainerSummary TrainJudge(const train::JobPlace& place, const JudgeTrainingOptions& options, const JudgeData& data);
+train::TrainerSummary TrainJudge(const train::JobPlace& place, const JudgeTrainingOptions& options,
+                                 const JudgeData& data);
 
 }  // namespace evac

@@ -7,6 +7,7 @@
 
 #include "apps/networks/judge_quality.h"
 #include "apps/networks/judge_shard_clips.h"
+#include "apps/networks/learners.h"
 #include "core/error.h"
 #include "core/file.h"
 #include "core/hash.h"
@@ -18,6 +19,7 @@
 namespace evac {
 namespace {
 
+using testing::ElementsAre;
 using testing::HasSubstr;
 using testing::Not;
 using testing::ThrowsMessage;
@@ -66,6 +68,35 @@ TEST_F(TrainJudgeTest, ATinyClassifierTellsClipsApartThatItHasNotSeen) {
   EXPECT_EQ(file.Text("tasks"), "carry");
   EXPECT_EQ(file.Text("recipe"), "carry");
   EXPECT_NO_THROW(ClassifierJudge(folder_ / "judge" / "judge.safetensors", folder_.path()));
+}
+
+TEST_F(TrainJudgeTest, AClipSeenAsALongerOneStandsStillAtItsEnd) {
+  PackedClip clip;
+  clip.first = 100;
+  clip.frames = 15;
+  EXPECT_THAT(RowsOf(clip), ElementsAre(100, 102, 104, 106, 108, 110, 112, 114));
+  EXPECT_THAT(RowsOf(clip, 2), ElementsAre(100, 104, 108, 112, 114, 114, 114, 114));
+  EXPECT_THAT(RowsOf(clip, 50), ElementsAre(100, 114, 114, 114, 114, 114, 114, 114));
+}
+
+TEST_F(TrainJudgeTest, TrainedForLongerClipsItIsMeasuredOnThem) {
+  JudgeTrainingOptions options = Quick(150);
+  options.longest = 4;
+  Train(Place("longer"), options);
+  const WeightFile file(folder_ / "longer" / "judge.safetensors", "evac-classifier 1");
+  EXPECT_EQ(file.Number("longer"), 2.5);
+  EXPECT_GT(file.Number("kappa"), 0.8);
+  EXPECT_GT(file.Number("kappa_longer"), 0.8);
+
+  const ShardClips set(folder_ / "shards", train::Split::kTrain, nullptr);
+  const Learners<ClassifierNet> learners(ClassifierShape{set.tasks, set.cameras, 16, 24}, 3, 1);
+  const auto loss = [&](double longest) {
+    JudgeTrainingOptions some = Quick(1);
+    some.longest = longest;
+    return JudgeTraining(set, set.clips, some).Loss(learners.net(), {3, 0, 0, 0}).item<double>();
+  };
+  EXPECT_NE(loss(4), loss(1));
+  EXPECT_THROW(loss(0.5), Error);
 }
 
 TEST_F(TrainJudgeTest, OneThatLearnedNothingIsWarnedOf) {
