@@ -47,6 +47,9 @@ std::vector<std::vector<cv::Mat>> ReadClip(const std::filesystem::path& video, c
   VideoReader reader(video);
   const int scale = ScaleOf(video, {reader.width_px(), reader.height_px()}, look.cameras);
   if (reader.frames() < 1) throw InvalidInput("{}: does not say how many frames it has", video.string());
+  if (look.most_frames > 0 && reader.frames() > look.most_frames)
+    throw InvalidInput("{}: {} frames, wanted at most {}: longer than anything its judge learned from", video.string(),
+                       reader.frames(), look.most_frames);
   std::vector<std::vector<cv::Mat>> views(look.cameras.size());
   int at = 0;
   cv::Mat frame;

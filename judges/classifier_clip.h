@@ -13,12 +13,14 @@ struct ClipLook {
   std::vector<Camera> cameras;  ///< the views that stand side by side in the clip, as Task::cameras
   int frames = 8;               ///< evenly spaced, the first and the last among them; one that is too short repeats
   cv::Size picture_px;          ///< each view comes back in this size
+  int most_frames = 0;          ///< above 0: a clip of more is refused
 };
 
 /// Reads a clip as episodes store them: the task's views side by side, each pixel drawn several times over. Reads the
 /// video and nothing else.
 /// @returns [V][frames] CV_8UC3 RGB
-/// @throws InvalidInput naming the file: it cannot be read to its end, or its pictures are not the cameras' (found,
+/// @throws InvalidInput naming the file: it cannot be read to its end, is longer than `most_frames`, or its pictures
+/// are not the cameras' (found,
 ///   wanted).
 std::vector<std::vector<cv::Mat>> ReadClip(const std::filesystem::path& video, const ClipLook& look);
 

@@ -34,10 +34,11 @@ ClassifierShape ShapeOf(const WeightFile& file) {
 }
 
 ClassifierCard CardOf(const WeightFile& file) {
-  const ClassifierCard card{file.Number("temperature"), file.Number("threshold"), file.Number("unsure")};
+  ClassifierCard card{file.Number("temperature"), file.Number("threshold"), file.Number("unsure")};
   if (card.temperature <= 0 || card.threshold <= 0 || card.threshold >= 1 || card.unsure < 0)
     throw InvalidInput("{}: temperature {}, threshold {}, unsure {}: wanted above 0, in (0, 1), at least 0",
                        file.name(), card.temperature, card.threshold, card.unsure);
+  if (file.card().contains("longest_frames")) card.longest_frames = file.Whole("longest_frames", 1, 1000000);
   return card;
 }
 
@@ -109,7 +110,8 @@ double ClassifierJudge::Probability(const Task& task, const std::filesystem::pat
   const at::NoGradGuard no_gradients;
   const ClassifierShape& shape = network_->shape;
   const auto views = static_cast<std::int64_t>(shape.cameras.size());
-  const ClipLook look{task.cameras, static_cast<int>(kClassifierFrames), {shape.width_px, shape.height_px}};
+  const ClipLook look{
+      task.cameras, static_cast<int>(kClassifierFrames), {shape.width_px, shape.height_px}, card_.longest_frames};
   const std::vector<std::vector<cv::Mat>> seen = ReadClip(video, look);
   at::Tensor bytes = at::zeros({1, views, kClassifierFrames, shape.height_px, shape.width_px, 3}, at::kByte);
   ClassifierClips clip{{}, at::zeros({1, views}), at::zeros({1}, at::kLong)};

@@ -16,6 +16,7 @@ struct ClassifierCard {
   double temperature = 1;  ///< the network's logit is divided by it: then its probabilities can be believed
   double threshold = 0.5;  ///< success from here on
   double unsure = 0;       ///< closer than this to the threshold: cannot tell
+  int longest_frames = 0;  ///< no clip that it learned from was longer; 0: unknown
 };
 
 /// Success, failure or cannot tell, by the card.
@@ -26,8 +27,8 @@ Label LabelOf(double probability, const ClassifierCard& card);
 /// threshold.
 ///
 /// Verdicts: `success`, `failure`, or `cannot_tell` near the threshold, with the probability. A clip that is missing or
-/// cannot be read, a task or camera it does not know, and a clip that it learned from, throw: JudgeEpisodes makes them
-/// `invalid`, never a failure.
+/// cannot be read, one longer than any it learned from, a task or camera it does not know, and a clip that it learned
+/// from, throw: JudgeEpisodes makes them `invalid`, never a failure.
 class ClassifierJudge : public Judge {
  public:
   /// @param weights  of `evac train judge`

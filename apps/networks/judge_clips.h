@@ -10,8 +10,8 @@ namespace evac {
 
 using JudgeClips = std::vector<PackedClip>;
 
-/// Clips that a classifier judge learns from, and their pictures, wherever they lie: shards (judge_shard_clips.h) or the
-/// videos of runs (judge_run_clips.h). A clip's rows are `first` … `first + frames - 1`.
+/// Clips that a classifier judge learns from, and their pictures, wherever they lie: shards (judge_shard_clips.h) or
+/// the videos of runs (judge_run_clips.h). A clip's rows are `first` … `first + frames - 1`.
 class JudgeClipSource {
  public:
   virtual ~JudgeClipSource() = default;
@@ -25,6 +25,8 @@ class JudgeClipSource {
   virtual at::Tensor Pictures(const PackedClip& clip, const std::vector<std::int64_t>& rows) const = 0;
   /// [V, T, 2] pixels: the middle of the task's object; not a number where nobody knows.
   virtual at::Tensor Objects(const PackedClip& clip, const std::vector<std::int64_t>& rows) const = 0;
+  /// Whether a clip has as many rows as its recording has frames: then it is known how long the longest was.
+  virtual bool KnowsLengths() const { return true; }
   /// Whether `Objects` knows any.
   virtual bool KnowsObjects() const { return true; }
   /// SHA-256 of the codec that `Reconstructed` shows; empty: there is none.

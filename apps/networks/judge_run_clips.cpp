@@ -31,6 +31,7 @@ class RunClips final : public JudgeClipSource {
     return at::full({static_cast<std::int64_t>(cameras.size()), static_cast<std::int64_t>(rows.size()), 2},
                     std::numeric_limits<float>::quiet_NaN());
   }
+  bool KnowsLengths() const override { return false; }
   bool KnowsObjects() const override { return false; }
   std::string Mark(const PackedClip& clip) const override { return marks[clip.shard]; }
 };

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <optional>
 
 #include "apps/networks/judge_quality.h"
@@ -114,6 +115,11 @@ TensorMetadata CardText(const Judged& judged, const JudgeClipSource& learn, cons
                          {"licence", "as the project"}};
   if (judged.masked) card["kappa_masked"] = number(judged.masked->kappa);
   if (const std::string marks = MarksOf(learn); !marks.empty()) card["learned_from"] = marks;
+  if (learn.KnowsLengths()) {
+    std::int64_t most = 0;
+    for (const PackedClip& clip : learn.clips) most = std::max(most, clip.frames);
+    card["longest_frames"] = std::to_string(std::llround(options.longest * static_cast<double>(most)));
+  }
   if (judged.longer) {
     card["longer"] = number(MiddleLength(options));
     card["kappa_longer"] = number(judged.longer->kappa);

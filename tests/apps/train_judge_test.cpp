@@ -85,6 +85,7 @@ TEST_F(TrainJudgeTest, TrainedForLongerClipsItIsMeasuredOnThem) {
   Train(Place("longer"), options);
   const WeightFile file(folder_ / "longer" / "judge.safetensors", "evac-classifier 1");
   EXPECT_EQ(file.Number("longer"), 2.5);
+  EXPECT_EQ(file.Number("longest_frames"), 4 * LearningShards{}.frames);
   EXPECT_GT(file.Number("kappa"), 0.8);
   EXPECT_GT(file.Number("kappa_longer"), 0.8);
 

@@ -124,6 +124,20 @@ TEST_F(ClassifierJudgeTest, AClipThatCannotBeReadIsAnErrorRowAndNoFailure) {
   EXPECT_THAT(verdict.reason, HasSubstr(".mp4"));
 }
 
+TEST_F(ClassifierJudgeTest, AClipLongerThanAnyItLearnedFromIsNotJudged) {
+  const Episode episode = Stored("1-0000", 40);  // 12 frames
+  TensorMetadata card = kCard;
+  card["longest_frames"] = "12";
+  ClassifierJudge fits(Weights(folder_ / "fits.safetensors", card), folder_.path());
+  EXPECT_TRUE(fits.Rate(BottleTask(), episode).probability);
+  card["longest_frames"] = "11";
+  ClassifierJudge judge(Weights(folder_ / "w.safetensors", card), folder_.path());
+  JudgeEpisodes(judge, store_, {});
+  const Verdict verdict = store_.CurrentVerdicts().at(episode.key.Id()).at(judge.Name());
+  EXPECT_EQ(verdict.label, Label::kInvalid);
+  EXPECT_THAT(verdict.reason, HasSubstr("12 frames, wanted at most 11"));
+}
+
 TEST_F(ClassifierJudgeTest, RefusesTasksAndCamerasThatItDidNotLearn) {
   const ClassifierJudge judge(Weights(folder_ / "w.safetensors"), folder_.path());
   Task task = BottleTask();
