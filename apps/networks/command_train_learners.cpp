@@ -63,7 +63,8 @@ struct LabelledArguments {
 
 ExitCode RunJudgeFromLabels(const LabelledArguments& arguments) {
   return RunLearner<JudgeTrainingOptions>(arguments.training, "judge",
-                                          [&](const train::JobPlace& place, const JudgeTrainingOptions& options) {
+                                          [&](const train::JobPlace& place, JudgeTrainingOptions options) {
+                                            options.longest = 1;  // runs' clips are as long as those it will judge
                                             LabelledRuns runs = arguments.runs;
                                             runs.seed = options.job.trainer.seed;
                                             const LabelledClips clips = ReadLabelledClips(runs, place.say);

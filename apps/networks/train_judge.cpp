@@ -29,10 +29,9 @@ std::vector<JudgeLook> LooksOf(const JudgeClipSource& learn, const JudgeTraining
   std::vector<JudgeLook> looks = {{}};
   if (!learn.Codec().empty()) looks.push_back({.reconstructed = true});
   if (options.longest > 1) {
-    for (std::size_t i = looks.size(); i-- > 0;) {
-      looks.push_back(looks[i]);
-      looks.back().longer = MiddleLength(options);
-    }
+    std::vector<JudgeLook> longer = looks;
+    for (JudgeLook& look : longer) look.longer = MiddleLength(options);
+    looks.insert(looks.end(), longer.begin(), longer.end());
   }
   return looks;
 }
