@@ -143,6 +143,7 @@ class Evaluation {
                     .policy_chunk_size = policy.chunk_size(),
                     .latency = suite_.latency,
                     .video = suite_.video,
+                    .film = world.film,
                     .keep_initial_scene = world.is_real};
     options.failures_left = plan_.allowed - plan_.failed;
     options.on_progress = [this](const Progress& progress) { display_.Show(progress, ProgressDisplay::Clock::now()); };

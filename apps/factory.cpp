@@ -115,7 +115,8 @@ void NeedNetworksFor(const Suite& suite) {
 std::unique_ptr<World> MakeWorld(const SuiteWorld& world, const Suite& suite, const Store* store) {
   if (world.type == "evac") return MakeEvacWorld(world, suite, store);
   if (world.type == "echo") return std::make_unique<EchoWorld>(ReadRecording(*suite.recording));
-  return std::make_unique<sim::MujocoWorld>(sim::MujocoWorldOptions{.name = world.name, .profile = world.profile, .threads = Threads(suite)});
+  return std::make_unique<sim::MujocoWorld>(
+      sim::MujocoWorldOptions{.name = world.name, .profile = world.profile, .threads = Threads(suite), .film = world.film});
 }
 
 std::vector<std::string> CommandLine(const SuitePolicy& policy, const Suite& suite) {

@@ -29,6 +29,13 @@ std::optional<std::string> WhatIsWrong(const Arms& arms, const Task& task) {
   return std::nullopt;
 }
 
+/// A measured arm may be outside the workspace that commands must keep to.
+std::optional<std::string> WhatIsWrongAnywhere(const Arms& arms, const Task& task) {
+  Task anywhere = task;
+  anywhere.workspace_m = Eigen::AlignedBox3d(Eigen::Vector3d::Constant(-1e3), Eigen::Vector3d::Constant(1e3));
+  return WhatIsWrong(arms, anywhere);
+}
+
 }  // namespace
 
 std::optional<std::string> WhatIsWrong(const ActionChunk& chunk, const Task& task, int max_targets) {
@@ -52,9 +59,13 @@ std::optional<std::string> WhatIsWrong(const Observation& observation, const Tas
                          image.channels(), camera.width_px, camera.height_px);
     }
   }
-  Task anywhere = task;
-  anywhere.workspace_m = Eigen::AlignedBox3d(Eigen::Vector3d::Constant(-1e3), Eigen::Vector3d::Constant(1e3));
-  return WhatIsWrong(observation.arms, anywhere);
+  return WhatIsWrongAnywhere(observation.arms, task);
+}
+
+std::optional<std::string> WhatIsWrongUnseen(const Observation& observation, const Task& task) {
+  if (!observation.images.empty())
+    return fmt::format("the observation has {} images, wanted none: the world is not filmed", observation.images.size());
+  return WhatIsWrongAnywhere(observation.arms, task);
 }
 
 }  // namespace evac

@@ -15,4 +15,7 @@ std::optional<std::string> WhatIsWrong(const ActionChunk& chunk, const Task& tas
 /// The same for what a world answers: images of the cameras' sizes, finite arms.
 std::optional<std::string> WhatIsWrong(const Observation& observation, const Task& task);
 
+/// The same for a step that nobody sees, within a chunk of a world that is not filmed: no images, finite arms.
+std::optional<std::string> WhatIsWrongUnseen(const Observation& observation, const Task& task);
+
 }  // namespace evac

@@ -15,7 +15,7 @@ using SceneId = int;
 
 /// One period of a world: what may be seen, and what only the oracle may.
 struct WorldStep {
-  Observation observation;
+  Observation observation;     ///< without images within a chunk if the world is not filmed
   PrivilegedFrame privileged;  ///< empty in worlds that have no physics
 };
 

@@ -57,7 +57,7 @@ std::optional<WorldStep> Lane::ResetWorld(World& world) try {
 void Lane::Keep(const WorldStep& first) {
   VideoOptions video = options_.video;
   video.period_s = job_.task->period_s;
-  video_.emplace(store_.VideoPath(job_.key), video);
+  if (options_.film) video_.emplace(store_.VideoPath(job_.key), video);
   Append(first);
   if (!options_.keep_initial_scene) return;
   store_.AddInitialScene(job_.key.pair, {first.observation.images, first.observation.arms, job_.task->cameras});
@@ -82,7 +82,9 @@ void Lane::Observe(const Advanced& advanced) {
     return Fail({StopReason::kWorldError, fmt::format("the world answered {} targets with {} observations", chunk_.targets.size(), steps.size())});
   }
   for (std::size_t k = 0; k < steps.size(); ++k) {
-    if (const auto wrong = WhatIsWrong(steps[k].observation, *job_.task)) {
+    const Observation& observation = steps[k].observation;
+    const bool seen = options_.film || k + 1 == steps.size();
+    if (const auto wrong = seen ? WhatIsWrong(observation, *job_.task) : WhatIsWrongUnseen(observation, *job_.task)) {
       return Fail({StopReason::kWorldError, fmt::format("chunk {}, step {}: {}", episode_.chunks + 1, k + 1, *wrong)});
     }
     episode_.commands.push_back(chunk_.targets[k]);
@@ -111,8 +113,9 @@ void Lane::Append(const WorldStep& step) {
   if (!episode_.observations.empty()) episode_.observations.back().images.clear();  // they are in the video now
   episode_.observations.push_back(step.observation);
   privileged_.push_back(step.privileged);
+  if (step.observation.images.empty()) return;
   last_frame_ = SideBySide(step.observation.images);
-  video_->Append(last_frame_);
+  if (video_) video_->Append(last_frame_);
 }
 
 /// Empty where the arms are only commanded: they say nothing about the gripper that the chunk does not say already.
@@ -128,7 +131,7 @@ std::vector<Arms> Lane::ObservedSinceLastChunk() const {
 EpisodeRecord Lane::Finish() {
   EpisodeRecord record;
   if (!last_frame_.empty()) {
-    record.video = video_->Finish();
+    if (video_) record.video = video_->Finish();
     record.thumbnail_jpeg = Jpeg(Enlarged(last_frame_, options_.video.scale));
   }
   const bool has_physics = !privileged_.empty() && !privileged_.front().bodies.empty();

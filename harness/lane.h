@@ -19,6 +19,7 @@ struct LaneOptions {
   int policy_chunk_size = 8;  ///< targets a policy may answer
   PolicyLatency latency;      ///< what the world does while the policy thinks
   VideoOptions video;         ///< period_s is the task's
+  bool film = true;                 ///< false: no video, and of each chunk only the last observation has images
   bool keep_initial_scene = false;  ///< the world is the real one: its first frames start the imagined episodes
 };
 

@@ -35,7 +35,7 @@ void AllowOnlyFieldsOf(const std::string& type, const Config& page) {
                            "cfg_rescale", "period_s", "pose_map", "products", "threads_per_scene", "quirks", "cache",
                            "initial_states"});
   }
-  page.AllowOnly({"name", "type", "role", "profile", "initial_states"});
+  page.AllowOnly({"name", "type", "role", "profile", "film", "initial_states"});
 }
 
 SuiteWorld ReadWorld(const Config& page) {
@@ -50,6 +50,9 @@ SuiteWorld ReadWorld(const Config& page) {
   world.is_real = role == "real";
   page.Require(!world.is_real || world.type != "evac", "role", "evaluated: what is imagined is no reference");
   if (world.type == "mujoco") world.profile = page.Path("profile");
+  world.film = page.Get<bool>("film", true);
+  page.Require(world.film || (world.type == "mujoco" && !world.is_real), "film",
+               "true: only a world of type mujoco beside the real one may do without clips");
   if (world.type == "echo") page.Require(!page.Has("profile"), "profile", "none: a recording has no physics");
   if (world.type == "evac") world.evac = ReadSuiteEvac(page);
   world.initial_states = page.Get<int>("initial_states", 0);

@@ -20,6 +20,7 @@ struct SuiteWorld {
   bool is_real = false;  ///< `role: real`
   std::filesystem::path
       profile;  ///< mujoco: the page of its physical truth; absolute or relative to the working directory
+  bool film = true;                    ///< mujoco: false: no clips, and nothing is drawn that no policy is shown
   std::optional<SuiteEvac> evac = {};  ///< evac: its network
   int initial_states = 0;              ///< only the first so many of the suite's; 0: all of them
 };

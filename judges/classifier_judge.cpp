@@ -132,7 +132,7 @@ double ClassifierJudge::Probability(const Task& task, const std::filesystem::pat
 
 Verdict ClassifierJudge::Rate(const Task& task, const Episode& episode) {
   CheckKnows({&task, 1});
-  if (episode.video.empty()) throw InvalidInput("{}: it has no clip", episode.key.Id());
+  if (episode.video.empty()) throw InvalidInput("{}: it has no clip", episode.key.Id()).Called("not_judged");
   if (learned_from_.contains(episode.video_sha256.substr(0, kHashDigits)))
     throw InvalidInput("{}: {} learned from this clip, and cannot judge it", episode.key.Id(), name_);
   Verdict verdict;

@@ -163,6 +163,17 @@ TEST_F(Rollout, AnEpisodeDoesNotDependOnLanesCompanyOrOrder) {
   }
 }
 
+TEST_F(Rollout, AWorldThatShowsWhatNobodyAskedForIsAWorldError) {
+  options_.lane.film = false;
+  WalkingPolicy policy;
+  Store store = NewDeclaredStore("unfilmed");
+  Run(policy, Jobs(1), store);
+  const Episode episode = store.Episodes().at(0);
+  EXPECT_EQ(episode.stop, StopReason::kWorldError);
+  EXPECT_THAT(episode.failure, HasSubstr("chunk 1, step 1: the observation has 1 images, wanted none"));
+  EXPECT_EQ(episode.video, "");
+}
+
 TEST_F(Rollout, ObservationsAreCommandsPlusOneAndTheLimitIsAStopReason) {
   const Episode episode = OnlyEpisode([](Acted plain, std::uint64_t) { return plain; });
   EXPECT_EQ(episode.stop, StopReason::kMaxChunks);

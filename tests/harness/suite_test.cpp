@@ -80,6 +80,16 @@ TEST_F(SuiteTest, AWorldMayTryTheFirstOfTheInitialStatesAlone) {
   for (const char* wrong : {"0", "-1", "21"}) EXPECT_THROW(read({fmt::format("worlds.1.initial_states={}", wrong)}), Error) << wrong;
 }
 
+TEST_F(SuiteTest, OnlyASimulatedWorldBesideTheRealOneMayGoUnfilmed) {
+  const std::filesystem::path small = EVAC_SOURCE_DIR "/tests/system/small.yaml";
+  EXPECT_TRUE(ReadSuite(small, {}).worlds[1].film);
+  const Suite suite = ReadSuite(small, {"worlds.1.film=false"});
+  EXPECT_TRUE(suite.worlds[0].film);
+  EXPECT_FALSE(suite.worlds[1].film);
+  EXPECT_THAT(Complaint(small, {"worlds.0.film=false"}), HasSubstr("film: found 'false', wanted true"));
+  EXPECT_THAT(Complaint(std::string(kSuite), {"worlds.0.film=false"}), HasSubstr("film: found 'false', wanted true"));
+}
+
 TEST_F(SuiteTest, SetOverridesAnyFieldAndChangesTheHash) {
   const auto path = Write("suite.yaml", kSuite);
   const Suite plain = ReadSuite(path, {}), changed = ReadSuite(path, {"policies.1.checkpoint=c", "chunk_size=4"});

@@ -7,13 +7,14 @@
 namespace evac::sim {
 namespace {
 
-/// Executes one chunk, up to where the physics fails.
-Advanced Execute(Scene& scene, const ActionChunk& chunk, Renderer& renderer) {
+/// Executes one chunk, up to where the physics fails. Not filmed, only its last step is drawn.
+Advanced Execute(Scene& scene, const ActionChunk& chunk, bool film, Renderer& renderer) {
   std::vector<WorldStep> steps;
   for (const Arms& target : chunk.targets) {
     scene.Drive(target);
     if (const auto why = scene.WhyDiverged()) return Failure{StopReason::kDiverged, *why};
-    steps.push_back(scene.Observe(renderer));
+    const bool seen = film || &target == &chunk.targets.back();
+    steps.push_back(scene.Observe(seen ? &renderer : nullptr));
   }
   return steps;
 }
@@ -44,7 +45,7 @@ WorldStep MujocoWorld::Reset(SceneId scene, const Task& task, const InitialState
     auto made = std::make_unique<Scene>(Scene::Setup{stage.model.get(), &stage.page, &profile_, task, initial, seed});
     if (const auto why = made->WhyDiverged())
       throw InternalError("{} {} in {}: {}", task.id, initial.id, options_.name, *why);
-    first = made->Observe(renderer);
+    first = made->Observe(&renderer);
     place = std::move(made);
   });
   return first;
@@ -56,7 +57,7 @@ std::vector<Advanced> MujocoWorld::Advance(std::span<const SceneChunk> batch) {
   std::vector<Advanced> answers(batch.size());
   workers_->Run(static_cast<int>(batch.size()), [&](int item, Renderer& renderer) {
     const auto i = static_cast<std::size_t>(item);
-    answers[i] = Execute(*scenes[i], *batch[i].chunk, renderer);
+    answers[i] = Execute(*scenes[i], *batch[i].chunk, options_.film, renderer);
   });
   return answers;
 }

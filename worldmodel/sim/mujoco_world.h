@@ -19,6 +19,7 @@ struct MujocoWorldOptions {
   std::string name;               ///< what results are filed under: real, sim
   std::filesystem::path profile;  ///< a page such as profiles/real.yaml
   int threads = 2;                ///< scenes that advance at the same time; no part of any result
+  bool film = true;               ///< false: of each chunk only the last step has images, all that a policy is shown
 };
 
 /// The stand-in for the real robot: rigid bodies, contact and friction in MuJoCo (Todorov et al. 2012), rendered

@@ -77,16 +77,16 @@ void Scene::StepPhysics() {
   mj_step2(model_.get(), data_.get());
 }
 
-WorldStep Scene::Observe(Renderer& renderer) {
+WorldStep Scene::Observe(Renderer* renderer) {
   mj_forward(model_.get(), data_.get());  // poses and contacts of the state just reached
   WorldStep step;
   step.privileged = ReadPrivileged(*model_, *data_);
   const Arms arms = TrueArms();
   const std::uint64_t frame_seed = SeedFor(noise_seed_, frame_++);
-  for (std::size_t i = 0; i < setup_.task.cameras.size(); ++i) {
+  for (std::size_t i = 0; renderer && i < setup_.task.cameras.size(); ++i) {
     const Camera& camera = setup_.task.cameras[i];
     const Eigen::Isometry3d base_from_camera = BaseFromCamera(camera, arms) * errors_.camera_from_true_camera[i];
-    step.observation.images.push_back(renderer.Draw(*setup_.base, *model_, *data_, camera, base_from_camera));
+    step.observation.images.push_back(renderer->Draw(*setup_.base, *model_, *data_, camera, base_from_camera));
     AddNoise(step.observation.images.back(), setup_.profile->sensors.image_noise,
              SeedFor(frame_seed, "image " + camera.name));
   }

@@ -34,8 +34,9 @@ class Scene {
   /// One period towards the target.
   void Drive(const Arms& target);
 
-  /// What sensors and oracle see now. The n-th call has the n-th frame's noise.
-  WorldStep Observe(Renderer& renderer);
+  /// What sensors and oracle see now; without a renderer, no images. The n-th call has the n-th frame's noise, whatever
+  /// was drawn before.
+  WorldStep Observe(Renderer* renderer);
 
   /// Why the physics can no longer be trusted, with the simulated time, or nothing.
   std::optional<std::string> WhyDiverged() const;

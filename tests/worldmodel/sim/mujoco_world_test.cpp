@@ -167,6 +167,26 @@ TEST(MujocoWorld, AnEpisodeDoesNotDependOnLanesThreadsCompanyOrOrder) {
   EXPECT_TRUE(expected == crowd_first + Bytes(std::get<0>(begun[1])) + Bytes(std::get<0>(ended[0])));
 }
 
+TEST(MujocoWorld, WhatNobodyIsShownIsNotDrawnAndChangesNothingElse) {
+  const Task task = ReadTask("take_toast");
+  MujocoWorld filmed = MakeWorld("real"), unfilmed({.name = "real", .profile = ProfilePage("real"), .threads = 1, .film = false});
+  const WorldStep first = filmed.Reset(0, task, State(5), 2);
+  EXPECT_TRUE(Bytes(first) == Bytes(unfilmed.Reset(0, task, State(5), 2)));
+  const std::vector<Arms> targets = Circle(first.observation.arms[0], 8);
+  for (std::size_t from = 0; from < targets.size(); from += 4) {
+    const std::vector<Arms> chunk(targets.begin() + from, targets.begin() + from + 4);
+    std::vector<WorldStep> seen = Advance(filmed, 0, chunk);
+    const std::vector<WorldStep> unseen = Advance(unfilmed, 0, chunk);
+    ASSERT_EQ(unseen.size(), 4u);
+    for (std::size_t k = 0; k < 4; ++k) {
+      EXPECT_EQ(ThingPositions(seen[k].privileged), ThingPositions(unseen[k].privileged));
+      if (k < 3) seen[k].observation.images.clear();
+      EXPECT_EQ(unseen[k].observation.images.size(), seen[k].observation.images.size());
+      EXPECT_TRUE(Bytes(seen[k]) == Bytes(unseen[k])) << "step " << from + k;
+    }
+  }
+}
+
 TEST(MujocoWorld, AnInitialStateIsTheSameInBothProfilesUpToTheirDifferences) {
   MujocoWorld real = MakeWorld("real"), simulated = MakeWorld("sim");
   const Task task = ReadTask("take_bottle");
