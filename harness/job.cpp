@@ -5,7 +5,8 @@
 namespace evac {
 
 std::uint64_t Job::WorldSeed() const {
-  return SeedFor(SeedFor(SeedFor(key.pair.seed, "world"), key.pair.task), key.pair.initial_state);
+  const std::uint64_t seed = SeedFor(SeedFor(SeedFor(key.pair.seed, "world"), key.pair.task), key.pair.initial_state);
+  return noise.empty() ? seed : SeedFor(seed, noise);
 }
 
 std::uint64_t Job::PolicySeed() const {

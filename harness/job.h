@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <deque>
 #include <optional>
+#include <string>
 #include <vector>
 
 #include "core/types.h"
@@ -14,9 +15,10 @@ struct Job {
   const Task* task = nullptr;  ///< outlives the run
   InitialState initial;
   EpisodeKey key;
+  std::string noise = {};  ///< whose noise the world has; empty: the real one's, which imagining worlds share
 
-  /// The world's randomness: the same for every policy, so that all of them meet the same world. World and profile
-  /// mix in their own names, so that no two worlds share a stream.
+  /// The world's randomness: the same for every policy, so that all of them meet the same world, and for every
+  /// checkpoint of a world model. A simulated world beside the real one has noise of its own, even of one profile.
   std::uint64_t WorldSeed() const;
   /// The policy's noise: the same in every world, so that a pair differs by the world alone.
   std::uint64_t PolicySeed() const;

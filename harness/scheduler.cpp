@@ -8,12 +8,14 @@ namespace evac {
 
 std::vector<Job> AllJobs(const Suite& suite, const SuiteWorld& world, const SuitePolicy& policy) {
   std::vector<Job> jobs;
+  const bool has_own_noise = world.type == "mujoco" && !world.is_real;
   for (const Task& task : suite.tasks) {
     for (const InitialState& state : StatesOf(suite, world)) {
       for (const std::uint64_t seed : suite.seeds) {
         jobs.push_back({.task = &task,
                         .initial = {state.id, SeedFor(state.seed, task.id)},
-                        .key = {{task.id, state.id, policy.name, policy.checkpoint, seed}, world.name}});
+                        .key = {{task.id, state.id, policy.name, policy.checkpoint, seed}, world.name},
+                        .noise = has_own_noise ? world.name : ""});
       }
     }
   }

@@ -202,6 +202,20 @@ TEST(Scheduler, PairsShareTheirSeedsAcrossWorldsAndWorldsAcrossPolicies) {
   EXPECT_NE(real_a[0].PolicySeed(), real_a[1].PolicySeed());
 }
 
+TEST(Scheduler, RealityAskedTwiceHasOtherNoiseTheSecondTime) {
+  Suite suite;
+  suite.tasks.resize(1);
+  suite.initial_states = {{"7-0000", 11}};
+  suite.seeds = {1};
+  const SuitePolicy policy{"p", "a", {}, "", ""};
+  const auto seed_in = [&](const SuiteWorld& world) { return AllJobs(suite, world, policy).at(0).WorldSeed(); };
+  const std::uint64_t real = seed_in({"real", "mujoco", true, "page"}), again = seed_in({"again", "mujoco", false, "page"});
+  EXPECT_NE(again, real);
+  EXPECT_NE(seed_in({"third", "mujoco", false, "page"}), again);
+  EXPECT_EQ(seed_in({"reality", "mujoco", true, "page"}), real) << "whatever the real world is called";
+  EXPECT_EQ(seed_in({"model", "evac", false, ""}), seed_in({"other", "evac", false, ""})) << "checkpoints of a model meet the same noise";
+}
+
 TEST(Scheduler, TheRealWorldComesFirst) {
   const auto worlds = RealFirst({{"sim", "mujoco", false, ""}, {"real", "mujoco", true, ""}, {"other", "mujoco", false, ""}});
   EXPECT_EQ(worlds[0].name, "real");

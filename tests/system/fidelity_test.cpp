@@ -9,6 +9,7 @@
 #include <thread>
 
 #include "core/file.h"
+#include "core/store.h"
 #include "tests/support/command.h"
 #include "tests/support/synthetic_recording.h"
 #include "tests/support/temp_folder.h"
@@ -57,6 +58,17 @@ nlohmann::json Numbers(const fs::path& out) {
   return json;
 }
 
+/// Where the arms were measured to be before anything was done, in an episode of that world.
+Arms FirstArmsIn(const fs::path& out, const std::string& world) {
+  const Store store = Store::Open(out / "closed", Store::Mode::kReadOnly);
+  for (Episode& episode : store.Episodes()) {
+    if (episode.key.world != world) continue;
+    store.LoadSteps(episode);
+    return episode.observations.at(0).arms;
+  }
+  return {};
+}
+
 TEST_F(FidelityRun, AsksEveryPartAndEndsInTheSameNumbersWhenItWasKilled) {
   const fs::path whole = folder_ / "whole", killed = folder_ / "killed";
   const auto begin = std::chrono::steady_clock::now();
@@ -73,6 +85,9 @@ TEST_F(FidelityRun, AsksEveryPartAndEndsInTheSameNumbersWhenItWasKilled) {
   EXPECT_EQ(lines[2], "open_loop,take_bottle,visual_pick,good,3-0000,1,1,,");
   for (std::size_t i = 3; i < 6; ++i) EXPECT_THAT(lines[i], HasSubstr(",3-0000,1,0,,")) << "it fails in truth";
 
+  const Arms real = FirstArmsIn(whole, "real"), again_measured = FirstArmsIn(whole, "again");
+  ASSERT_FALSE(real.empty());
+  EXPECT_NE(real[0].base_from_gripper.translation(), again_measured.at(0).base_from_gripper.translation()) << "other noise than the real world's";
   const nlohmann::json numbers = Numbers(whole);
   EXPECT_GE(numbers["open_loop"]["psnr_by_chunk"].size(), 2u);
   EXPECT_EQ(numbers["horizon"]["psnr_moving_by_chunk"].size(), 3u);
