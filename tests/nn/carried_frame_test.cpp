@@ -1,6 +1,7 @@
 #include "worldmodel/nn/carried_frame.h"
 
 #include <ATen/ops/allclose.h>
+#include <ATen/ops/equal.h>
 #include <ATen/ops/linalg_vector_norm.h>
 #include <ATen/ops/rand.h>
 #include <gtest/gtest.h>
@@ -61,7 +62,14 @@ CarriedFrame Carry(const Tensor& frame, const std::vector<Camera>& cameras, doub
 
 Tensor Picture() { return at::rand({2, kHeight, kWidth}); }
 
-TEST(CarriedFrame, OfACameraThatStandsStillIsTheFrame) {
+/// By libtorch's operators (where gradients are kept) and in one pass of our own.
+class CarriedAlongPlane : public testing::TestWithParam<bool> {
+  const at::AutoGradMode keeps_gradients_{GetParam()};
+};
+
+INSTANTIATE_TEST_SUITE_P(Each, CarriedAlongPlane, testing::Bool());
+
+TEST_P(CarriedAlongPlane, OfACameraThatStandsStillIsTheFrame) {
   const Tensor frame = Picture();
   const CarriedFrame later = Carry(frame, {{}, {}, {}});
   ASSERT_EQ(later.frames.sizes(), (std::vector<std::int64_t>{1, 2, 2, kHeight, kWidth}));
@@ -69,7 +77,7 @@ TEST(CarriedFrame, OfACameraThatStandsStillIsTheFrame) {
   EXPECT_EQ(later.seen.min().item<double>(), 1);
 }
 
-TEST(CarriedFrame, MovesAgainstTheCameraAndRepeatsTheEdgeWhereNothingWasSeen) {
+TEST_P(CarriedAlongPlane, MovesAgainstTheCameraAndRepeatsTheEdgeWhereNothingWasSeen) {
   const Tensor frame = Picture();
   const CarriedFrame later = Carry(frame, {{}, {.x_m = 0.2}, {.y_m = 0.1}});  // two to the right; one up
   const Tensor right = later.frames[0].select(1, 0), up = later.frames[0].select(1, 1);
@@ -83,7 +91,7 @@ TEST(CarriedFrame, MovesAgainstTheCameraAndRepeatsTheEdgeWhereNothingWasSeen) {
   EXPECT_EQ(seen[1][0].sum().item<double>(), 0);
 }
 
-TEST(CarriedFrame, TurnsAndShrinksWithTheCamera) {
+TEST_P(CarriedAlongPlane, TurnsAndShrinksWithTheCamera) {
   const Tensor frame = Picture();
   const Tensor turned = Carry(frame, {{}, {.turn = M_PI}}).frames[0].select(1, 0);
   EXPECT_TRUE(at::allclose(turned, frame.flip({1, 2}), 1e-4, 1e-4));
@@ -95,19 +103,19 @@ TEST(CarriedFrame, TurnsAndShrinksWithTheCamera) {
   EXPECT_EQ(far.seen[0][0][0][2][3].item<double>(), 1);
 }
 
-TEST(CarriedFrame, ThePlaneSaysHowFarThingsMove) {
+TEST_P(CarriedAlongPlane, ThePlaneSaysHowFarThingsMove) {
   const Tensor frame = Picture();
   const Tensor near = Carry(frame, {{}, {.x_m = 0.1}}, 0.5).frames[0].select(1, 0);  // half as far: twice the motion
   EXPECT_TRUE(at::allclose(near.narrow(2, 0, kWidth - 2), frame.narrow(2, 2, kWidth - 2), 1e-4, 1e-4));
 }
 
-TEST(CarriedFrame, WhereNoRayMeetsThePlaneItTurnsWithTheCameraAlone) {
+TEST_P(CarriedAlongPlane, WhereNoRayMeetsThePlaneItTurnsWithTheCameraAlone) {
   const Tensor frame = Picture();
   const Tensor above = Carry(frame, {{}, {.x_m = 3}}, 7.0).frames[0].select(1, 0);  // the plane is behind the cameras
   EXPECT_TRUE(at::allclose(above, frame, 1e-4, 1e-5));
 }
 
-TEST(CarriedFrame, ARayAlongThePlaneIsFarAway) {
+TEST_P(CarriedAlongPlane, ARayAlongThePlaneIsFarAway) {
   const Tensor across = ((at::arange(kWidth, at::kFloat) - 3.5) * 0.1).reshape({1, kWidth}).expand({5, kWidth});
   const Tensor up = ((at::arange(5, at::kFloat) - 2) * 0.1).reshape({5, 1}).expand({5, kWidth});
   const Tensor ray = at::stack({at::ones({5, kWidth}), -across, up});  // along x; the middle row keeps its height
@@ -119,7 +127,7 @@ TEST(CarriedFrame, ARayAlongThePlaneIsFarAway) {
   EXPECT_TRUE(at::allclose(later.frames[0].select(1, 0).select(1, 2), frame.select(1, 2), 1e-4, 1e-4));
 }
 
-TEST(CarriedFrame, APictureFinerThanItsRaysMovesByItsOwnPixels) {
+TEST_P(CarriedAlongPlane, APictureFinerThanItsRaysMovesByItsOwnPixels) {
   const Tensor picture = at::rand({3, 4 * kHeight, 4 * kWidth});
   const CarriedFrame later =
       Carry(picture, {{}, {.x_m = 0.025}, {.x_m = 0.1, .y_m = -0.05}});  // one pixel; four and two
@@ -129,6 +137,25 @@ TEST(CarriedFrame, APictureFinerThanItsRaysMovesByItsOwnPixels) {
   EXPECT_TRUE(at::allclose(one.narrow(2, 0, 4 * kWidth - 1), picture.narrow(2, 1, 4 * kWidth - 1), 1e-4, 1e-4));
   EXPECT_TRUE(at::allclose(more.narrow(2, 0, 4 * kWidth - 4).narrow(1, 0, 4 * kHeight - 2),
                            picture.narrow(2, 4, 4 * kWidth - 4).narrow(1, 2, 4 * kHeight - 2), 1e-4, 1e-4));
+}
+
+TEST(CarriedFrame, OfOnePassIsThatOfLibtorchsOperators) {
+  const Tensor pictures = at::rand({2, 3, 4 * kHeight, 4 * kWidth});
+  const Rays one({{}, {.x_m = 0.13, .y_m = -0.31, .height_m = 0.8, .turn = 0.4}, {.height_m = 1.7, .turn = -2}}),
+      other({{.turn = 1}, {.x_m = -0.2, .height_m = 0.4}, {.y_m = 3, .height_m = -1}});
+  const Tensor direction = at::cat({one.direction, other.direction}), origin = at::cat({one.origin, other.origin});
+  for (const double plane_m : {-0.2, 0.0, 0.5}) {
+    const auto carry = [&](bool keeps_gradients) {
+      const at::AutoGradMode mode(keeps_gradients);
+      return CarryAlongPlane(pictures, direction, origin, 0, 1, plane_m);
+    };
+    const CarriedFrame by_operators = carry(true), in_one_pass = carry(false);
+    EXPECT_TRUE(at::allclose(in_one_pass.frames, by_operators.frames, 1e-4, 1e-4)) << plane_m;
+    EXPECT_TRUE(at::equal(in_one_pass.seen, by_operators.seen)) << plane_m;
+    EXPECT_TRUE(at::equal(in_one_pass.shown, by_operators.shown)) << plane_m;
+    EXPECT_GT(in_one_pass.seen.sum().item<double>(), 0) << plane_m;
+    EXPECT_LT(in_one_pass.shown.to(at::kFloat).mean().item<double>(), 0.9) << plane_m;
+  }
 }
 
 TEST(CarriedFrame, LatentsGoByWayOfTheirPictureAndWhatStandsStillStays) {

@@ -91,6 +91,22 @@ TrainerOptions WithMuon() {
   return options;
 }
 
+TEST(Muon, WorkersChangeNoNumber) {
+  constexpr std::int64_t kEach = 16 * 24, kMatrices = 7;
+  std::vector<MatrixPlace> matrices;
+  for (std::int64_t i = 0; i < kMatrices; ++i) matrices.push_back({5 + i * (kEach + 3), 16, 24});
+  const auto after = [&](std::size_t workers) {
+    AdamWState state = Fresh(5 + kMatrices * (kEach + 3));
+    for (std::int64_t t = 0; t < 3; ++t) {
+      state.gradients.copy_(Noise(1, state.gradients.numel(), t).flatten());
+      StepMuon(state, matrices, 0.95, {}, {t, 0.01, 1, 0.9}, workers);
+    }
+    return at::cat({state.values, state.first_moment, state.average, state.gradients});
+  };
+  const Tensor alone = after(1);
+  for (const std::size_t workers : {2, 3, 20}) EXPECT_TRUE(at::equal(after(workers), alone)) << workers;
+}
+
 TEST(Muon, LearnsAndGoesOnAfterAnyKillAsIfNothingHadHappened) {
   const TempFolder whole_folder, killed_folder;
   Products whole;

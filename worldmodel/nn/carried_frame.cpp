@@ -6,7 +6,9 @@
 
 #include <cmath>
 
+#include "worldmodel/nn/carry_kernel.h"
 #include "worldmodel/nn/latent_pictures.h"
+#include "worldmodel/nn/layers.h"
 
 namespace evac::nn {
 namespace {
@@ -40,30 +42,62 @@ Tensor PixelPositions(std::int64_t h, std::int64_t w, std::int64_t finer, const 
   return at::stack({x.flatten(), y.flatten(), at::ones({height * width}, at::kDouble)}).to(device);
 }
 
+/// Where in the frame `at` later frames' places are looked for: fields as in kernels::CarryGeometry, double.
+struct Geometry {
+  Tensor found_from_position;  ///< [BV, K, 3, 3]
+  Tensor found_from_camera;    ///< [BV, K, 3, 1]
+  Tensor rise_from_position;   ///< [BV, K, 1, 3]
+  Tensor plane_above_camera;   ///< [BV, K, 1, 1] metres
+};
+
+Geometry GeometryOf(const Tensor& direction, const Tensor& origin, std::int64_t at, std::int64_t first,
+                    double plane_m) {
+  const std::int64_t rows = direction.size(0), later = direction.size(2) - first;
+  const auto camera = [&](std::int64_t from, std::int64_t count) {
+    const Tensor all = origin.narrow(2, from, count).narrow(3, 0, 1).narrow(4, 0, 1).to(at::kDouble);
+    return all.transpose(1, 2).flatten(3);  // [BV, count, 3, 1]
+  };
+  const Tensor ray_from_position =
+      RayFromPosition(direction.narrow(2, first, later).transpose(1, 2).flatten(0, 1)).unflatten(0, {rows, later});
+  const Tensor position_from_ray = at::linalg_inv(RayFromPosition(direction.select(2, at))).unsqueeze(1);
+  const Tensor from = camera(first, later);
+  return {at::matmul(position_from_ray, ray_from_position), at::matmul(position_from_ray, from - camera(at, 1)),
+          ray_from_position.narrow(2, 2, 1), plane_m - from.narrow(2, 2, 1)};
+}
+
 /// Positions among the places of a frame, and how far before its camera they lie.
 struct Found {
   Tensor x, y, depth;  ///< [BV, K, H W], double
 };
 
-/// Where in the frame `at` the pixels of later frames are looked for.
-Found Find(const Tensor& direction, const Tensor& origin, std::int64_t at, std::int64_t first, double plane_m,
-           std::int64_t finer) {
-  const std::int64_t rows = direction.size(0), h = direction.size(3), w = direction.size(4),
-                     later = direction.size(2) - first;
-  const Tensor corners = direction.narrow(2, first, later).transpose(1, 2).flatten(0, 1);  // [BV K, 3, h, w]
-  const Tensor ray = at::matmul(RayFromPosition(corners), PixelPositions(h, w, finer, direction.device()))
-                         .unflatten(0, {rows, later});  // [BV, K, 3, H W]
-  const auto camera = [&](std::int64_t from, std::int64_t count) {
-    const Tensor all = origin.narrow(2, from, count).narrow(3, 0, 1).narrow(4, 0, 1).to(at::kDouble);
-    return all.transpose(1, 2).flatten(3);  // [BV, count, 3, 1]
-  };
-  const Tensor from = camera(first, later), distance = (plane_m - from.narrow(2, 2, 1)) / ray.narrow(2, 2, 1);
+Found Find(const Geometry& geometry, std::int64_t h, std::int64_t w, std::int64_t finer) {
+  const Tensor positions = PixelPositions(h, w, finer, geometry.rise_from_position.device());
+  const Tensor distance = geometry.plane_above_camera / at::matmul(geometry.rise_from_position, positions);
+  const Tensor far = at::matmul(geometry.found_from_position, positions);
   constexpr double kFar = 1e4;  // rays' lengths; and a ray along the plane, which meets it nowhere
-  const Tensor place =
-      at::where((distance > 0).logical_and(distance < kFar), from + distance * ray - camera(at, 1), ray);
-  const Tensor found = at::matmul(at::linalg_inv(RayFromPosition(direction.select(2, at))).unsqueeze(1), place);
+  const Tensor found =
+      at::where((distance > 0).logical_and(distance < kFar), geometry.found_from_camera + distance * far, far);
   const Tensor depth = found.select(2, 2), safe = depth.clamp_min(1e-9);
   return {found.select(2, 0) / safe, found.select(2, 1) / safe, depth};
+}
+
+/// In one pass over the pixels; what libtorch's operators do below in thirty.
+CarriedFrame CarryByKernel(const Tensor& frame, const Geometry& geometry, std::int64_t h, std::int64_t w) {
+  const std::int64_t rows = frame.size(0), later = geometry.rise_from_position.size(1), finer = frame.size(2) / h;
+  const Tensor numbers = at::cat({geometry.found_from_position.flatten(2), geometry.found_from_camera.flatten(2),
+                                  geometry.rise_from_position.flatten(2), geometry.plane_above_camera.flatten(2)},
+                                 2)
+                             .contiguous();
+  static_assert(sizeof(kernels::CarryGeometry) == 16 * sizeof(double));
+  const auto* each = reinterpret_cast<const kernels::CarryGeometry*>(numbers.data_ptr<double>());
+  const auto bools = frame.options().dtype(at::kBool);
+  const Tensor read = at::empty({rows, frame.size(1), later, frame.size(2), frame.size(3)}, frame.options()),
+               seen = at::empty({rows, 1, later, h, w}, bools),
+               shown = at::empty({rows, 1, later, frame.size(2), frame.size(3)}, bools);
+  kernels::Carry({rows, later, frame.size(1), w, h, finer}, each, frame.data_ptr<float>(), read.data_ptr<float>(),
+                 shown.data_ptr<bool>());
+  kernels::Carry({rows, later, 0, w, h, 1}, each, nullptr, nullptr, seen.data_ptr<bool>());
+  return {read, seen.to(frame.scalar_type()), shown};
 }
 
 /// [BV] true where none of `count` cameras from `first` on is elsewhere or looks elsewhere than `at`.
@@ -94,14 +128,15 @@ CarriedFrame CarryAlongPlane(const Tensor& frame, const Tensor& direction, const
                      later = direction.size(2) - first, height = frame.size(2), width = frame.size(3),
                      finer = height / h;
   CheckShape("a frame to carry", frame, {direction.size(0), -1, h * finer, w * finer});
+  const Geometry geometry = GeometryOf(direction, origin, at, first, plane_m);
+  if (CanUseKernels(frame)) return CarryByKernel(frame, geometry, h, w);
   const auto within = [](const Tensor& position, std::int64_t side) {
     return (position >= -0.5).logical_and(position <= static_cast<double>(side) - 0.5);
   };
-  const Found places = Find(direction, origin, at, first, plane_m, 1);
-  const Tensor seen =
-      (places.depth > 1e-9).logical_and(within(places.x, w)).logical_and(within(places.y, h)).unsqueeze(1);
-  const Found pixels = finer == 1 ? places : Find(direction, origin, at, first, plane_m, finer);
-  const Tensor shown = (pixels.depth > 1e-9).logical_and(within(pixels.x, w)).logical_and(within(pixels.y, h));
+  const auto is_shown = [&](const Found& at) {
+    return (at.depth > 1e-9).logical_and(within(at.x, w)).logical_and(within(at.y, h)).unsqueeze(1);
+  };
+  const Found places = Find(geometry, h, w, 1), pixels = finer == 1 ? places : Find(geometry, h, w, finer);
   const auto scaled = [](const Tensor& position, std::int64_t side) {  // -1 and 1: the outer edges of the frame
     return ((position + 0.5) * (2.0 / static_cast<double>(side)) - 1).clamp(-2, 2);
   };
@@ -109,8 +144,9 @@ CarriedFrame CarryAlongPlane(const Tensor& frame, const Tensor& direction, const
                           .reshape({rows, later * height, width, 2});
   constexpr std::int64_t kBilinear = 0, kRepeatEdge = 1;
   const Tensor read = at::grid_sampler_2d(frame.to(at::kFloat), grid.to(at::kFloat), kBilinear, kRepeatEdge, false);
-  return {read.to(frame.scalar_type()).unflatten(2, {later, height}), seen.to(frame.scalar_type()).unflatten(3, {h, w}),
-          shown.unsqueeze(1).unflatten(3, {height, width})};
+  return {read.to(frame.scalar_type()).unflatten(2, {later, height}),
+          is_shown(places).to(frame.scalar_type()).unflatten(3, {h, w}),
+          is_shown(pixels).unflatten(3, {height, width})};
 }
 
 CarriedFrame CarryLatentsAlongPlane(const EvacModel& model, const Tensor& latents, const Tensor& direction,

@@ -29,6 +29,8 @@ Tensor AsConvolution(const Tensor& x, const Tensor& weight, const Tensor& bias) 
   return at::conv2d(pixels, weight.view({out, in, 1, 1}), bias).permute({0, 2, 3, 1}).contiguous().view(shape);
 }
 
+bool IsFloatsInARow(const Tensor& x) { return x.is_cpu() && x.scalar_type() == at::kFloat && x.is_contiguous(); }
+
 /// What training needs: differentiable, exact for pictures of one colour too.
 Tensor DifferentiableGroupNorm(const Tensor& x, const GroupNorm& norm, double epsilon) {
   const Tensor channels_second = x.reshape({x.size(0), -1, x.size(-1)}).transpose(1, 2).contiguous();
@@ -42,7 +44,7 @@ Tensor Precise(const Tensor& weight) {
 }
 
 bool CanUseKernels(const Tensor& x) {
-  return !(at::GradMode::is_enabled()) && x.is_cpu() && x.scalar_type() == at::kFloat && x.is_contiguous();
+  return !at::GradMode::is_enabled() && IsFloatsInARow(x);
 }
 
 Linear::Linear(const Scope& at, std::int64_t in, std::int64_t out, Bias with_bias) : product_(at.ProductType()) {
@@ -64,7 +66,7 @@ Tensor Linear::operator()(const Tensor& x) const {
   constexpr std::int64_t kManyRows = 512;
   const Tensor matrix = ForProduct(product_, weight.dim() > 2 ? weight.flatten(1) : weight);
   const Tensor addend = ForProduct(product_, bias);
-  if (CanUseKernels(x) && matrix.scalar_type() == at::kFloat && x.numel() >= kManyRows * x.size(-1))
+  if (IsFloatsInARow(x) && matrix.scalar_type() == at::kFloat && x.numel() >= kManyRows * x.size(-1))
     return AsConvolution(x, matrix, addend);
   return at::linear(InTypeOf(matrix, x), matrix, addend).to(x.scalar_type());
 }

@@ -1,7 +1,11 @@
 #include "worldmodel/train/muon.h"
 
 #include <algorithm>
+#include <atomic>
 #include <cmath>
+#include <future>
+
+#include "worldmodel/nn/threads.h"
 
 namespace evac::train {
 namespace {
@@ -54,7 +58,7 @@ Tensor Orthogonalised(const Tensor& matrix) {
 }
 
 void StepMuon(const AdamWState& state, const std::vector<MatrixPlace>& matrices, double momentum,
-              const AdamWOptions& options, const AdamWStep& step) {
+              const AdamWOptions& options, const AdamWStep& step, std::size_t workers) {
   const at::NoGradGuard no_gradients;
   std::int64_t from = 0;
   const auto others_until = [&](std::int64_t until) {
@@ -62,10 +66,25 @@ void StepMuon(const AdamWState& state, const std::vector<MatrixPlace>& matrices,
   };
   for (const MatrixPlace& place : matrices) {
     others_until(place.from);
-    StepMatrix(Part(state, place.from, place.count()), place, momentum, options, step);
     from = place.from + place.count();
   }
   others_until(state.values.numel());
+
+  std::atomic<std::size_t> next = 0;
+  const auto step_matrices = [&] {
+    for (std::size_t i = next++; i < matrices.size(); i = next++)
+      StepMatrix(Part(state, matrices[i].from, matrices[i].count()), matrices[i], momentum, options, step);
+  };
+  std::vector<std::future<void>> others;
+  for (std::size_t worker = 1; worker < std::min(workers, matrices.size()); ++worker) {
+    others.push_back(std::async(std::launch::async, [&] {
+      const at::NoGradGuard none_here_either;
+      nn::UseLibraryThreadsHere(1);
+      step_matrices();
+    }));
+  }
+  step_matrices();  // if it throws, the futures wait for the others
+  for (std::future<void>& other : others) other.get();
 }
 
 }  // namespace evac::train

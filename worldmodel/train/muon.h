@@ -28,7 +28,8 @@ Tensor Orthogonalised(const Tensor& matrix);
 /// One step: the matrices by Muon (Nesterov's momentum of `momentum`), all else by AdamW, the average of both;
 /// gradients become 0. A matrix's step is .2 √max(rows, columns) times the orthogonalised momentum (Liu et al. 2025):
 /// as long as AdamW's steps are, so that one learning rate and one weight decay serve both.
+/// @param workers  threads that share the matrices, this one among them; changes no number
 void StepMuon(const AdamWState& state, const std::vector<MatrixPlace>& matrices, double momentum,
-              const AdamWOptions& options, const AdamWStep& step);
+              const AdamWOptions& options, const AdamWStep& step, std::size_t workers = 1);
 
 }  // namespace evac::train

@@ -143,7 +143,8 @@ Trainer::StepOutcome Trainer::Step(const TrainerCallbacks& callbacks) {
   const auto n = static_cast<double>(step_);
   StepMuon(state_, matrices_, options_.momentum, options_.adamw,
            {step_, outcome.learning_rate, too_long ? options_.clip_norm / outcome.gradient_norm : 1.0,
-            std::min(options_.average_decay, (1 + n) / (10 + n))});
+            std::min(options_.average_decay, (1 + n) / (10 + n))},
+           replicas_.size() + 1);
   return outcome;
 }
 
