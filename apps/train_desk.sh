@@ -28,7 +28,7 @@ mkdir -p "$out"
 step collect collect "$configs/desk_recipe.yaml" --seed 7 --out "$out/recordings"
 step pack pack "$out/recordings" --config "$model" --out "$out/shards"
 learn codec
-step encode encode "$out/shards" --config "$model" --codec "$codec" --bf16
+step encode encode "$out/shards" --config "$model" --codec "$codec"
 learn judge --codec "$codec"
 learn policy --codec "$codec" --keep-steps 500,1000,2000,4000
 learn world --codec "$codec"
