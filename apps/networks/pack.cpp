@@ -117,7 +117,8 @@ void MeasureMotion(const PackArguments& arguments, Packing& packing) {
   }
   SayLag(lag, packing.clip.pose_map.lag_frames);
   packing.clip.delta_frames = arguments.period_s * kRawFrames_hz;
-  packing.clip.statistics = sums.Statistics("packed", packing.clip.delta_frames);
+  packing.clip.statistics = arguments.statistics.empty() ? sums.Statistics("packed", packing.clip.delta_frames)
+                                                         : ReadActionStatistics(arguments.statistics);
 }
 
 template <typename T>

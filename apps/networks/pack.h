@@ -12,6 +12,7 @@ namespace evac {
 struct PackArguments {
   std::vector<std::filesystem::path> inputs;
   std::filesystem::path out, config;
+  std::filesystem::path statistics;  ///< of the actions, as weights were trained with; empty: of these recordings
   std::vector<std::string> cameras;
   ArmsKind arms = ArmsKind::kAuto;
   double period_s = 0.1;

@@ -1,6 +1,9 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <array>
+#include <cmath>
+#include <cstring>
 #include <limits>
 #include <set>
 
@@ -112,6 +115,35 @@ TEST_F(PackCommand, GivesTheSameBytesForAnyNumberOfJobsAndGoesOnWhereItWasCut) {
   fs::remove(folder_ / "one/shards.json");
   ASSERT_EQ(RunCommand(Words("one", {"--crops", "2"})).exit_code, 0);
   EXPECT_EQ(HashesOf("one"), whole);
+}
+
+TEST_F(PackCommand, NormalisesByTheStatisticsThatWeightsWereTrainedWith) {
+  Add("a", Good());
+  ASSERT_EQ(RunCommand(Words("own")).exit_code, 0);
+  std::string page = ReadFile(folder_ / "own/statistics.yaml");
+  page.replace(page.find("packed"), 6, "theirs");
+  const std::size_t deviation = page.find("deviation: [") + 12;
+  page.replace(deviation, page.find(',', deviation) - deviation, "0.5");  // the left hand's x
+  WriteText(folder_ / "theirs.yaml", page);
+  const CommandResult result = RunCommand(Words("out", {"--statistics", folder_ / "theirs.yaml"}));
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_EQ(ReadFile(folder_ / "out/statistics.yaml"), page);
+  const auto first_step = [&](const std::string& out) {
+    const TensorFile shard = TensorFile::Open(folder_ / out / "shard_00000.safetensors");
+    EXPECT_EQ(shard.metadata().at("statistics"), ReadFile(folder_ / out / "statistics.yaml"));
+    std::array<float, 14> numbers;
+    std::memcpy(numbers.data(), shard.Get("deltas").bytes.data() + sizeof numbers, sizeof numbers);
+    return numbers;
+  };
+  const std::array<float, 14> own = first_step("own"), theirs = first_step("out");
+  EXPECT_NE(theirs[0], own[0]);
+  EXPECT_LT(std::abs(theirs[0]), 0.1) << "centimetres against half a metre";
+  for (std::size_t i = 1; i < 14; ++i) EXPECT_EQ(theirs[i], own[i]) << i;
+
+  WriteText(folder_ / "wrong.yaml", "robot: theirs\nmean: [0]\ndeviation: [1]\n");
+  const CommandResult wrong = RunCommand(Words("wrong", {"--statistics", folder_ / "wrong.yaml"}));
+  EXPECT_EQ(wrong.exit_code, 2);
+  EXPECT_THAT(wrong.err, AllOf(HasSubstr("wrong.yaml"), HasSubstr("mean")));
 }
 
 TEST_F(PackCommand, RefusesAFolderThatHoldsAnotherPacking) {
