@@ -23,7 +23,8 @@ inline void TellOpenBlasTheProcessor() {
 #endif
 }
 
-/// This process becomes the program `name` that lies beside this one, and OpenBLAS there is told the processor. @param arguments  without the program's name
+/// This process becomes the program `name` that lies beside this one, and OpenBLAS there is told the processor.
+/// @param arguments  without the program's name
 /// @throws InternalError if it cannot be started.
 [[noreturn]] inline void BecomeProgramBeside(const std::string& name, std::vector<std::string> arguments) {
   const std::string program = (std::filesystem::read_symlink("/proc/self/exe").parent_path() / name).string();
