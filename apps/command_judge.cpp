@@ -3,9 +3,10 @@
 #include <memory>
 
 #include "apps/commands.h"
+#include "apps/interrupts.h"
+#include "apps/judge_with_progress.h"
 #include "apps/judge_with_vlm.h"
 #include "apps/network_parts.h"
-#include "judges/judge_episodes.h"
 #include "judges/oracle_judge.h"
 
 namespace evac {
@@ -47,7 +48,8 @@ ExitCode Rate(const JudgeArguments& arguments) {
   if (arguments.judge == "classifier") NeedNetworks();
   Store store = Store::Open(arguments.run, Store::Mode::kReadWrite);
   const std::unique_ptr<Judge> judge = MakeJudge(arguments, store);
-  fmt::print("{}: {}\n", judge->Name(), Sentence(JudgeEpisodes(*judge, store, {.again = arguments.again})));
+  const CatchInterrupts catch_interrupts;
+  fmt::print("{}: {}\n", judge->Name(), Sentence(JudgeWithProgress(*judge, store, arguments.again)));
   return ExitCode::kOk;
 }
 

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <string_view>
+#include <vector>
 
 #include "core/error.h"
 
@@ -36,6 +37,24 @@ bool HasVerdict(const std::map<std::string, std::map<std::string, Verdict>>& cur
   return found != current.end() && found->second.contains(judge);
 }
 
+/// In their order; the summary counts the others.
+std::vector<Episode> ToBeAskedAbout(const Store& store, const std::string& judge, const JudgeOptions& options,
+                                    JudgeSummary& summary) {
+  const auto current = store.CurrentVerdicts();
+  std::vector<Episode> asked;
+  for (Episode& episode : store.Episodes()) {
+    if (!options.wanted(episode)) continue;
+    if (IsFailure(episode.stop)) {
+      ++summary.failed;
+    } else if (!options.again && HasVerdict(current, episode.key.Id(), judge)) {
+      ++summary.already;
+    } else {
+      asked.push_back(std::move(episode));
+    }
+  }
+  return asked;
+}
+
 }  // namespace
 
 std::string Sentence(const JudgeSummary& summary) {
@@ -50,25 +69,24 @@ std::string Sentence(const JudgeSummary& summary) {
 JudgeSummary JudgeEpisodes(Judge& judge, Store& store, const JudgeOptions& options) {
   std::map<std::string, Task> tasks;
   for (Task& task : store.Tasks()) tasks.emplace(task.id, std::move(task));
-  const auto current = store.CurrentVerdicts();
   JudgeSummary summary;
-  for (Episode& episode : store.Episodes()) {
+  std::vector<Episode> asked = ToBeAskedAbout(store, judge.Name(), options, summary);
+  const int total = static_cast<int>(asked.size());
+  int done = 0;
+  if (total > 0) options.on_asked(done, total);
+  for (Episode& episode : asked) {
     if (summary.why_over.empty() && options.interrupted()) summary.why_over = "interrupted";
     if (!summary.why_over.empty()) break;
-    if (!options.wanted(episode)) continue;
-    if (IsFailure(episode.stop)) {
-      ++summary.failed;
-    } else if (!options.again && HasVerdict(current, episode.key.Id(), judge.Name())) {
-      ++summary.already;
-    } else {
-      store.LoadSteps(episode);
-      const auto verdict = RateSafely(judge, tasks.at(episode.key.pair.task), episode, summary);
-      if (!verdict) continue;
+    store.LoadSteps(episode);
+    const auto verdict = RateSafely(judge, tasks.at(episode.key.pair.task), episode, summary);
+    episode = {};  // its steps are many
+    if (verdict) {
       store.AddVerdict(*verdict);
       options.on_verdict(*verdict);
       ++summary.rated;
       ++summary.labels[verdict->label];
     }
+    if (summary.why_over.empty()) options.on_asked(++done, total);
   }
   return summary;
 }

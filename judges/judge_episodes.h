@@ -15,6 +15,8 @@ struct JudgeOptions {
     return false;
   };  ///< asked before each episode: the rest is left for another time
   std::function<void(const Verdict&)> on_verdict = [](const Verdict&) {};  ///< after each one stored, for progress
+  /// Once before the first episode the judge is asked about (done 0), then after each, rated or left out.
+  std::function<void(int done, int total)> on_asked = [](int, int) {};
 };
 
 struct JudgeSummary {

@@ -3,12 +3,17 @@
 #include <algorithm>
 #include <opencv2/imgproc.hpp>
 
+#include "apps/interrupts.h"
+#include "apps/judge_with_progress.h"
+#include "apps/work_share.h"
+#include "core/error.h"
 #include "core/file.h"
 #include "core/statistics/confusion.h"
 #include "core/statistics/roc.h"
 #include "core/video.h"
+#include "judges/classifier_clip.h"
 #include "judges/classifier_judge.h"
-#include "judges/judge_episodes.h"
+#include "judges/classifier_net.h"
 #include "policies/visual_things.h"
 
 namespace evac {
@@ -34,14 +39,22 @@ cv::Mat Filled(const cv::Mat& rgb, const cv::Mat& mask) {
   return filled;
 }
 
-/// The same clip with the object painted over.
+cv::Mat WithoutObject(const cv::Mat& frame, const ColourModel& colour) {
+  cv::Mat mask = Cover(frame, colour) > kCovered;
+  cv::dilate(mask, mask, cv::Mat::ones(5, 5, CV_8U));
+  return Filled(frame, mask);
+}
+
+/// A clip of the pictures that the judge would look at, with the object painted over.
 void WriteWithoutObject(const fs::path& from, const ColourModel& colour, const fs::path& to) {
   VideoWriter writer(to, {.period_s = 0.1, .crf = 10, .preset = "veryfast", .scale = 1});
   VideoReader reader(from);
-  for (cv::Mat frame = reader.Next(); !frame.empty(); frame = reader.Next()) {
-    cv::Mat mask = Cover(frame, colour) > kCovered;
-    cv::dilate(mask, mask, cv::Mat::ones(5, 5, CV_8U));
-    writer.Append(Filled(frame, mask));
+  cv::Mat painted;
+  int at = 0;
+  for (const int row : EvenlySpaced(reader.frames(), static_cast<int>(kClassifierFrames))) {
+    for (; at < row; ++at) reader.Skip();
+    if (at == row) painted = WithoutObject(reader.Next(), colour), ++at;
+    writer.Append(painted);
   }
   writer.Finish();
 }
@@ -58,7 +71,7 @@ void FidelityJudge::Rate(Store& store) {
   if (classifier_.empty()) return;
   ClassifierJudge judge(classifier_, store.folder());
   judge.CheckKnows(store.Tasks());
-  JudgeEpisodes(judge, store, {});
+  JudgeWithProgress(judge, store, false);
   name_ = judge.Name();
 }
 
@@ -79,8 +92,12 @@ JudgeQualityOnReal FidelityJudge::QualityOn(const Store& store, const std::strin
              : truth ? confusion.only_human_success : confusion.both_failure);
   };
   MakeFolders(scratch);
-  for (Episode& episode : store.Episodes()) {
-    if (episode.key.world != world || IsFailure(episode.stop)) continue;
+  std::vector<Episode> episodes = store.Episodes();
+  std::erase_if(episodes, [&](const Episode& episode) { return episode.key.world != world || IsFailure(episode.stop); });
+  CountProgress progress("clips judged without their object", static_cast<std::int64_t>(episodes.size()), 0);
+  for (Episode& episode : episodes) {
+    if (IsInterrupted()) throw InternalError("interrupted; the same command goes on");
+    progress.Count();
     const auto& of_episode = verdicts.at(episode.key.Id());
     const auto truth = OutcomeOf(of_episode.at("oracle").label);
     const Verdict& said = of_episode.at(name_);

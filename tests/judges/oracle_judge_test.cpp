@@ -189,6 +189,26 @@ TEST_F(OracleJudgeTest, EveryEpisodeIsRatedOnceAndFailedOnesNever) {
   EXPECT_EQ(store_.Verdicts().size(), 4u) << "verdicts are only ever added";
 }
 
+TEST_F(OracleJudgeTest, SaysOfHowManyEpisodesItWasAsked) {
+  const PrivilegedTrack still = TrackMaker().Frame({0, 0, 0}).Repeat(3).track();
+  Add(LiftTask(), still);
+  Add(LiftTask(), still);
+  Add(LiftTask(), still, StopReason::kPolicyTimeout);
+  OracleJudge oracle(store_);
+  std::vector<std::pair<int, int>> said;
+  JudgeOptions options{.on_asked = [&](int done, int total) { said.emplace_back(done, total); }};
+  options.interrupted = [&] { return said.size() == 2; };
+  EXPECT_EQ(JudgeEpisodes(oracle, store_, options).why_over, "interrupted");
+  EXPECT_THAT(said, testing::ElementsAre(std::pair(0, 2), std::pair(1, 2)));
+  options.interrupted = [] { return false; };
+  said.clear();
+  EXPECT_EQ(JudgeEpisodes(oracle, store_, options).rated, 1);
+  EXPECT_THAT(said, testing::ElementsAre(std::pair(0, 1), std::pair(1, 1))) << "what has a verdict is not asked about";
+  said.clear();
+  JudgeEpisodes(oracle, store_, options);
+  EXPECT_TRUE(said.empty()) << "nothing to say where nothing is asked";
+}
+
 TEST_F(OracleJudgeTest, AJudgeThatThrowsGivesInvalidVerdicts) {
   class Broken : public Judge {
    public:

@@ -114,6 +114,20 @@ TEST_F(FidelityRun, AsksEveryPartAndEndsInTheSameNumbersWhenItWasKilled) {
   EXPECT_EQ(ReadFile(again / "episodes.csv"), ReadFile(whole / "episodes.csv"));
 }
 
+TEST_F(FidelityRun, AClassifierJudgesTheClipsAndSaysHowFarItIs) {
+  std::vector<std::string> words = Words(folder_ / "out");
+  words.insert(words.end(), {"--parts", "closed", "--classifier", EVAC_SOURCE_DIR "/worldmodel/weights/desk/judge.safetensors"});
+  const CommandResult result = RunCommand(words);
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_THAT(result.err, HasSubstr("3 of 3 episodes judged")) << "real, unfilmed (left out), imagined";
+  EXPECT_THAT(result.err, HasSubstr("1 of 1 clips judged without their object"));
+  std::istringstream rows(ReadFile(folder_ / "out" / "episodes.csv"));
+  std::string head, row;
+  std::getline(rows, head) && std::getline(rows, row);
+  EXPECT_THAT(row, testing::StartsWith("closed_loop,take_bottle,visual_pick,good,3-0000,1,1,1,"));
+  EXPECT_FALSE(fs::exists(folder_ / "out" / "masked")) << "painted clips are not kept";
+}
+
 TEST_F(FidelityRun, TakesOverNoOtherReality) {
   const fs::path earlier = folder_ / "earlier";
   fs::create_directories(earlier);

@@ -1,0 +1,12 @@
+#pragma once
+
+#include "judges/judge_episodes.h"
+
+namespace evac {
+
+/// JudgeEpisodes, which says every few seconds on stderr how far it is. Ends in order when IsInterrupted.
+/// @param again  rate also what has a verdict by this judge
+/// @throws Error where JudgeEpisodes does; InternalError if it ended early: what was judged is stored
+JudgeSummary JudgeWithProgress(Judge& judge, Store& store, bool again);
+
+}  // namespace evac
