@@ -32,7 +32,7 @@ def rows(answers):
     like_reality = lambda key, more: lambda answer: None if at(answer, key + "_real_real") is None else at(answer, key + "_real_real") + more
     yield "cells", lambda a: len(a["cells"]), fixed(24), ">="
     yield "of a real rate of .20 to .80", lambda a: real_rates_between(a, .2, .8), fixed(12), ">="
-    yield "fewest pairs of a cell", lambda a: min((cell["n"] for cell in a["cells"]), default=None), fixed(40), ">="
+    yield "fewest pairs of a cell that the judge could tell", lambda a: min((cell["n"] for cell in a["cells"]), default=None), fixed(None), ">="
     yield "agreement, real and real", lambda a: at(a, "agreement_real_real"), fixed(.9), ">="
     yield "Pearson", lambda a: at(a, "pearson"), fixed(.95), ">="
     yield "its lower 95 % bound", lambda a: at(a, "pearson_low"), fixed(.85), ">="
@@ -48,6 +48,10 @@ def rows(answers):
         yield f"counterfactual: {kind.replace('_', ' ')}", of_kind, fixed(.05), "<="
     yield "30 chunks: least gain over the copy, dB", lambda a: least_gain_db(at(a, "horizon")), fixed(2), ">="
     yield "seconds per chunk", lambda a: at(a, "seconds_per_chunk"), fixed(.3), "<="
+    yield "judge on real clips: AUROC", lambda a: at(a, "judge", "auroc"), fixed(.98), ">="
+    yield "its kappa", lambda a: at(a, "judge", "kappa"), fixed(.85), ">="
+    yield "its kappa with the object painted over", lambda a: at(a, "judge", "kappa_masked"), fixed(None), "<="
+    yield "its ECE", lambda a: at(a, "judge", "ece"), fixed(.05), "<="
 
 
 def shown(value):
