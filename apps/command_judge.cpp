@@ -49,7 +49,7 @@ ExitCode Rate(const JudgeArguments& arguments) {
   Store store = Store::Open(arguments.run, Store::Mode::kReadWrite);
   const std::unique_ptr<Judge> judge = MakeJudge(arguments, store);
   const CatchInterrupts catch_interrupts;
-  fmt::print("{}: {}\n", judge->Name(), Sentence(JudgeWithProgress(*judge, store, arguments.again)));
+  fmt::print("{}: {}\n", judge->Name(), Sentence(JudgeWithProgress(*judge, store, {.again = arguments.again})));
   return ExitCode::kOk;
 }
 

@@ -3,10 +3,7 @@
 #include <algorithm>
 #include <opencv2/imgproc.hpp>
 
-#include "apps/interrupts.h"
 #include "apps/judge_with_progress.h"
-#include "apps/work_share.h"
-#include "core/error.h"
 #include "core/file.h"
 #include "core/statistics/confusion.h"
 #include "core/statistics/roc.h"
@@ -59,6 +56,31 @@ void WriteWithoutObject(const fs::path& from, const ColourModel& colour, const f
   writer.Finish();
 }
 
+/// The classifier, shown clips with the object painted over. Its verdicts are stored as a judge's of their own, as those
+/// of every probe: "NAME:masked".
+class MaskedClassifier : public Judge {
+ public:
+  /// @param run      the folder of the clips
+  /// @param scratch  a folder for one painted clip
+  MaskedClassifier(const std::string& weights, fs::path run, const fs::path& scratch)
+      : judge_(weights, scratch), run_(std::move(run)), painted_(scratch / "clip.mp4") {}
+
+  std::string Name() const override { return judge_.Name() + ":masked"; }
+
+  Verdict Rate(const Task& task, const Episode& episode) override {
+    WriteWithoutObject(run_ / episode.video, KnowledgeOf(task.id).thing.colour, painted_);
+    Episode masked = episode;
+    masked.video = painted_.filename();
+    Verdict verdict = judge_.Rate(task, masked);
+    verdict.judge = Name();
+    return verdict;
+  }
+
+ private:
+  ClassifierJudge judge_;
+  fs::path run_, painted_;
+};
+
 std::optional<bool> OutcomeOf(Label label) {
   if (label == Label::kSuccess) return true;
   if (label == Label::kFailure) return false;
@@ -71,18 +93,24 @@ void FidelityJudge::Rate(Store& store) {
   if (classifier_.empty()) return;
   ClassifierJudge judge(classifier_, store.folder());
   judge.CheckKnows(store.Tasks());
-  JudgeWithProgress(judge, store, false);
+  JudgeWithProgress(judge, store, {});
   name_ = judge.Name();
 }
 
-JudgeQualityOnReal FidelityJudge::QualityOn(const Store& store, const std::string& world, const fs::path& scratch) {
+JudgeQualityOnReal FidelityJudge::QualityOn(Store& store, const std::string& world, const fs::path& scratch) {
   JudgeQualityOnReal quality;
   quality.name = name_;
   if (name_.empty()) return quality;
-  ClassifierJudge judge(classifier_, scratch);
-  std::map<std::string, Task> tasks;
-  for (const Task& task : store.Tasks()) tasks[task.id] = task;
-  const auto verdicts = store.CurrentVerdicts();
+  MakeFolders(scratch);
+  MaskedClassifier masked_judge(classifier_, store.folder(), scratch);
+  const auto told = store.CurrentVerdicts();
+  const auto is_told = [&](const Episode& episode) {  // what it cannot be asked about whole (too long) is not asked about
+    return episode.key.world == world && told.contains(episode.key.Id()) && told.at(episode.key.Id()).contains(name_) &&
+           told.at(episode.key.Id()).at(name_).probability.has_value();
+  };
+  JudgeWithProgress(masked_judge, store, {.wanted = is_told});
+  fs::remove_all(scratch);
+
   std::vector<double> probabilities;
   std::vector<int> truths;
   Confusion plain, masked;
@@ -91,27 +119,18 @@ JudgeQualityOnReal FidelityJudge::QualityOn(const Store& store, const std::strin
     ++(*said ? truth ? confusion.both_success : confusion.only_judge_success
              : truth ? confusion.only_human_success : confusion.both_failure);
   };
-  MakeFolders(scratch);
-  std::vector<Episode> episodes = store.Episodes();
-  std::erase_if(episodes, [&](const Episode& episode) { return episode.key.world != world || IsFailure(episode.stop); });
-  CountProgress progress("clips judged without their object", static_cast<std::int64_t>(episodes.size()), 0);
-  for (Episode& episode : episodes) {
-    if (IsInterrupted()) throw InternalError("interrupted; the same command goes on");
-    progress.Count();
+  const auto verdicts = store.CurrentVerdicts();
+  for (const Episode& episode : store.Episodes()) {
+    if (IsFailure(episode.stop) || !is_told(episode)) continue;
     const auto& of_episode = verdicts.at(episode.key.Id());
     const auto truth = OutcomeOf(of_episode.at("oracle").label);
+    if (!truth) continue;
     const Verdict& said = of_episode.at(name_);
-    if (!truth || !said.probability) continue;
     probabilities.push_back(*said.probability);
     truths.push_back(*truth);
     count(OutcomeOf(said.label), *truth, plain);
-    const Task& task = tasks.at(episode.key.pair.task);
-    const fs::path painted = scratch / "clip.mp4";
-    WriteWithoutObject(store.folder() / episode.video, KnowledgeOf(task.id).thing.colour, painted);
-    episode.video = painted.filename();
-    count(OutcomeOf(judge.Rate(task, episode).label), *truth, masked);
+    count(OutcomeOf(of_episode.at(masked_judge.Name()).label), *truth, masked);
   }
-  fs::remove_all(scratch);
   quality.auroc = AreaUnderRoc(probabilities, truths);
   quality.ece = CalibrationOf(probabilities, truths).ece;
   quality.kappa = StatisticsOf(plain).kappa;

@@ -23,9 +23,10 @@ class FidelityJudge {
   /// Empty before it rated anything.
   const std::string& name() const { return name_; }
 
-  /// Against the oracle on the clips of a world; and once more with the object painted over.
+  /// Against the oracle on the clips of a world; and once more with the object painted over, of which the verdicts are
+  /// stored too ("NAME:masked"), so that no clip is painted twice.
   /// @param scratch  a folder for painted clips
-  JudgeQualityOnReal QualityOn(const Store& store, const std::string& world, const std::filesystem::path& scratch);
+  JudgeQualityOnReal QualityOn(Store& store, const std::string& world, const std::filesystem::path& scratch);
 
  private:
   std::string classifier_, name_;
