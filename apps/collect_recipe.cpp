@@ -5,6 +5,7 @@
 #include <numbers>
 #include <set>
 
+#include "apps/network_parts.h"
 #include "core/config.h"
 #include "core/file.h"
 #include "core/geometry.h"
@@ -37,6 +38,7 @@ constexpr PickParameter kPickParameters[] = {{"noise_m", &VisualPickOptions::noi
 constexpr const char* kPickExtras[] = {"miss_m", "miss_deg", "retries"};
 
 bool IsKnown(const std::string& policy, const std::string& name) {
+  if (policy == "learned") return false;
   if (policy == "explorer") return name == "speed";
   const auto is_it = [&](const PickParameter& known) { return name == known.name; };
   return std::any_of(std::begin(kPickParameters), std::end(kPickParameters), is_it) ||
@@ -51,11 +53,13 @@ Behaviour ReadBehaviour(const Config& page) {
   behaviour.does = page.Get<std::string>("does", "");
   behaviour.without_object = page.Get<bool>("without_object", false);
   page.Require(behaviour.share > 0 && std::isfinite(behaviour.share), "share", "a positive number");
-  page.Require(behaviour.policy == "visual_pick" || behaviour.policy == "explorer", "policy",
-               "visual_pick or explorer");
-  page.Require((behaviour.policy == "explorer") == page.Has("does"), "does", "it with policy explorer, and only there");
-  if (page.Has("does")) ExplorationFromName(behaviour.does);
-  static const std::set<std::string> kOwn = {"name", "share", "policy", "does", "without_object"};
+  const bool explores = behaviour.policy == "explorer", learned = behaviour.policy == "learned";
+  page.Require(explores || learned || behaviour.policy == "visual_pick", "policy", "visual_pick, explorer or learned");
+  page.Require(explores == page.Has("does"), "does", "it with policy explorer, and only there");
+  page.Require(learned == page.Has("checkpoint"), "checkpoint", "it with policy learned, and only there");
+  if (explores) ExplorationFromName(behaviour.does);
+  if (learned) behaviour.checkpoint = page.Path("checkpoint");
+  static const std::set<std::string> kOwn = {"name", "share", "policy", "does", "checkpoint", "without_object"};
   for (const std::string& key : page.Keys()) {
     if (kOwn.contains(key)) continue;
     page.Require(IsKnown(behaviour.policy, key), key, "no such field: it is no parameter of " + behaviour.policy);
@@ -110,6 +114,9 @@ std::string HashOf(Config page, const Recipe& recipe) {
     all += Sha256HexOfFile(mujoco.Path("scene"));
     for (const auto& file : mujoco.Get<std::vector<std::string>>("includes", std::vector<std::string>{}))
       all += Sha256HexOfFile(mujoco.Path("scene").parent_path() / file);
+  }
+  for (const Behaviour& behaviour : recipe.mix) {
+    if (!behaviour.checkpoint.empty()) all += Sha256HexOfFile(behaviour.checkpoint);
   }
   return Sha256Hex(all);
 }
@@ -217,6 +224,7 @@ CollectJob JobAt(const Recipe& recipe, std::uint64_t seed, std::int64_t index) {
 std::unique_ptr<Policy> MakePolicy(const CollectJob& job, int chunk_size) {
   if (job.behaviour->policy == "visual_pick")
     return std::make_unique<VisualPick>(PickOptions(job.row.parameters, chunk_size));
+  if (job.behaviour->policy == "learned") return MakeLearnedPolicy(job.behaviour->checkpoint, chunk_size);
   const auto speed = job.row.parameters.find("speed");
   return std::make_unique<Explorer>(ExplorerOptions{ExplorationFromName(job.behaviour->does), chunk_size,
                                                     speed == job.row.parameters.end() ? 1.0 : speed->second});

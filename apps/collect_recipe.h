@@ -18,8 +18,9 @@ namespace evac {
 struct Behaviour {
   std::string name;
   double share = 0;    ///< of all episodes, relative to the other entries' shares
-  std::string policy;  ///< visual_pick, explorer
+  std::string policy;  ///< visual_pick, explorer, learned
   std::string does;    ///< explorer's: push, wrong_object, roam, random
+  std::filesystem::path checkpoint;  ///< learned's weights
   bool without_object = false;  ///< the task's object is taken away
   std::vector<std::pair<std::string, std::pair<double, double>>> parameters;  ///< uniform in [low, high], file's order
 };
@@ -57,7 +58,8 @@ struct CollectJob {
 /// Initial states come from a stream of their own ("collected state"), never from that of a suite ("initial state").
 CollectJob JobAt(const Recipe& recipe, std::uint64_t seed, std::int64_t index);
 
-/// The policy of a job, with its parameters. @throws InvalidInput naming one that is out of its range.
+/// The policy of a job, with its parameters. @throws InvalidInput naming one that is out of its range, or a checkpoint
+/// that is none of a learned policy's.
 std::unique_ptr<Policy> MakePolicy(const CollectJob& job, int chunk_size);
 
 }  // namespace evac

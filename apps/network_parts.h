@@ -4,6 +4,7 @@
 #include <memory>
 
 #include "core/judge.h"
+#include "core/policy.h"
 #include "core/store.h"
 #include "core/world.h"
 #include "harness/suite.h"
@@ -32,6 +33,11 @@ void CheckNetwork(const SuiteEvac& evac);
 
 /// The classifier judge of a run. @throws InvalidInput if the weights are none of its, or do not know the run's tasks.
 std::unique_ptr<Judge> MakeClassifier(const std::filesystem::path& weights, const Store& store);
+
+/// A policy that learned, in this process instead of one of its own. From then on networks that the calling thread asks
+/// use it alone: many threads record at the same time, and how many there are changes no byte.
+/// @throws InvalidInput if the weights are none of its, or a chunk is longer than theirs.
+std::unique_ptr<Policy> MakeLearnedPolicy(const std::filesystem::path& weights, int chunk_size);
 
 /// Pictures as a world model's codec gives them back.
 /// @param weights  of the codec, alone or in a checkpoint

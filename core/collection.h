@@ -18,7 +18,7 @@ struct CollectedEpisode {
   std::string initial_state;  ///< "collect-7-00012": episodes that share it began alike
   std::uint64_t state_seed = 0, world_seed = 0, policy_seed = 0;
   std::string behaviour;                    ///< entry of the recipe's mix
-  std::string policy;                       ///< visual_pick, explorer
+  std::string policy;                       ///< visual_pick, explorer, learned
   std::map<std::string, double> parameters; ///< of the policy, as drawn for this episode
   std::string without;                      ///< the body that was taken away, or empty
   bool success = false;                     ///< by the oracle

@@ -1,6 +1,9 @@
 #include "apps/network_parts.h"
 
+#include <ATen/Parallel.h>
+
 #include "judges/classifier_judge.h"
+#include "policies/learned_policy.h"
 
 namespace evac {
 
@@ -10,6 +13,11 @@ std::unique_ptr<Judge> MakeClassifier(const std::filesystem::path& weights, cons
   auto judge = std::make_unique<ClassifierJudge>(weights, store.folder());
   judge->CheckKnows(store.Tasks());
   return judge;
+}
+
+std::unique_ptr<Policy> MakeLearnedPolicy(const std::filesystem::path& weights, int chunk_size) {
+  at::set_num_threads(1);  // of this thread, which is one of many that record
+  return std::make_unique<LearnedPolicy>(weights, chunk_size);
 }
 
 }  // namespace evac

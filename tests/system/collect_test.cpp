@@ -79,6 +79,27 @@ TEST(CollectCommand, ACollectionIsARecordingTreeThatPacks) {
   EXPECT_EQ(shard.metadata().at("cameras"), "head,hand_right");
 }
 
+/// A mix of one checkpoint, chunks as long as its own.
+std::vector<std::string> Learned(const fs::path& out, const std::string& jobs) {
+  const std::string weights = EVAC_SOURCE_DIR "/worldmodel/weights/desk/policy_004000.safetensors";
+  return Words(out, {"--episodes", "4", "--jobs", jobs, "--set", "chunk_size=16", "--set",
+                     "mix=[{name: on_policy, share: 1, policy: learned, checkpoint: " + weights + "}]"});
+}
+
+TEST(CollectCommand, ALearnedPolicyIsRecordedWithTheSameBytesForAnyNumberOfJobs) {
+  const TempFolder folder;
+  const CommandResult alone = RunCommand(Learned(folder / "alone", "1"));
+  ASSERT_EQ(alone.exit_code, 0) << alone.err;
+  ASSERT_EQ(RunCommand(Learned(folder / "beside", "3")).exit_code, 0);
+  EXPECT_EQ(HashesBelow(folder / "alone"), HashesBelow(folder / "beside"));
+  EXPECT_THAT(ReadFile(folder / "alone/manifest.csv"), HasSubstr("on_policy,learned"));
+  const Recording recording = ReadRecording(folder / "alone/observations/take_bottle/000000", {.read_told = true});
+  ASSERT_EQ(recording.told.size(), 49u);
+  const double moved_m = (recording.told.back()[0].base_from_gripper.translation() -
+                          recording.told.front()[0].base_from_gripper.translation()).norm();
+  EXPECT_GT(moved_m, 0.05);  // it went for the bottle
+}
+
 TEST(CollectCommand, RefusesAFolderThatHoldsAnotherCollection) {
   const TempFolder folder;
   ASSERT_EQ(RunCommand(Words(folder / "a", {"--episodes", "1"})).exit_code, 0);
@@ -131,6 +152,14 @@ TEST(Recipe, AMistakeIsNamedWithItsFieldBeforeAnythingRuns) {
   EXPECT_THAT(error_of("mix.0.policy=oracle"), HasSubstr("policy"));
   EXPECT_THAT(error_of("tasks.0.object=cup"), HasSubstr("cup"));
   EXPECT_THAT(error_of("mix.0.share=0"), HasSubstr("share"));
+  EXPECT_THAT(error_of("mix.0.checkpoint=x.safetensors"), HasSubstr("checkpoint"));
+  EXPECT_THAT(error_of("mix=[{name: a, share: 1, policy: learned}]"), HasSubstr("checkpoint"));
+  const std::string weights = EVAC_SOURCE_DIR "/worldmodel/weights/desk/";
+  const auto with = [&](const std::string& file) {
+    return error_of("mix=[{name: a, share: 1, policy: learned, checkpoint: " + weights + file + "}]");
+  };
+  EXPECT_THAT(with("policy_0.safetensors"), HasSubstr("policy_0.safetensors"));
+  EXPECT_THAT(with("judge.safetensors"), HasSubstr("judge.safetensors"));
 }
 
 }  // namespace
