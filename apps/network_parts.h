@@ -34,8 +34,8 @@ void CheckNetwork(const SuiteEvac& evac);
 /// The classifier judge of a run. @throws InvalidInput if the weights are none of its, or do not know the run's tasks.
 std::unique_ptr<Judge> MakeClassifier(const std::filesystem::path& weights, const Store& store);
 
-/// A policy that learned, in this process instead of one of its own. From then on networks that the calling thread asks
-/// use it alone: many threads record at the same time, and how many there are changes no byte.
+/// A policy that learned, in this process instead of one of its own. From then on each thread of
+/// this process that asks for one works alone: many record at the same time, and how many there are changes no byte.
 /// @throws InvalidInput if the weights are none of its, or a chunk is longer than theirs.
 std::unique_ptr<Policy> MakeLearnedPolicy(const std::filesystem::path& weights, int chunk_size);
 

@@ -9,6 +9,7 @@
 
 #include "apps/commands.h"
 #include "apps/network_parts.h"
+#include "apps/networks/codec_identity.h"
 #include "core/hash.h"
 #include "worldmodel/evac_config.h"
 #include "worldmodel/nn/threads.h"
@@ -35,7 +36,7 @@ ExitCode Encode(const EncodeArguments& arguments) {
   train::CheckpointWeights file(arguments.codec);
   train::TrainableWeights weights(file, arguments.bf16 ? at::kBFloat16 : at::kFloat);
   const nn::Vae vae(nn::Scope(weights, train::kCodecPrefix), config.vae);
-  const std::string codec = Sha256HexOfFile(arguments.codec);
+  const std::string codec = CodecSha256(arguments.codec);
   const std::vector<std::filesystem::path> shards = train::ShardPaths(arguments.shards);
   const nn::LibraryThreads one_each(1);
   std::atomic<std::size_t> next = 0, encoded = 0;

@@ -7,10 +7,10 @@
 #include "apps/commands.h"
 #include "apps/interrupts.h"
 #include "apps/network_parts.h"
+#include "apps/networks/codec_identity.h"
 #include "apps/networks/train_arguments.h"
 #include "apps/networks/training_page.h"
 #include "core/file.h"
-#include "core/hash.h"
 #include "worldmodel/nn/memory.h"
 #include "worldmodel/nn/threads.h"
 #include "worldmodel/train/train_world.h"
@@ -52,7 +52,7 @@ ExitCode RunWorld(const TrainArguments& arguments) {
   ReadTrainingPage(arguments.training, "world", arguments.settings, SettingsOf(options));
   Override(arguments, options.job.trainer);
   const train::WorldStart start{arguments.codec, arguments.init, arguments.init_except, arguments.init_widen,
-                                Sha256HexOfFile(arguments.codec)};
+                                CodecSha256(arguments.codec)};
   const CatchInterrupts catch_interrupts;
   TrainingProgress progress(stderr);
   const train::JobPlace place = PlaceOf(arguments, progress);

@@ -1,9 +1,8 @@
 #include "apps/network_parts.h"
 
-#include <ATen/Parallel.h>
-
 #include "judges/classifier_judge.h"
 #include "policies/learned_policy.h"
+#include "worldmodel/nn/threads.h"
 
 namespace evac {
 
@@ -16,7 +15,8 @@ std::unique_ptr<Judge> MakeClassifier(const std::filesystem::path& weights, cons
 }
 
 std::unique_ptr<Policy> MakeLearnedPolicy(const std::filesystem::path& weights, int chunk_size) {
-  at::set_num_threads(1);  // of this thread, which is one of many that record
+  static const nn::LibraryThreads one_each(1);  // for as long as the process records
+  nn::UseLibraryThreadsHere(1);
   return std::make_unique<LearnedPolicy>(weights, chunk_size);
 }
 

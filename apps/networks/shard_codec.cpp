@@ -1,6 +1,6 @@
 #include "apps/networks/shard_codec.h"
 
-#include "core/hash.h"
+#include "apps/networks/codec_identity.h"
 #include "worldmodel/nn/pictures.h"
 
 namespace evac {
@@ -10,7 +10,7 @@ ShardCodec::ShardCodec(const std::filesystem::path& weights, const nn::VaeConfig
 
 void ShardCodec::Open(train::ShardSet& shards) const {
   shards.OpenLatents(config_.z_channels, config_.Stride());
-  if (shards.codec() != Sha256HexOfFile(path_))
+  if (shards.codec() != CodecSha256(path_))
     throw TensorError(path_.string() + " did not make the shards' latents (they are of codec " + shards.codec() +
                       "): wanted `evac encode` with this codec");
 }

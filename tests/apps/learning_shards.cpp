@@ -3,6 +3,7 @@
 #include <nlohmann/json.hpp>
 #include <string>
 
+#include "apps/networks/codec_identity.h"
 #include "core/file.h"
 #include "core/hash.h"
 #include "core/seed.h"
@@ -155,7 +156,7 @@ std::filesystem::path EncodeLearningShards(const std::filesystem::path& folder, 
   train::CheckpointWeights weights(codec);
   const nn::Vae vae(nn::Scope(weights, train::kCodecPrefix), place.config.vae);
   for (const auto& shard : train::ShardPaths(folder))
-    train::EncodeShard(vae, shard, {Sha256HexOfFile(codec), Sha256HexOfFile(shard)});
+    train::EncodeShard(vae, shard, {CodecSha256(codec), Sha256HexOfFile(shard)});
   return codec;
 }
 

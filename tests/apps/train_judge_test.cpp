@@ -5,6 +5,7 @@
 
 #include <fstream>
 
+#include "apps/networks/codec_identity.h"
 #include "apps/networks/judge_quality.h"
 #include "apps/networks/judge_shard_clips.h"
 #include "apps/networks/learners.h"
@@ -146,7 +147,7 @@ TEST_F(CodedJudgeTest, ItLearnsFromClipsAsTheCodecGivesThemBackAndIsMeasuredOnTh
 
   Train(Place("judge"), Quick(150), &shard_codec);
   const WeightFile file(folder_ / "judge" / "judge.safetensors", "evac-classifier 1");
-  EXPECT_EQ(file.Text("codec"), Sha256HexOfFile(codec_));
+  EXPECT_EQ(file.Text("codec"), CodecSha256(codec_));
   EXPECT_GT(file.Number("kappa"), 0.8);
   EXPECT_GT(file.Number("kappa_reconstructed"), 0.8);
 }
@@ -158,6 +159,25 @@ TEST_F(CodedJudgeTest, LatentsOfAnotherCodecAreRefused) {
   }
   const ShardCodec shard_codec(codec_, config_);
   EXPECT_THAT([&] { Train(Place("judge"), Quick(2), &shard_codec); },
+              ThrowsMessage<TensorError>(HasSubstr("did not make the shards' latents")));
+}
+
+TEST_F(CodedJudgeTest, AFileThatHoldsTheSameCodecAndMoreMadeTheSameLatents) {
+  const TensorFile alone = TensorFile::Open(codec_);
+  std::vector<TensorView> tensors = alone.tensors();
+  const std::vector<std::byte> more(8);
+  tensors.insert(tensors.begin(), TensorView{{"model.more", TensorType::kF32, {2}}, more});
+  const std::filesystem::path whole = folder_ / "whole.safetensors", other = folder_ / "other.safetensors";
+  WriteTensorFile(whole, tensors, {{"a_world", "model's card"}});
+  train::ShardSet shards(folder_ / "shards", train::Split::kTrain);
+  ShardCodec(whole, config_).Open(shards);
+  EXPECT_EQ(CodecSha256(whole), CodecSha256(codec_));
+
+  std::vector<std::byte> last(tensors.back().bytes.begin(), tensors.back().bytes.end());
+  last[0] ^= std::byte{1};
+  tensors.back().bytes = last;
+  WriteTensorFile(other, tensors, {{"a_world", "model's card"}});
+  EXPECT_THAT([&] { ShardCodec(other, config_).Open(shards); },
               ThrowsMessage<TensorError>(HasSubstr("did not make the shards' latents")));
 }
 

@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "apps/networks/codec_identity.h"
 #include "apps/networks/learners.h"
 #include "core/error.h"
 #include "core/hash.h"
@@ -106,7 +107,7 @@ TEST_F(TrainPolicyTest, ItIsShownWhatTheCodecGivesBackAndNoOtherCodecsLatents) {
 
   TrainPolicy(Place("policy"), Quick(2), &codec, {});
   EXPECT_EQ(WeightFile(folder_ / "policy" / "policy.safetensors", kLearnedFormat).Text("codec"),
-            Sha256HexOfFile(weights));
+            CodecSha256(weights));
   for (const auto& shard : train::ShardPaths(folder_ / "shards")) {
     train::CheckpointWeights again(weights);
     train::EncodeShard(nn::Vae(nn::Scope(again, train::kCodecPrefix), LearningCodec()), shard, {"another", "shard"});
