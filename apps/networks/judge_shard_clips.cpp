@@ -7,7 +7,7 @@ at::Tensor Indices(const std::vector<std::int64_t>& rows) { return at::tensor(at
 
 }  // namespace
 
-ShardClips::ShardClips(const std::filesystem::path& shards, train::Split split, const ShardCodec* codec)
+ShardClips::ShardClips(const train::ShardFolders& shards, train::Split split, const ShardCodec* codec)
     : set_(shards, split), codec_(codec) {
   tasks = set_.tasks;
   cameras = set_.cameras;

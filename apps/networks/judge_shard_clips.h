@@ -5,12 +5,12 @@
 
 namespace evac {
 
-/// One split of a packing, all clips whose outcome is known.
+/// One split of some packings, all clips whose outcome is known.
 class ShardClips final : public JudgeClipSource {
  public:
   /// @param codec  whose latents lie beside the shards, or null; outlives this
   /// @throws as PackedSet and ShardCodec::Open
-  ShardClips(const std::filesystem::path& shards, train::Split split, const ShardCodec* codec);
+  ShardClips(const train::ShardFolders& shards, train::Split split, const ShardCodec* codec);
 
   at::Tensor Pictures(const PackedClip& clip, const std::vector<std::int64_t>& rows) const override;
   at::Tensor Objects(const PackedClip& clip, const std::vector<std::int64_t>& rows) const override;

@@ -1,5 +1,6 @@
 #include "apps/networks/packed_clips.h"
 
+#include <map>
 #include <nlohmann/json.hpp>
 #include <sstream>
 
@@ -54,14 +55,19 @@ std::string Joined(const std::vector<std::string>& names) {
   return text;
 }
 
-PackedSet::PackedSet(const std::filesystem::path& folder, train::Split split) : shards(folder, split) {
+PackedSet::PackedSet(const train::ShardFolders& folders, train::Split split) : shards(folders, split) {
   tasks = NamesIn(shards.metadata().at("tasks"));
   cameras = NamesIn(shards.metadata().at("cameras"));
-  const Recordings recordings = ReadRecordings(folder / "shards.json");
+  std::map<std::filesystem::path, Recordings> of_folder;
+  for (const std::filesystem::path& folder : folders) {
+    const std::filesystem::path page = folder / "shards.json";
+    of_folder[page.parent_path()] = ReadRecordings(page);  // as its shards' paths say it, without a last slash
+  }
   std::vector<at::Tensor> ids;
   for (const train::Shard& shard : shards.shards()) ids.push_back(ClipIds(shard.path));
   std::vector<std::int64_t> in_shard(shards.shards().size(), 0);
   for (const train::Clip& clip : shards.clips()) {
+    const Recordings& recordings = of_folder.at(shards.shards()[clip.shard].path.parent_path());
     const std::int64_t recording = ids[clip.shard][in_shard[clip.shard]++].item<std::int64_t>();
     const auto at = static_cast<std::size_t>(recording);
     if (recording < 0 || at >= recordings.states.size() || clip.task < 0 ||

@@ -11,16 +11,16 @@ namespace evac {
 
 /// A clip of a shard with what the packing knows of its recording beside the tensors.
 struct PackedClip : train::Clip {
-  std::int64_t recording = 0;
+  std::int64_t recording = 0;  ///< of its packing
   std::string state;      ///< recordings that began alike share it: what data is split by
   std::string behaviour;  ///< entry of the collection's mix; empty where nobody collected it
   std::string fate;       ///< judges/attempt.h; empty where unknown
 };
 
-/// One split of a packing, the clips in the order of the shards.
+/// One split of some packings, the clips in the order of the shards.
 struct PackedSet {
   /// @throws TensorError as ShardSet; InvalidInput if shards.json lacks what is said of recordings.
-  PackedSet(const std::filesystem::path& folder, train::Split split);
+  PackedSet(const train::ShardFolders& folders, train::Split split);
 
   train::ShardSet shards;
   std::vector<PackedClip> clips;

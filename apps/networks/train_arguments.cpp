@@ -11,7 +11,7 @@
 namespace evac {
 
 void AddShared(CLI::App& command, const std::shared_ptr<TrainArguments>& arguments) {
-  command.add_option("SHARDS", arguments->shards, "a folder of `evac pack` (docs/formats/shards.md)")
+  command.add_option("SHARDS", arguments->shards, "folders of `evac pack` (docs/formats/shards.md); one that is named twice counts twice")
       ->required()
       ->check(CLI::ExistingDirectory);
   AddTraining(command, arguments);
@@ -46,7 +46,7 @@ void Override(const TrainArguments& arguments, train::TrainerOptions& options) {
 
 train::JobPlace PlaceOf(const TrainArguments& arguments, TrainingProgress& progress) {
   const int cores = std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
-  return {arguments.shards,
+  return {train::ShardFolders(arguments.shards.begin(), arguments.shards.end()),
           arguments.out,
           arguments.config.empty() ? nn::ModelConfig{} : ReadEvacConfig(arguments.config),
           arguments.threads > 0 ? arguments.threads : cores,

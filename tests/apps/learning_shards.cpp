@@ -124,7 +124,7 @@ void WriteLearningShards(const std::filesystem::path& folder, const LearningShar
         Draw(options, tensors, clip * options.frames + i,
              static_cast<double>(i) / static_cast<double>(options.frames - 1), y, success);
       states.push_back((holds_out ? "unseen-" : "seen-") + std::to_string(clip / 2));
-      behaviours.push_back("good");
+      behaviours.push_back(options.behaviour);
       fates.push_back(success ? "success" : "near_miss");
     }
     Write(folder / (holds_out ? "shard_00001.safetensors" : "shard_00000.safetensors"), options, tensors, holds_out);
@@ -145,7 +145,7 @@ std::filesystem::path EncodeLearningShards(const std::filesystem::path& folder, 
   options.job.trainer.clip_norm = 1;
   options.codec.batch = 8;
   train::JobPlace place;
-  place.shards = folder;
+  place.shards = {folder};
   place.out = out;
   place.config.vae = LearningCodec();
   place.config.views = 2;

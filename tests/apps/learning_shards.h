@@ -14,6 +14,7 @@ struct LearningShards {
   std::int64_t clips = 24;  ///< of each split, every second a success; two to an initial state
   std::int64_t frames = 20;
   std::int64_t height_px = 16, width_px = 24;
+  const char* behaviour = "good";
 };
 
 /// Writes a training and a hold-out shard and shards.json, as docs/formats/shards.md says.

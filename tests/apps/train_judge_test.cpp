@@ -43,14 +43,14 @@ class TrainJudgeTest : public testing::Test {
   void SetUp() override { WriteLearningShards(folder_ / "shards", {}); }
   train::JobPlace Place(const std::string& out) const {
     train::JobPlace place;
-    place.shards = folder_ / "shards";
+    place.shards = {folder_ / "shards"};
     place.out = folder_ / out;
     return place;
   }
   train::TrainerSummary Train(const train::JobPlace& place, const JudgeTrainingOptions& options,
                               const ShardCodec* codec = nullptr) const {
-    const ShardClips learn(folder_ / "shards", train::Split::kTrain, codec),
-        holdout(folder_ / "shards", train::Split::kHoldout, codec);
+    const ShardClips learn({folder_ / "shards"}, train::Split::kTrain, codec),
+        holdout({folder_ / "shards"}, train::Split::kHoldout, codec);
     return TrainJudge(place, options, {learn, holdout});
   }
   const TempFolder folder_;
@@ -90,7 +90,7 @@ TEST_F(TrainJudgeTest, TrainedForLongerClipsItIsMeasuredOnThem) {
   EXPECT_GT(file.Number("kappa"), 0.8);
   EXPECT_GT(file.Number("kappa_longer"), 0.8);
 
-  const ShardClips set(folder_ / "shards", train::Split::kTrain, nullptr);
+  const ShardClips set({folder_ / "shards"}, train::Split::kTrain, nullptr);
   const Learners<ClassifierNet> learners(ClassifierShape{set.tasks, set.cameras, 16, 24}, 3, 1);
   const auto loss = [&](double longest) {
     JudgeTrainingOptions some = Quick(1);
@@ -135,7 +135,7 @@ class CodedJudgeTest : public TrainJudgeTest {
 
 TEST_F(CodedJudgeTest, ItLearnsFromClipsAsTheCodecGivesThemBackAndIsMeasuredOnThem) {
   const ShardCodec shard_codec(codec_, config_);
-  const ShardClips set(folder_ / "shards", train::Split::kTrain, &shard_codec);
+  const ShardClips set({folder_ / "shards"}, train::Split::kTrain, &shard_codec);
   const PackedClip& clip = set.clips[3];
   const std::vector<std::int64_t> rows = RowsOf(clip);
   const at::Tensor whole = set.Pictures(clip, rows).to(at::kFloat);
@@ -182,7 +182,7 @@ TEST_F(CodedJudgeTest, AFileThatHoldsTheSameCodecAndMoreMadeTheSameLatents) {
 }
 
 TEST_F(TrainJudgeTest, CalibrationSharesNoInitialStateWithLearning) {
-  const ShardClips set(folder_ / "shards", train::Split::kTrain, nullptr);
+  const ShardClips set({folder_ / "shards"}, train::Split::kTrain, nullptr);
   const JudgeSplit split = SplitForJudge(set.clips, Quick(2));
   EXPECT_EQ(split.fit.size() + split.calibration.size(), set.clips.size());
   for (const PackedClip& one : split.fit) {
@@ -191,7 +191,7 @@ TEST_F(TrainJudgeTest, CalibrationSharesNoInitialStateWithLearning) {
 }
 
 TEST_F(TrainJudgeTest, OutcomesOfOneKindAloneAreRefused) {
-  ShardClips set(folder_ / "shards", train::Split::kTrain, nullptr);
+  ShardClips set({folder_ / "shards"}, train::Split::kTrain, nullptr);
   for (PackedClip& clip : set.clips) clip.outcome = 1;
   EXPECT_THAT([&] { SplitForJudge(set.clips, Quick(2)); },
               ThrowsMessage<Error>(HasSubstr("wanted some of both kinds")));

@@ -37,7 +37,7 @@ class TrainPolicyTest : public testing::Test {
   void SetUp() override { WriteLearningShards(folder_ / "shards", {}); }
   train::JobPlace Place(const std::string& out) const {
     train::JobPlace place;
-    place.shards = folder_ / "shards";
+    place.shards = {folder_ / "shards"};
     place.out = folder_ / out;
     return place;
   }
@@ -67,7 +67,7 @@ TEST_F(TrainPolicyTest, InterruptedAndGoneOnWithItEndsInTheSameBytes) {
 }
 
 TEST_F(TrainPolicyTest, OnlySuccessesOfTheWantedBehavioursAreImitated) {
-  const PackedSet set(folder_ / "shards", train::Split::kTrain);
+  const PackedSet set({folder_ / "shards"}, train::Split::kTrain);
   EXPECT_EQ(PolicyTraining(set, Quick(1), nullptr).clips(), set.clips.size() / 2);
   PolicyOptions options = Quick(1);
   options.behaviours = "";
@@ -78,7 +78,7 @@ TEST_F(TrainPolicyTest, OnlySuccessesOfTheWantedBehavioursAreImitated) {
 }
 
 TEST_F(TrainPolicyTest, TheCardKeepsTheCamerasOfTheShards) {
-  const std::vector<Camera> cameras = CamerasOf(PackedSet(folder_ / "shards", train::Split::kTrain));
+  const std::vector<Camera> cameras = CamerasOf(PackedSet({folder_ / "shards"}, train::Split::kTrain));
   ASSERT_EQ(cameras.size(), 2U);
   EXPECT_EQ(cameras[0].mount, Mount::kBase);
   EXPECT_NEAR(cameras[0].mount_from_camera.translation().z(), 1, 1e-6);
@@ -90,7 +90,7 @@ TEST_F(TrainPolicyTest, TheCardKeepsTheCamerasOfTheShards) {
 TEST_F(TrainPolicyTest, ItIsShownWhatTheCodecGivesBackAndNoOtherCodecsLatents) {
   const std::filesystem::path weights = EncodeLearningShards(folder_ / "shards", folder_ / "codec");
   const ShardCodec codec(weights, LearningCodec());
-  PackedSet set(folder_ / "shards", train::Split::kTrain);
+  PackedSet set({folder_ / "shards"}, train::Split::kTrain);
   codec.Open(set.shards);
   const LearnedShape shape{set.tasks, set.cameras, ArmsOf(set), 16, 24};
   const Learners<LearnedNet> learners(shape, 3, 1);
@@ -116,8 +116,19 @@ TEST_F(TrainPolicyTest, ItIsShownWhatTheCodecGivesBackAndNoOtherCodecsLatents) {
               ThrowsMessage<TensorError>(HasSubstr("did not make the shards' latents")));
 }
 
+TEST_F(TrainPolicyTest, EachPackingsClipsAreKnownByItsOwnPage) {
+  const LearningShards pushes{.clips = 8, .behaviour = "push"};
+  WriteLearningShards(folder_ / "pushes", pushes);
+  const PackedSet set({folder_ / "shards", folder_ / "pushes/"}, train::Split::kTrain);
+  ASSERT_EQ(set.clips.size(), 24u + 8u);
+  for (std::size_t i = 0; i < set.clips.size(); ++i) EXPECT_EQ(set.clips[i].behaviour, i < 24 ? "good" : "push") << i;
+  PolicyOptions options = Quick(1);
+  options.behaviours = "push";
+  EXPECT_EQ(PolicyTraining(set, options, nullptr).clips(), 4u);
+}
+
 TEST_F(TrainPolicyTest, ACarriedCameraGoesWithTheToldGripperHoweverLateTheShardsAre) {
-  const PackedSet set(folder_ / "shards", train::Split::kTrain);
+  const PackedSet set({folder_ / "shards"}, train::Split::kTrain);
   const train::Shard& shard = set.shards.shards().front();
   const std::int64_t first = set.clips.front().first, last = set.clips.front().frames - 1;
   const auto right_m = [&](std::int64_t row) {

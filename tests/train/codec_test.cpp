@@ -1,3 +1,4 @@
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include "tests/nn/support.h"
@@ -104,6 +105,22 @@ TEST(ShardSet, RefusesWhatNoTrainingCanRead) {
   const ShardSet shards(folder.path(), Split::kTrain);
   EXPECT_EQ(shards.clips().size(), 6u);
   EXPECT_EQ(shards.frame_count(), 54);
+}
+
+TEST(ShardSet, SeveralPackingsAreOneSetAndOneThatIsNamedTwiceCountsTwice) {
+  const TempFolder folder;
+  const std::filesystem::path a = folder / "a", b = folder / "b", other = folder / "other";
+  WriteSyntheticShards(a, {.clips = 6, .seed = 1});
+  WriteSyntheticShards(b, {.clips = 4, .seed = 2});
+  const ShardSet shards(ShardFolders{a, b, b}, Split::kTrain);
+  EXPECT_EQ(shards.clips().size(), 14u);
+  EXPECT_EQ(shards.clips()[13].shard, 2u);
+  EXPECT_EQ(shards.shards()[2].path.parent_path(), b);
+  EXPECT_EQ(shards.metadata().at("recipe"), "1,2,2") << "a training knows what it is a training on";
+  EXPECT_TRUE(shards.shards()[1].frames.equal(ShardSet(b, Split::kTrain).shards()[0].frames));
+  WriteSyntheticShards(other, {.statistics = "of another robot"});
+  EXPECT_THAT([&] { ShardSet(ShardFolders{a, other}, Split::kTrain); },
+              testing::ThrowsMessage<TensorError>(testing::HasSubstr("statistics differs")));
 }
 
 }  // namespace

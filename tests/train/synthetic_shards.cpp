@@ -100,7 +100,7 @@ void WriteSyntheticShards(const std::filesystem::path& folder, const SyntheticSh
            {"tasks", "follow"},
            {"pose_map", "radius_px=2 thickness_px=1"},
            {"delta_frames", "3"},
-           {"statistics", "synthetic"},
+           {"statistics", options.statistics},
            {"recipe", std::to_string(options.seed)},
            {"shard", std::to_string(index)},
            {"shards", "2"}});

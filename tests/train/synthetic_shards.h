@@ -16,6 +16,7 @@ struct SyntheticShards {
   std::int64_t views = 1;
   std::int64_t height_px = 16, width_px = 24;
   std::uint64_t seed = 1;
+  const char* statistics = "synthetic";
 };
 
 /// Writes shard_00000 (train), shard_00001 (hold-out) and shards.json, as docs/formats/shards.md says.

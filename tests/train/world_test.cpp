@@ -40,7 +40,7 @@ struct Prepared {
     options.job.trainer.steps = 2;
     options.job.trainer.learning_rate = 1e-3;
     options.codec.batch = 4;
-    TrainCodec({folder / "shards", folder / "codec", config}, options);
+    TrainCodec({{folder / "shards"}, folder / "codec", config}, options);
     CheckpointWeights weights(codec());
     const nn::Vae vae(nn::Scope(weights, kCodecPrefix), config.vae);
     for (const auto& shard : ShardPaths(folder / "shards")) EncodeShard(vae, shard, {"codec", "shard"});
@@ -60,7 +60,7 @@ TEST(TrainCodec, GoesOnFromACodecThatIsGiven) {
     options.job.trainer.clip_norm = 1;
     options.codec.batch = 8;
     options.codec.latent_noise = 0.05;
-    TrainCodec({at.folder / "shards", at.folder / out, at.config}, options, init);
+    TrainCodec({{at.folder / "shards"}, at.folder / out, at.config}, options, init);
     return std::stod(CheckpointWeights(at.folder / out / "codec.safetensors").file().metadata().at("psnr"));
   };
   const std::filesystem::path first = at.folder / "first" / "codec.safetensors";
@@ -187,7 +187,7 @@ TEST(TrainWorld, AViewsErrorsCountAsMuchAsItsWeight) {
   for (const char* wrong : {"1,-1", "1,0", "1,x", "1,,1", "1,inf"}) EXPECT_THROW(loss(wrong), TensorError) << wrong;
   WorldOptions three = Quick(1);
   three.view_weights = "1,1,1";
-  EXPECT_THROW(TrainWorld({at.folder / "shards", at.folder / "out", at.config}, three, {.codec = at.codec()}, {}),
+  EXPECT_THROW(TrainWorld({{at.folder / "shards"}, at.folder / "out", at.config}, three, {.codec = at.codec()}, {}),
                TensorError);
 }
 
@@ -230,12 +230,12 @@ TEST(TrainWorld, EndsInTheSameBytesWhenItWasKilledAndItsWeightsImagine) {
   options.job.trainer.average_decay = 0.9;
   options.world.train_action_resampler = true;
   const WorldStart start{at.codec()};
-  const JobPlace whole{at.folder / "shards", at.folder / "whole", at.config};
+  const JobPlace whole{{at.folder / "shards"}, at.folder / "whole", at.config};
   TrainWorld(whole, options, start, {});
   int left = 0;
   for (const int steps : {2, 1, 100}) {
     left = steps;
-    JobPlace killed{at.folder / "shards", at.folder / "killed", at.config};
+    JobPlace killed{{at.folder / "shards"}, at.folder / "killed", at.config};
     killed.interrupted = [&] { return left-- == 0; };
     TrainWorld(killed, options, start, {});
   }
@@ -246,11 +246,11 @@ TEST(TrainWorld, EndsInTheSameBytesWhenItWasKilledAndItsWeightsImagine) {
 
 TEST(TrainWorld, GoesOnFromAnotherModelStrictlyButForWhatIsExcepted) {
   const Prepared at(1);
-  TrainWorld({at.folder / "shards", at.folder / "first", at.config}, Quick(2), {at.codec()}, {});
+  TrainWorld({{at.folder / "shards"}, at.folder / "first", at.config}, Quick(2), {at.codec()}, {});
   WorldStart start{at.codec(), at.folder / "first" / "weights.safetensors"};
   nn::ModelConfig other = at.config;
   other.action_resampler.queries = 5;
-  const JobPlace place{at.folder / "shards", at.folder / "second", other};
+  const JobPlace place{{at.folder / "shards"}, at.folder / "second", other};
   EXPECT_THROW(TrainWorld(place, Quick(1), start, {}), TensorError);
   start.init_except = {"cond_stage_model.latents"};
   EXPECT_EQ(TrainWorld(place, Quick(1), start, {}).why, "done");
@@ -265,7 +265,7 @@ TEST(TrainWorld, GoesOnFromAModelThatWasShownLess) {
     WorldOptions options = Quick(rate > 1e-9 ? 20 : 1);
     options.job.trainer.learning_rate = rate;
     options.job.trainer.holdout_every = options.job.trainer.steps;
-    return TrainWorld({at.folder / "shards", at.folder / out, config}, options, start, {}).best.value();
+    return TrainWorld({{at.folder / "shards"}, at.folder / out, config}, options, start, {}).best.value();
   };
   WorldStart start{at.codec()};
   const double before = end("first", at.config, 3e-3, start);
@@ -284,7 +284,7 @@ TEST(TrainWorld, RefusesLatentsOfAnotherCodec) {
   const Prepared at(1);
   WorldStart start{at.codec()};
   start.codec_sha256 = "another";
-  EXPECT_THROW(TrainWorld({at.folder / "shards", at.folder / "out", at.config}, Quick(1), start, {}), TensorError);
+  EXPECT_THROW(TrainWorld({{at.folder / "shards"}, at.folder / "out", at.config}, Quick(1), start, {}), TensorError);
 }
 
 TEST(TrainWorld, DrawsTruthAboveWhatIsImagined) {
@@ -293,7 +293,7 @@ TEST(TrainWorld, DrawsTruthAboveWhatIsImagined) {
   options.job.trainer.holdout_every = 2;
   options.strip_steps = 2;
   int looked = 0;
-  TrainWorld({at.folder / "shards", at.folder / "out", at.config}, options, {at.codec()},
+  TrainWorld({{at.folder / "shards"}, at.folder / "out", at.config}, options, {at.codec()},
              [&](std::int64_t step, const Strips& strips) {
                ++looked;
                EXPECT_EQ(step, 2);

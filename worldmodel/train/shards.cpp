@@ -5,7 +5,7 @@
 namespace evac::train {
 namespace {
 
-constexpr const char* kCommon[] = {"period_s", "cameras", "arms", "pose_map", "delta_frames", "statistics"};
+constexpr const char* kCommon[] = {"period_s", "tasks", "cameras", "arms", "pose_map", "delta_frames", "statistics"};
 
 std::string Text(const TensorFile& file, const std::string& key) {
   const auto found = file.metadata().find(key);
@@ -81,10 +81,21 @@ std::vector<std::filesystem::path> ShardPaths(const std::filesystem::path& folde
   return paths;
 }
 
-ShardSet::ShardSet(const std::filesystem::path& folder, Split split) {
-  for (const std::filesystem::path& path : ShardPaths(folder)) Add(path, split);
+ShardSet::ShardSet(const ShardFolders& folders, Split split) {
+  std::string recipes, names;
+  const auto append = [](std::string& list, const char* separator, const std::string& one) {
+    if (!list.empty()) list += separator;
+    list += one;
+  };
+  for (const std::filesystem::path& folder : folders) {
+    const std::vector<std::filesystem::path> paths = ShardPaths(folder);
+    for (const std::filesystem::path& path : paths) Add(path, split);
+    append(names, ", ", folder.string());
+    if (!paths.empty()) append(recipes, ",", Text(TensorFile::Open(paths.front()), "recipe"));
+  }
   if (shards_.empty())
-    throw TensorError(folder.string() + " has no shard with split " + (split == Split::kTrain ? "train" : "holdout"));
+    throw TensorError(names + " has no shard with split " + (split == Split::kTrain ? "train" : "holdout"));
+  metadata_["recipe"] = recipes;
 }
 
 void ShardSet::Add(const std::filesystem::path& path, Split split) {
@@ -94,22 +105,22 @@ void ShardSet::Add(const std::filesystem::path& path, Split split) {
   if (Text(file.file(), "split") != (split == Split::kTrain ? "train" : "holdout")) return;
   Shard shard = Read(path, file);
   if (!shards_.empty()) nn::CheckShape(path.string() + ": frames", shard.frames, {-1, views(), height_px(), width_px(), 3});
+  if (shards_.empty()) metadata_ = file.file().metadata();
   CheckSame(path.string(), file.file().metadata());
   for (const Clip& clip : ClipsOf(shard, shards_.size())) clips_.push_back(clip);
   shards_.push_back(std::move(shard));
 }
 
-void ShardSet::CheckSame(const std::string& name, const TensorMetadata& metadata) {
-  if (shards_.empty()) {
-    metadata_ = metadata;
-    return;
-  }
+void ShardSet::CheckSame(const std::string& name, const TensorMetadata& metadata) const {
   for (const char* key : kCommon) {
     const auto found = metadata.find(key);
     const TensorMetadata::const_iterator wanted = metadata_.find(key);
     const bool same = (found == metadata.end()) == (wanted == metadata_.end()) &&
                       (found == metadata.end() || found->second == wanted->second);
-    if (!same) throw TensorError(name + ": " + key + " differs from that of " + shards_.front().path.string());
+    if (same) continue;
+    std::string what = name + ": " + key + " differs from that of " + shards_.front().path.string();
+    if (std::string_view(key) == "statistics") what += ": wanted `evac pack --statistics` with the former's";
+    throw TensorError(what);
   }
 }
 

@@ -37,12 +37,16 @@ struct Shard {
 
 enum class Split { kTrain, kHoldout };
 
+/// What `evac pack` wrote, each packing in a folder of its own. One that is named twice counts twice.
+using ShardFolders = std::vector<std::filesystem::path>;
+
 class ShardSet {
  public:
-  /// @param folder  as `evac pack` writes it
   /// @throws TensorError naming the file and what was found and wanted: packing not done, no shard of this split, a
-  ///   tensor that is missing or misshapen, another version, shards of different pictures, periods or cameras
-  ShardSet(const std::filesystem::path& folder, Split split);
+  ///   tensor that is missing or misshapen, another version, shards of different pictures, periods, tasks, cameras or
+  ///   statistics
+  ShardSet(const ShardFolders& folders, Split split);
+  ShardSet(const std::filesystem::path& folder, Split split) : ShardSet(ShardFolders{folder}, split) {}
 
   /// @param z  latent channels
   /// @param stride  of the codec, pixels
@@ -51,7 +55,8 @@ class ShardSet {
 
   const std::vector<Shard>& shards() const { return shards_; }
   const std::vector<Clip>& clips() const { return clips_; }
-  /// Of all its shards: period_s, cameras, pose_map, delta_frames, statistics, recipe.
+  /// Of all its shards: period_s, tasks, cameras, arms, pose_map, delta_frames, statistics; and recipe, those of the
+  /// folders with commas between them.
   const TensorMetadata& metadata() const { return metadata_; }
   std::int64_t views() const { return shards_.front().frames.size(1); }
   std::int64_t height_px() const { return shards_.front().frames.size(2); }
@@ -62,7 +67,7 @@ class ShardSet {
 
  private:
   void Add(const std::filesystem::path& path, Split split);
-  void CheckSame(const std::string& name, const TensorMetadata& metadata);
+  void CheckSame(const std::string& name, const TensorMetadata& metadata) const;
 
   std::vector<Shard> shards_;
   std::vector<Clip> clips_;

@@ -1,12 +1,13 @@
 #pragma once
 
 #include "worldmodel/train/settings.h"
+#include "worldmodel/train/shards.h"
 
 namespace evac::train {
 
 /// Where a training reads and writes, and who hears of it.
 struct JobPlace {
-  std::filesystem::path shards;  ///< a folder of `evac pack`
+  ShardFolders shards;
   std::filesystem::path out;     ///< see Trainer; and the weights when it ends
   nn::ModelConfig config;
   int threads = 1;  ///< parts of a step (`accumulate`) that are computed side by side, each on one core
