@@ -181,6 +181,22 @@ TEST_F(CodedJudgeTest, AFileThatHoldsTheSameCodecAndMoreMadeTheSameLatents) {
               ThrowsMessage<TensorError>(HasSubstr("did not make the shards' latents")));
 }
 
+TEST_F(CodedJudgeTest, TheSameNumbersInAnotherTypeAreTheSameCodec) {
+  const nn::MappedTensors read(TensorFile::Open(codec_));
+  std::vector<at::Tensor> halves, floats;
+  std::vector<TensorView> of_halves, of_floats;
+  for (const TensorView& tensor : read.file().tensors()) {
+    halves.push_back(read.Get(tensor.name).to(at::kBFloat16));
+    floats.push_back(halves.back().to(at::kFloat));
+    of_halves.push_back(nn::ViewOf(tensor.name, halves.back()));
+    of_floats.push_back(nn::ViewOf(tensor.name, floats.back()));
+  }
+  WriteTensorFile(folder_ / "halves.safetensors", of_halves, {});
+  WriteTensorFile(folder_ / "floats.safetensors", of_floats, {});
+  EXPECT_EQ(CodecSha256(folder_ / "halves.safetensors"), CodecSha256(folder_ / "floats.safetensors"));
+  EXPECT_NE(CodecSha256(folder_ / "halves.safetensors"), CodecSha256(codec_)) << "rounded";
+}
+
 TEST_F(TrainJudgeTest, CalibrationSharesNoInitialStateWithLearning) {
   const ShardClips set({folder_ / "shards"}, train::Split::kTrain, nullptr);
   const JudgeSplit split = SplitForJudge(set.clips, Quick(2));
