@@ -3,14 +3,14 @@
 # page that says how true it is. Every step goes on where it was killed, and one that is done says so at once.
 #   apps/train_desk.sh EVAC OUT [LAST [CONFIGS]]
 # EVAC: the program. LAST: the step to end after (default: fidelity). CONFIGS: a folder of other pages. The desk's own
-# fidelity page is asked about six development states a cell; its forty reported ones would take as long as the training.
+# fidelity page is asked about four development states a cell; its forty reported ones would take as long as the training.
 # OUT/time.csv gets a line for each start of a step: step, seconds, peak memory of its largest process in KiB, how it
 # ended. A step that was killed together with this script has none.
 set -euo pipefail
 evac=$1 out=$2 last=${3:-fidelity} configs=${4:-$(dirname "${BASH_SOURCE[0]}")/configs}
 model=$configs/desk_model.yaml training=$configs/desk_training.yaml codec=$out/codec/codec.safetensors
 states=()
-if [ $# -lt 4 ]; then states=(--set initial_states.seed=8101 --set initial_states.count=6); fi
+if [ $# -lt 4 ]; then states=(--set initial_states.seed=8101 --set initial_states.count=4); fi
 case $last in
   collect | pack | codec | encode | judge | policy | world | fidelity) ;;
   *) echo "train_desk: the last step is '$last', wanted collect, pack, codec, encode, judge, policy, world or fidelity" >&2; exit 2 ;;
@@ -33,7 +33,7 @@ step pack pack "$out/recordings" --config "$model" --out "$out/shards"
 learn codec
 step encode encode "$out/shards" --config "$model" --codec "$codec"
 learn judge --codec "$codec"
-learn policy --codec "$codec" --keep-steps 500,1000,2000,4000
+learn policy --codec "$codec" --keep-steps 250,500,1000,2000
 learn world --codec "$codec"
 step fidelity fidelity "$configs/fidelity.yaml" --set "worlds.2.weights=$out/world/weights.safetensors" \
   --set "worlds.2.statistics=$out/shards/statistics.yaml" \
