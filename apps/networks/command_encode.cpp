@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <atomic>
+#include <filesystem>
+#include <functional>
 #include <future>
 #include <memory>
 #include <thread>
@@ -10,10 +12,14 @@
 #include "apps/commands.h"
 #include "apps/network_parts.h"
 #include "apps/networks/codec_identity.h"
+#include "core/error.h"
+#include "core/file.h"
 #include "core/hash.h"
 #include "worldmodel/evac_config.h"
 #include "worldmodel/nn/threads.h"
+#include "worldmodel/nn/weights.h"
 #include "worldmodel/train/encode_shards.h"
+#include "worldmodel/train/imagine_shards.h"
 #include "worldmodel/train/trainable_weights.h"
 #include "worldmodel/train/weight_files.h"
 
@@ -21,15 +27,44 @@ namespace evac {
 namespace {
 
 struct EncodeArguments {
-  std::string shards, config, codec;
+  std::string shards, config, codec, imagined;
+  std::int64_t steps = 2;
   int threads = 0;
   bool bf16 = false;
 };
+
+/// Whether a packing has shards of a split.
+bool HasSplit(const std::filesystem::path& folder, train::Split split) {
+  const std::string wanted = split == train::Split::kTrain ? "train" : "holdout";
+  const auto shards = train::ShardPaths(folder);
+  return std::ranges::any_of(shards, [&](const auto& path) {
+    const TensorMetadata metadata = TensorFile::Open(path).metadata();
+    const auto found = metadata.find("split");
+    return found != metadata.end() && found->second == wanted;
+  });
+}
 
 int ThreadsOf(const EncodeArguments& arguments) {
   const auto cores = static_cast<int>(std::thread::hardware_concurrency());
   return arguments.threads > 0 ? arguments.threads : std::max(1, cores);
 }
+
+/// Calls `work` with 0 … count - 1. Each thread takes a shard of its own: threads that share a picture's layers wait for
+/// each other after each of them.
+void ForEachShard(const EncodeArguments& arguments, std::size_t count, const std::function<void(std::size_t)>& work) {
+  const nn::LibraryThreads one_each(1);
+  std::atomic<std::size_t> next = 0;
+  const auto take = [&] {
+    nn::UseLibraryThreadsHere(1);
+    for (std::size_t i = next++; i < count; i = next++) work(i);
+  };
+  std::vector<std::future<void>> others;
+  for (int thread = 1; thread < ThreadsOf(arguments); ++thread) others.push_back(std::async(std::launch::async, take));
+  take();
+  for (std::future<void>& other : others) other.get();
+}
+
+const char* ProductsOf(const EncodeArguments& arguments) { return arguments.bf16 ? "bfloat16" : "float32"; }
 
 ExitCode Encode(const EncodeArguments& arguments) {
   const nn::ModelConfig config = ReadEvacConfig(arguments.config);
@@ -38,24 +73,62 @@ ExitCode Encode(const EncodeArguments& arguments) {
   const nn::Vae vae(nn::Scope(weights, train::kCodecPrefix), config.vae);
   const std::string codec = CodecSha256(arguments.codec);
   const std::vector<std::filesystem::path> shards = train::ShardPaths(arguments.shards);
-  const nn::LibraryThreads one_each(1);
-  std::atomic<std::size_t> next = 0, encoded = 0;
-  // Each thread takes a shard of its own: threads that share a picture's layers wait for each other after each of them.
-  const auto work = [&] {
-    nn::UseLibraryThreadsHere(1);
-    for (std::size_t i = next++; i < shards.size(); i = next++) {
-      const train::EncodeOptions options{codec, Sha256HexOfFile(shards[i]), arguments.bf16 ? "bfloat16" : "float32"};
-      if (train::IsEncoded(shards[i], options)) continue;
-      train::EncodeShard(vae, shards[i], options);
-      fmt::print(stderr, "{}: encoded, {} of {}\n", train::LatentsPath(shards[i]).string(), ++encoded, shards.size());
-    }
-  };
-  std::vector<std::future<void>> others;
-  for (int thread = 1; thread < ThreadsOf(arguments); ++thread)
-    others.push_back(std::async(std::launch::async, work));
-  work();
-  for (std::future<void>& other : others) other.get();
+  std::atomic<std::size_t> encoded = 0;
+  ForEachShard(arguments, shards.size(), [&](std::size_t i) {
+    const train::EncodeOptions options{codec, Sha256HexOfFile(shards[i]), ProductsOf(arguments)};
+    if (train::IsEncoded(shards[i], options)) return;
+    train::EncodeShard(vae, shards[i], options);
+    fmt::print(stderr, "{}: encoded, {} of {}\n", train::LatentsPath(shards[i]).string(), ++encoded, shards.size());
+  });
   fmt::print("{}: latents of {} shards, {} of them new\n", arguments.shards, shards.size(), encoded.load());
+  return ExitCode::kOk;
+}
+
+/// The same file in another folder, without a copy where the disk can.
+void LinkInto(const std::filesystem::path& folder, const std::filesystem::path& file) {
+  const std::filesystem::path to = folder / file.filename();
+  if (std::filesystem::exists(to)) return;
+  std::error_code refused;
+  std::filesystem::create_hard_link(file, to, refused);
+  if (refused) std::filesystem::copy_file(file, to);
+}
+
+/// A packing as SHARDS, whose latents are what a world model imagines of its clips; shards.json comes last.
+ExitCode Imagine(const EncodeArguments& arguments) {
+  const std::filesystem::path from = arguments.shards, to = arguments.imagined;
+  if (std::filesystem::exists(to) && std::filesystem::equivalent(from, to))
+    throw InvalidInput("--imagined {}: wanted another folder than that of the shards", to.string());
+  const nn::ModelConfig config = ReadEvacConfig(arguments.config);
+  nn::LoadOptions options;
+  if (arguments.bf16) options = {.dtype = at::kBFloat16, .products = at::kBFloat16};
+  const nn::EvacModel model = nn::LoadModel(arguments.codec, config, options);
+  const std::string codec = CodecSha256(arguments.codec);
+  const std::string products = fmt::format("{}, imagined by {} in {} steps", ProductsOf(arguments),
+                                           Sha256HexOfFile(arguments.codec), arguments.steps);
+  MakeFolders(to);
+  std::size_t shards = 0;
+  std::atomic<std::size_t> imagined = 0;
+  for (const train::Split split : {train::Split::kTrain, train::Split::kHoldout}) {
+    if (!HasSplit(from, split)) continue;
+    train::ShardSet set(from, split);
+    set.OpenLatents(config.vae.z_channels, config.vae.Stride());
+    if (set.codec() != codec)
+      throw TensorError(arguments.codec + " did not make the shards' latents: wanted `evac encode` with it first");
+    ForEachShard(arguments, set.shards().size(), [&](std::size_t i) {
+      const std::filesystem::path shard = set.shards()[i].path, own = to / shard.filename();
+      LinkInto(to, shard);
+      if (train::IsEncoded(own, {codec, Sha256HexOfFile(shard), products})) return;
+      train::WriteImaginedLatents(model, set, i, to, products, {.steps = arguments.steps});
+      ++imagined;
+      fmt::print(stderr, "{}: imagined, {} of {} of this split\n", train::LatentsPath(own).string(), i + 1,
+                 set.shards().size());
+    });
+    shards += set.shards().size();
+  }
+  for (const char* name : {"statistics.yaml", "packing.json", "left_out.csv", "shards.json"}) {
+    if (std::filesystem::exists(from / name)) LinkInto(to, from / name);
+  }
+  fmt::print("{}: imagined latents of {} shards, {} of them new\n", to.string(), shards, imagined.load());
   return ExitCode::kOk;
 }
 
@@ -72,11 +145,21 @@ void AddEncode(CLI::App& app, ExitCode& exit_code) {
   command->add_option("--threads", arguments->threads, "default: one per core")->check(CLI::Range(1, 1024));
   command->add_flag("--bf16", arguments->bf16,
                     "products in bf16: faster, two to three digits");
+  command->add_option("--imagined", arguments->imagined,
+                      "a folder that becomes the same shards with other latents: what the world model beside the codec "
+                      "imagines of each recording, told what was told, from its first picture on");
+  command->add_option("--steps", arguments->steps, "with --imagined: calls of the network per chunk")
+      ->check(CLI::Range(1, 1000))
+      ->capture_default_str();
   command->footer(
       "Example:\n"
       "  evac encode out/shards --config apps/configs/desk_model.yaml --codec out/codec/codec.safetensors\n"
+      "  evac encode out/shards --config apps/configs/desk_model.yaml --codec out/world/weights.safetensors --imagined "
+      "out/imagined\n"
       "Latents that are there, of this codec and these shards, are not made again.");
-  command->callback([arguments, &exit_code] { exit_code = Encode(*arguments); });
+  command->callback([arguments, &exit_code] {
+    exit_code = arguments->imagined.empty() ? Encode(*arguments) : Imagine(*arguments);
+  });
 }
 
 }  // namespace evac

@@ -1,3 +1,5 @@
+#include <fmt/format.h>
+
 #include <memory>
 #include <optional>
 
@@ -46,13 +48,35 @@ void AddCodec(CLI::App& command, const std::shared_ptr<TrainArguments>& argument
   codec->check(CLI::ExistingFile)->needs(AddConfig(command, arguments));
 }
 
+/// Clips of the shards, for a judge that is trained or calibrated.
+struct ShardJudgeData {
+  ShardJudgeData(const TrainArguments& arguments, const train::JobPlace& place)
+      : codec(CodecOf(arguments, place)),
+        learn(place.shards, train::Split::kTrain, codec ? &*codec : nullptr),
+        holdout(place.shards, train::Split::kHoldout, codec ? &*codec : nullptr),
+        data{learn, holdout, arguments.init} {}
+
+  std::optional<ShardCodec> codec;
+  ShardClips learn, holdout;
+  JudgeData data;
+};
+
+ExitCode CalibrateOnly(const TrainArguments& arguments) {
+  JudgeTrainingOptions options;
+  ReadTrainingPage(arguments.training, "judge", arguments.settings, SettingsOf(options));
+  TrainingProgress progress(stderr);
+  const train::JobPlace place = PlaceOf(arguments, progress);
+  nn::KeepFreedMemory();
+  CalibrateJudge(place, options, ShardJudgeData(arguments, place).data);
+  fmt::print("{}: calibrated anew\n", (place.out / "judge.safetensors").string());
+  return ExitCode::kOk;
+}
+
 ExitCode RunJudge(const TrainArguments& arguments) {
+  if (arguments.calibrate_only) return CalibrateOnly(arguments);
   return RunLearner<JudgeTrainingOptions>(
       arguments, "judge", [&](const train::JobPlace& place, const JudgeTrainingOptions& options) {
-        const std::optional<ShardCodec> codec = CodecOf(arguments, place);
-        const ShardClips learn(place.shards, train::Split::kTrain, codec ? &*codec : nullptr),
-            holdout(place.shards, train::Split::kHoldout, codec ? &*codec : nullptr);
-        return TrainJudge(place, options, {learn, holdout});
+        return TrainJudge(place, options, ShardJudgeData(arguments, place).data);
       });
 }
 
@@ -87,6 +111,12 @@ void AddTrainJudge(CLI::App& group, ExitCode& exit_code) {
   CLI::App* command = group.add_subcommand("judge", "Train the classifier judge on clips with a known outcome.");
   AddShared(*command, arguments);
   AddCodec(*command, arguments, "clips");
+  CLI::Option* init = command->add_option("--init", arguments->init, "a judge of the same tasks and cameras to go on from");
+  init->check(CLI::ExistingFile);
+  command
+      ->add_flag("--calibrate-only", arguments->calibrate_only,
+                 "nothing is learned: temperature and threshold of --init are chosen anew on these shards")
+      ->needs(init);
   command->footer(
       "Example:\n"
       "  evac train judge out/shards --training apps/configs/desk_training.yaml --config apps/configs/desk_model.yaml "

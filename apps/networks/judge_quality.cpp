@@ -91,7 +91,7 @@ double LogLoss(const std::vector<double>& logits, const JudgeClips& clips) {
   return OrNotANumber(CalibrationOf(Probabilities(logits, {}), Outcomes(clips)).log_loss);
 }
 
-ClassifierCard Calibrate(const std::vector<double>& logits, const JudgeClips& clips, double unsure) {
+ClassifierCard Calibrate(const std::vector<double>& logits, const JudgeClips& clips, double unsure, double caution) {
   const std::vector<int> outcomes = Outcomes(clips);
   ClassifierCard card;
   card.unsure = unsure;
@@ -110,6 +110,10 @@ ClassifierCard Calibrate(const std::vector<double>& logits, const JudgeClips& cl
       best_kappa = KappaAt(probabilities, clips, threshold);
       card.threshold = threshold;
     }
+  }
+  for (double threshold = 0.95; threshold > card.threshold; threshold -= 0.01) {
+    if (caution <= 0 || KappaAt(probabilities, clips, threshold) < best_kappa - caution) continue;
+    card.threshold = threshold;
   }
   return card;
 }

@@ -27,7 +27,9 @@ double LogLoss(const std::vector<double>& logits, const JudgeClips& clips);
 
 /// Temperature (Guo et al. 2017) that makes the likelihood of the outcomes largest, and the threshold with the highest
 /// kappa, of those the one next to .5.
-ClassifierCard Calibrate(const std::vector<double>& logits, const JudgeClips& clips, double unsure);
+/// @param caution  above 0: the highest threshold whose kappa is lower by no more than this. Where kappa hardly tells them
+///   apart, the judge that calls fewer failures successes is the better one.
+ClassifierCard Calibrate(const std::vector<double>& logits, const JudgeClips& clips, double unsure, double caution = 0);
 
 /// Each a number, or not a number where it is undefined.
 struct MeasuredJudge {

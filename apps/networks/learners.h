@@ -2,10 +2,12 @@
 
 #include <deque>
 #include <filesystem>
+#include <memory>
 
 #include "apps/networks/relu_weights.h"
 #include "worldmodel/train/train_codec.h"
 #include "worldmodel/train/trainable_weights.h"
+#include "worldmodel/train/weight_files.h"
 
 namespace evac {
 
@@ -15,9 +17,10 @@ template <class Net>
 class Learners {
  public:
   /// @param shape  what `Net` is made from, beside its parameters
+  /// @param init   weights to begin with, every parameter of which must fit; empty: drawn from the seed
   template <class Shape>
-  Learners(const Shape& shape, std::uint64_t seed, std::int64_t count) {
-    for (std::int64_t i = 0; i < count; ++i) copies_.emplace_back(shape, seed);
+  Learners(const Shape& shape, std::uint64_t seed, std::int64_t count, const std::filesystem::path& init = {}) {
+    for (std::int64_t i = 0; i < count; ++i) copies_.emplace_back(shape, seed, init);
   }
 
   const Net& net() const { return copies_.front().net; }
@@ -43,9 +46,10 @@ class Learners {
  private:
   struct Copy {
     template <class Shape>
-    Copy(const Shape& shape, std::uint64_t seed)
+    Copy(const Shape& shape, std::uint64_t seed, const std::filesystem::path& init)
         : random(seed),
-          weights(random),
+          given(init.empty() ? nullptr : std::make_unique<train::CheckpointWeights>(init)),
+          weights(given ? static_cast<nn::ParameterSource&>(*given) : random),
           net(shape, [this](const std::string& key, const std::vector<std::int64_t>& sizes) {
             return weights.Take(key, sizes);
           }) {}
@@ -53,6 +57,7 @@ class Learners {
     Copy& operator=(const Copy&) = delete;
 
     ReluWeights random;
+    std::unique_ptr<train::CheckpointWeights> given;
     train::TrainableWeights weights;
     Net net;
   };

@@ -22,7 +22,7 @@ struct TrainArguments {
   std::optional<double> minutes;
   std::optional<std::int64_t> steps;
   int threads = 0;
-  bool init_widen = false;
+  bool init_widen = false, calibrate_only = false;
 };
 
 /// Adds what all trainings share: --training, --set, --minutes, --steps, --threads, --out.

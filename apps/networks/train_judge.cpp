@@ -8,6 +8,7 @@
 
 #include "apps/networks/judge_quality.h"
 #include "apps/networks/learners.h"
+#include "core/file.h"
 
 namespace evac {
 namespace {
@@ -45,7 +46,7 @@ ClassifierCard CardOf(const ClassifierNet& net, const JudgeClipSource& learn, co
     logits.insert(logits.end(), some.begin(), some.end());
     clips.insert(clips.end(), calibration.begin(), calibration.end());
   }
-  return Calibrate(logits, clips, options.unsure);
+  return Calibrate(logits, clips, options.unsure, options.caution);
 }
 
 Judged MeasureAll(const ClassifierNet& net, const JudgeData& data, const JudgeClips& calibration,
@@ -72,6 +73,10 @@ void Say(const train::JobPlace& place, const ClassifierNet& net, const JudgeData
   if (judged.longer) place.say("  as longer clips: " + judged.longer->Line());
   const std::vector<double> logits = Logits(net, data.holdout, data.holdout.clips, {});
   place.say("  failures taken for successes: " + MistakesByFate(logits, data.holdout.clips, judged.card));
+  if (judged.reconstructed) {
+    const std::vector<double> given_back = Logits(net, data.holdout, data.holdout.clips, {.reconstructed = true});
+    place.say("  as the codec gives them back: " + MistakesByFate(given_back, data.holdout.clips, judged.card));
+  }
   if (!(judged.whole.kappa >= kLeastKappa)) {
     place.say(
         fmt::format("warning: it learned too little for its verdicts to be counted: kappa {:.2f}, wanted at least "
@@ -132,12 +137,21 @@ TensorMetadata CardText(const Judged& judged, const JudgeClipSource& learn, cons
 
 }  // namespace
 
+void CalibrateJudge(const train::JobPlace& place, const JudgeTrainingOptions& options, const JudgeData& data) {
+  const ClassifierShape shape{data.learn.tasks, data.learn.cameras, data.learn.height_px, data.learn.width_px};
+  const Learners<ClassifierNet> learners(shape, options.job.trainer.seed, 1, data.init);
+  const Judged judged = MeasureAll(learners.net(), data, data.learn.clips, options);
+  Say(place, learners.net(), data, judged);
+  MakeFolders(place.out);
+  learners.Write(place.out / "judge.safetensors", CardText(judged, data.learn, options, 0));
+}
+
 train::TrainerSummary TrainJudge(const train::JobPlace& place, const JudgeTrainingOptions& given,
                                  const JudgeData& data) {
   JudgeTrainingOptions options = given;
   const JudgeSplit split = SplitForJudge(data.learn.clips, options);
   const ClassifierShape shape{data.learn.tasks, data.learn.cameras, data.learn.height_px, data.learn.width_px};
-  const Learners<ClassifierNet> learners(shape, options.job.trainer.seed, Workers(place, options.job));
+  const Learners<ClassifierNet> learners(shape, options.job.trainer.seed, Workers(place, options.job), data.init);
   const ClassifierNet& net = learners.net();
   const JudgeTraining training(data.learn, split.fit, options);
   options.job.trainer.identity = IdentityOf(SettingsOf(options)) + data.learn.recipe + data.learn.Codec() +

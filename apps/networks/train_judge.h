@@ -9,7 +9,12 @@ namespace evac {
 struct JudgeData {
   const JudgeClipSource& learn;    ///< most of it is learned from, the rest calibrates
   const JudgeClipSource& holdout;  ///< measured on once, at the end
+  std::filesystem::path init = {};  ///< a judge of the same tasks and views to go on from; empty: from nothing
 };
+
+/// Writes OUT/judge.safetensors with the weights of `data.init`, not trained on: temperature and threshold are chosen anew on
+/// all of `data.learn`, and what it is worth is measured on the hold-out.
+void CalibrateJudge(const train::JobPlace& place, const JudgeTrainingOptions& options, const JudgeData& data);
 
 /// Trains the classifier judge and writes OUT/judge.safetensors: its weights and its card (docs/classifier_judge.md).
 /// Where the clips have a codec, `reconstructed_share` of them are shown as it gives them back, which is how a world

@@ -3,6 +3,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <cmath>
 #include <fstream>
 
 #include "apps/networks/codec_identity.h"
@@ -48,10 +50,10 @@ class TrainJudgeTest : public testing::Test {
     return place;
   }
   train::TrainerSummary Train(const train::JobPlace& place, const JudgeTrainingOptions& options,
-                              const ShardCodec* codec = nullptr) const {
+                              const ShardCodec* codec = nullptr, const std::filesystem::path& init = {}) const {
     const ShardClips learn({folder_ / "shards"}, train::Split::kTrain, codec),
         holdout({folder_ / "shards"}, train::Split::kHoldout, codec);
-    return TrainJudge(place, options, {learn, holdout});
+    return TrainJudge(place, options, {learn, holdout, init});
   }
   const TempFolder folder_;
 };
@@ -69,6 +71,20 @@ TEST_F(TrainJudgeTest, ATinyClassifierTellsClipsApartThatItHasNotSeen) {
   EXPECT_EQ(file.Text("tasks"), "carry");
   EXPECT_EQ(file.Text("recipe"), "carry");
   EXPECT_NO_THROW(ClassifierJudge(folder_ / "judge" / "judge.safetensors", folder_.path()));
+}
+
+TEST_F(TrainJudgeTest, GoesOnFromAJudgeThatIsGiven) {
+  Train(Place("first"), Quick(150));
+  const std::filesystem::path first = folder_ / "first" / "judge.safetensors";
+  JudgeTrainingOptions still = Quick(2);
+  still.job.trainer.learning_rate = 1e-9;
+  const auto kappa = [&](const char* out) {
+    return WeightFile(folder_ / out / "judge.safetensors", "evac-classifier 1").Number("kappa");
+  };
+  Train(Place("second"), still, nullptr, first);
+  EXPECT_NEAR(kappa("second"), kappa("first"), 0.1);
+  Train(Place("fresh"), still);
+  EXPECT_LT(kappa("fresh"), kappa("first") - 0.3) << "two steps teach nothing";
 }
 
 TEST_F(TrainJudgeTest, AClipSeenAsALongerOneStandsStillAtItsEnd) {
@@ -271,6 +287,47 @@ TEST(Calibrate, FindsTheTemperatureThatMadeTheLogitsTooSure) {
   EXPECT_NEAR(card.temperature, 3, 0.4);
   EXPECT_NEAR(card.threshold, 0.5, 0.1);
   EXPECT_LT(Measure(logits, clips, card).ece, 0.06);
+}
+
+TEST(Calibrate, ACautiousJudgeGivesUpALittleKappaForFewerHallucinations) {
+  JudgeClips clips;
+  std::vector<double> logits;
+  for (int i = 0; i < 1000; ++i) {
+    const double honest = (i % 50 - 24.5) / 6;  // log odds
+    clips.emplace_back().outcome = (i / 50 + 0.5) / 20 < 1 / (1 + std::exp(-honest)) ? 1 : 0;
+    logits.push_back(honest);
+  }
+  const ClassifierCard plain = Calibrate(logits, clips, 0), cautious = Calibrate(logits, clips, 0, 0.05);
+  const auto hallucinated = [&](const ClassifierCard& card) {
+    int count = 0;
+    for (std::size_t i = 0; i < clips.size(); ++i)
+      count += clips[i].outcome == 0 && 1 / (1 + std::exp(-logits[i] / card.temperature)) >= card.threshold;
+    return count;
+  };
+  EXPECT_EQ(cautious.temperature, plain.temperature);
+  EXPECT_GT(cautious.threshold, plain.threshold);
+  EXPECT_LT(hallucinated(cautious), hallucinated(plain));
+  EXPECT_GE(Measure(logits, clips, cautious).kappa, Measure(logits, clips, plain).kappa - 0.05);
+  ClassifierCard more = cautious;
+  more.threshold += 0.01;
+  EXPECT_LT(Measure(logits, clips, more).kappa, Measure(logits, clips, plain).kappa - 0.05) << "it is the highest";
+}
+
+TEST_F(TrainJudgeTest, CalibratedAnewItKeepsItsWeights) {
+  Train(Place("first"), Quick(150));
+  const std::filesystem::path first = folder_ / "first" / "judge.safetensors";
+  const ShardClips learn({folder_ / "shards"}, train::Split::kTrain, nullptr),
+      holdout({folder_ / "shards"}, train::Split::kHoldout, nullptr);
+  JudgeTrainingOptions options = Quick(1);
+  options.unsure = 0.03;
+  CalibrateJudge(Place("anew"), options, {learn, holdout, first});
+  const std::filesystem::path anew = folder_ / "anew" / "judge.safetensors";
+  EXPECT_EQ(WeightFile(anew, "evac-classifier 1").Number("unsure"), 0.03);
+  EXPECT_GT(WeightFile(anew, "evac-classifier 1").Number("kappa"), 0.8);
+  const TensorFile before = TensorFile::Open(first), after = TensorFile::Open(anew);
+  ASSERT_EQ(before.tensors().size(), after.tensors().size());
+  for (const TensorView& tensor : before.tensors())
+    EXPECT_TRUE(std::ranges::equal(tensor.bytes, after.Get(tensor.name).bytes)) << tensor.name;
 }
 
 }  // namespace

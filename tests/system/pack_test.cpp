@@ -105,6 +105,38 @@ TEST_F(PackCommand, RealRecordingsAreThinnedToTheClipsPeriodAndKnowNoOutcome) {
   EXPECT_NEAR(second, SyntheticClip::FrameGrey(3), 3) << "every third frame";
 }
 
+TEST_F(PackCommand, ShardsAreImaginedAgainIntoAFolderOfTheirOwn) {
+  for (const char* name : {"a", "b", "c"}) Add(name, Good());
+  ASSERT_EQ(RunCommand(Words("out")).exit_code, 0);
+  const std::string page = folder_ / "tiny.yaml", weights = folder_ / "w.safetensors", shards = folder_ / "out";
+  const CommandResult made = RunCommand({Binary("evac"), "weights", "init", weights, "--config", page});
+  ASSERT_EQ(made.exit_code, 0) << made.err;
+  std::vector<std::string> encode = {Binary("evac"), "encode", shards, "--config", page, "--codec", weights};
+  std::vector<std::string> imagine = encode;
+  imagine.insert(imagine.end(), {"--imagined", folder_ / "imagined"});
+  const CommandResult early = RunCommand(imagine);
+  EXPECT_EQ(early.exit_code, 2);
+  EXPECT_THAT(early.err, HasSubstr("has no latents"));
+  ASSERT_EQ(RunCommand(encode).exit_code, 0);
+  const CommandResult result = RunCommand(imagine);
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_THAT(result.out, HasSubstr("imagined latents of 2 shards, 2 of them new"));
+  EXPECT_THAT(RunCommand(imagine).out, HasSubstr("0 of them new"));
+  const TensorFile truth = TensorFile::Open(folder_ / "out/latents_00000.safetensors"),
+                   imagined = TensorFile::Open(folder_ / "imagined/latents_00000.safetensors");
+  const auto bytes = [](const TensorFile& file, const char* name) {
+    const auto all = file.Get(name).bytes;
+    return std::string(reinterpret_cast<const char*>(all.data()), all.size());
+  };
+  EXPECT_NE(bytes(imagined, "latents"), bytes(truth, "latents"));
+  EXPECT_EQ(bytes(imagined, "map_latents"), bytes(truth, "map_latents"));
+  EXPECT_EQ(imagined.metadata().at("codec"), truth.metadata().at("codec"));
+  EXPECT_THAT(imagined.metadata().at("products"), HasSubstr("imagined by"));
+  EXPECT_EQ(Sha256HexOfFile(folder_ / "imagined/shards.json"), Sha256HexOfFile(folder_ / "out/shards.json"));
+  encode.insert(encode.end(), {"--imagined", shards});
+  EXPECT_EQ(RunCommand(encode).exit_code, 2) << "would be written over";
+}
+
 TEST_F(PackCommand, GivesTheSameBytesForAnyNumberOfJobsAndGoesOnWhereItWasCut) {
   for (const char* name : {"a", "b", "c", "d", "e"}) Add(name, Good());
   ASSERT_EQ(RunCommand(Words("one", {"--jobs", "1", "--crops", "2"})).exit_code, 0);
