@@ -87,7 +87,10 @@ ExitCode Encode(const EncodeArguments& arguments) {
 /// The same file in another folder, without a copy where the disk can.
 void LinkInto(const std::filesystem::path& folder, const std::filesystem::path& file) {
   const std::filesystem::path to = folder / file.filename();
-  if (std::filesystem::exists(to)) return;
+  if (std::filesystem::exists(to)) {
+    if (std::filesystem::equivalent(file, to) || Sha256HexOfFile(file) == Sha256HexOfFile(to)) return;
+    throw InvalidInput("{} is another file than {}: wanted a folder of its own for each packing", to.string(), file.string());
+  }
   std::error_code refused;
   std::filesystem::create_hard_link(file, to, refused);
   if (refused) std::filesystem::copy_file(file, to);
@@ -145,12 +148,14 @@ void AddEncode(CLI::App& app, ExitCode& exit_code) {
   command->add_option("--threads", arguments->threads, "default: one per core")->check(CLI::Range(1, 1024));
   command->add_flag("--bf16", arguments->bf16,
                     "products in bf16: faster, two to three digits");
-  command->add_option("--imagined", arguments->imagined,
-                      "a folder that becomes the same shards with other latents: what the world model beside the codec "
-                      "imagines of each recording, told what was told, from its first picture on");
+  CLI::Option* imagined = command->add_option(
+      "--imagined", arguments->imagined,
+      "a folder that becomes the same shards with other latents: what the world model beside the codec imagines of each "
+      "recording, told what was told, from its first picture on");
   command->add_option("--steps", arguments->steps, "with --imagined: calls of the network per chunk")
       ->check(CLI::Range(1, 1000))
-      ->capture_default_str();
+      ->capture_default_str()
+      ->needs(imagined);
   command->footer(
       "Example:\n"
       "  evac encode out/shards --config apps/configs/desk_model.yaml --codec out/codec/codec.safetensors\n"

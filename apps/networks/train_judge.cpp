@@ -8,7 +8,9 @@
 
 #include "apps/networks/judge_quality.h"
 #include "apps/networks/learners.h"
+#include "core/error.h"
 #include "core/file.h"
+#include "core/weight_file.h"
 
 namespace evac {
 namespace {
@@ -85,9 +87,28 @@ void Say(const train::JobPlace& place, const ClassifierNet& net, const JudgeData
   }
 }
 
-/// Marks of the clips that were learned from or calibrated with.
-std::string MarksOf(const JudgeClipSource& learn) {
+/// What a judge to go on from must be, or it would be asked about other tasks than it knows.
+void CheckInit(const JudgeData& data) {
+  if (data.init.empty()) return;
+  const WeightFile file(data.init, "evac-classifier 1");
+  const auto check = [&](const char* key, const std::string& wanted) {
+    if (file.Text(key) != wanted)
+      throw InvalidInput("{}: {} is '{}', wanted '{}' as the clips have it", data.init.string(), key, file.Text(key), wanted);
+  };
+  check("tasks", Joined(data.learn.tasks));
+  check("cameras", Joined(data.learn.cameras));
+  check("height_px", std::to_string(data.learn.height_px));
+  check("width_px", std::to_string(data.learn.width_px));
+}
+
+/// Marks of the clips that were learned from or calibrated with, those of the judge it went on from among them.
+std::string MarksOf(const JudgeClipSource& learn, const std::filesystem::path& init) {
   std::vector<std::string> marks;
+  if (!init.empty()) {
+    const TensorFile file = TensorFile::OpenCheckpoint(init);
+    const auto before = file.metadata().find("learned_from");
+    if (before != file.metadata().end()) marks = NamesIn(before->second);
+  }
   for (const PackedClip& clip : learn.clips) {
     if (!learn.Mark(clip).empty()) marks.push_back(learn.Mark(clip));
   }
@@ -96,8 +117,9 @@ std::string MarksOf(const JudgeClipSource& learn) {
   return Joined(marks);
 }
 
-TensorMetadata CardText(const Judged& judged, const JudgeClipSource& learn, const JudgeTrainingOptions& options,
+TensorMetadata CardText(const Judged& judged, const JudgeData& data, const JudgeTrainingOptions& options,
                         std::int64_t steps) {
+  const JudgeClipSource& learn = data.learn;
   const auto number = [](double value) { return fmt::format("{:.6g}", value); };
   TensorMetadata card = {{"format", "evac-classifier 1"},
                          {"tasks", Joined(learn.tasks)},
@@ -118,7 +140,7 @@ TensorMetadata CardText(const Judged& judged, const JudgeClipSource& learn, cons
                          {"kappa_first_view", number(judged.first_view.kappa)},
                          {"licence", "as the project"}};
   if (judged.masked) card["kappa_masked"] = number(judged.masked->kappa);
-  if (const std::string marks = MarksOf(learn); !marks.empty()) card["learned_from"] = marks;
+  if (const std::string marks = MarksOf(learn, data.init); !marks.empty()) card["learned_from"] = marks;
   if (learn.KnowsLengths()) {
     std::int64_t most = 0;
     for (const PackedClip& clip : learn.clips) most = std::max(most, clip.frames);
@@ -138,17 +160,19 @@ TensorMetadata CardText(const Judged& judged, const JudgeClipSource& learn, cons
 }  // namespace
 
 void CalibrateJudge(const train::JobPlace& place, const JudgeTrainingOptions& options, const JudgeData& data) {
+  CheckInit(data);
   const ClassifierShape shape{data.learn.tasks, data.learn.cameras, data.learn.height_px, data.learn.width_px};
   const Learners<ClassifierNet> learners(shape, options.job.trainer.seed, 1, data.init);
   const Judged judged = MeasureAll(learners.net(), data, data.learn.clips, options);
   Say(place, learners.net(), data, judged);
   MakeFolders(place.out);
-  learners.Write(place.out / "judge.safetensors", CardText(judged, data.learn, options, 0));
+  learners.Write(place.out / "judge.safetensors", CardText(judged, data, options, 0));
 }
 
 train::TrainerSummary TrainJudge(const train::JobPlace& place, const JudgeTrainingOptions& given,
                                  const JudgeData& data) {
   JudgeTrainingOptions options = given;
+  CheckInit(data);
   const JudgeSplit split = SplitForJudge(data.learn.clips, options);
   const ClassifierShape shape{data.learn.tasks, data.learn.cameras, data.learn.height_px, data.learn.width_px};
   const Learners<ClassifierNet> learners(shape, options.job.trainer.seed, Workers(place, options.job), data.init);
@@ -174,7 +198,7 @@ train::TrainerSummary TrainJudge(const train::JobPlace& place, const JudgeTraini
   trainer.WithBest([&] {
     const Judged judged = MeasureAll(net, data, split.calibration, options);
     Say(place, net, data, judged);
-    learners.Write(place.out / "judge.safetensors", CardText(judged, data.learn, options, summary.step));
+    learners.Write(place.out / "judge.safetensors", CardText(judged, data, options, summary.step));
   });
   return summary;
 }

@@ -289,6 +289,22 @@ TEST(Calibrate, FindsTheTemperatureThatMadeTheLogitsTooSure) {
   EXPECT_LT(Measure(logits, clips, card).ece, 0.06);
 }
 
+TEST_F(TrainJudgeTest, GoesOnFromAJudgeOfTheSameTasksAloneAndKeepsWhatItLearnedFrom) {
+  Train(Place("first"), Quick(2));
+  const std::filesystem::path first = folder_ / "first" / "judge.safetensors";
+  const auto with = [&](const char* name, const char* key, const char* value) {
+    const TensorFile file = TensorFile::Open(first);
+    TensorMetadata card = file.metadata();
+    card[key] = value;
+    WriteTensorFile(folder_ / name, file.tensors(), card);
+    return folder_ / name;
+  };
+  EXPECT_THAT([&] { Train(Place("other"), Quick(2), nullptr, with("other.safetensors", "tasks", "pour")); },
+              ThrowsMessage<Error>(HasSubstr("tasks is 'pour', wanted 'carry'")));
+  Train(Place("marked"), Quick(2), nullptr, with("marked.safetensors", "learned_from", "0123456789ab"));
+  EXPECT_EQ(WeightFile(folder_ / "marked" / "judge.safetensors", "evac-classifier 1").Text("learned_from"), "0123456789ab");
+}
+
 TEST(Calibrate, ACautiousJudgeGivesUpALittleKappaForFewerHallucinations) {
   JudgeClips clips;
   std::vector<double> logits;
