@@ -122,7 +122,7 @@ void AddTrainJudge(CLI::App& group, ExitCode& exit_code) {
       "  evac train judge out/shards --training apps/configs/desk_training.yaml --config apps/configs/desk_model.yaml "
       "\\\n"
       "                   --codec out/codec/codec.safetensors --out out/judge\n"
-      "OUT: judge.safetensors with its card (docs/classifier_judge.md), metrics.csv, holdout.csv");
+      "OUT: judge.safetensors with its card, metrics.csv, holdout.csv, judged.csv, thresholds.csv (docs/classifier_judge.md)");
   command->callback([arguments, &exit_code] { exit_code = RunJudge(*arguments); });
 }
 
@@ -156,7 +156,7 @@ void AddJudgeTrain(CLI::App& judge, ExitCode& exit_code) {
       "  evac judge train out/mine --truth human:study --training apps/configs/desk_training.yaml --out out/judge\n"
       "  evac judge out/next --judge classifier --weights out/judge/judge.safetensors\n"
       "It does not judge clips that it learned from. OUT: judge.safetensors with its card, metrics.csv, holdout.csv,\n"
-      "curves.svg (docs/classifier_judge.md)");
+      "judged.csv, thresholds.csv, curves.svg (docs/classifier_judge.md)");
   command->callback([arguments, &exit_code] { exit_code = RunJudgeFromLabels(*arguments); });
 }
 

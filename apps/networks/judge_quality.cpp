@@ -16,8 +16,6 @@ namespace {
 constexpr std::size_t kBatch = 32;
 constexpr int kGrey = 128;
 
-double Probability(double logit, const ClassifierCard& card) { return 1 / (1 + std::exp(-logit / card.temperature)); }
-
 /// Covers what lies within the radius of the object's middle. @param pictures  [V, T, H, W, 3] bytes, changed
 /// @param objects  [V, T, 2] pixels; where it is not a number nothing is covered
 void MaskObject(const at::Tensor& objects, double radius, const at::Tensor& pictures) {
@@ -52,7 +50,7 @@ double KappaAt(const std::vector<double>& probabilities, const JudgeClips& clips
 
 std::vector<double> Probabilities(const std::vector<double>& logits, const ClassifierCard& card) {
   std::vector<double> probabilities;
-  for (const double logit : logits) probabilities.push_back(Probability(logit, card));
+  for (const double logit : logits) probabilities.push_back(CalibratedProbability(logit, card));
   return probabilities;
 }
 
@@ -67,7 +65,7 @@ double OrNotANumber(const Number& number) { return number ? *number : std::numer
 }  // namespace
 
 std::vector<double> Logits(const ClassifierNet& net, const JudgeClipSource& source, const JudgeClips& clips,
-                           const JudgeLook& look) {
+                           const JudgeLook& look, const std::function<void()>& on_clip) {
   const at::NoGradGuard no_gradients;
   std::vector<double> logits;
   for (std::size_t begin = 0; begin < clips.size(); begin += kBatch) {
@@ -83,8 +81,13 @@ std::vector<double> Logits(const ClassifierNet& net, const JudgeClipSource& sour
     if (look.first_view_only) seen.present.narrow(1, 1, seen.present.size(1) - 1).zero_();
     const at::Tensor answers = net(seen).logit.to(at::kDouble).contiguous();
     logits.insert(logits.end(), answers.data_ptr<double>(), answers.data_ptr<double>() + answers.numel());
+    for (std::size_t i = 0; on_clip && i < some.size(); ++i) on_clip();
   }
   return logits;
+}
+
+double CalibratedProbability(double logit, const ClassifierCard& card) {
+  return 1 / (1 + std::exp(-logit / card.temperature));
 }
 
 double LogLoss(const std::vector<double>& logits, const JudgeClips& clips) {
@@ -138,7 +141,7 @@ std::string MistakesByFate(const std::vector<double>& logits, const JudgeClips& 
   for (std::size_t i = 0; i < clips.size(); ++i) {
     if (clips[i].outcome == 1) continue;
     auto& [mistaken, all] = fates[clips[i].fate];
-    mistaken += Probability(logits[i], card) >= card.threshold;
+    mistaken += CalibratedProbability(logits[i], card) >= card.threshold;
     ++all;
   }
   std::string text;

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <functional>
 #include <string>
 #include <vector>
 
@@ -19,8 +20,12 @@ struct JudgeLook {
 };
 
 /// The network's logits of success, in the order of the clips.
+/// @param on_clip  called after each, where it is something
 std::vector<double> Logits(const ClassifierNet& net, const JudgeClipSource& source, const JudgeClips& clips,
-                           const JudgeLook& look);
+                           const JudgeLook& look, const std::function<void()>& on_clip = {});
+
+/// As the card's temperature has it.
+double CalibratedProbability(double logit, const ClassifierCard& card);
 
 /// Mean logarithmic loss of uncalibrated logits.
 double LogLoss(const std::vector<double>& logits, const JudgeClips& clips);

@@ -7,7 +7,9 @@
 #include <optional>
 
 #include "apps/networks/judge_quality.h"
+#include "apps/networks/judge_tables.h"
 #include "apps/networks/learners.h"
+#include "apps/work_share.h"
 #include "core/error.h"
 #include "core/file.h"
 #include "core/weight_file.h"
@@ -24,6 +26,7 @@ struct Judged {
   std::optional<MeasuredJudge> masked;         ///< where it is known where the objects are
   std::optional<MeasuredJudge> reconstructed;  ///< where there is a codec
   std::optional<MeasuredJudge> longer;         ///< where it was trained for longer clips than it was shown
+  std::vector<JudgedClips> clips;              ///< at their own length: of calibration and hold-out, in each way of seeing
 };
 
 /// The ways in which clips are seen by turns: plain and as the codec gives them back, where there is one; and both as
@@ -39,45 +42,61 @@ std::vector<JudgeLook> LooksOf(const JudgeClipSource& learn, const JudgeTraining
   return looks;
 }
 
-ClassifierCard CardOf(const ClassifierNet& net, const JudgeClipSource& learn, const JudgeClips& calibration,
-                      const JudgeTrainingOptions& options) {
-  std::vector<double> logits;
-  JudgeClips clips;
-  for (const JudgeLook& look : LooksOf(learn, options)) {
-    const std::vector<double> some = Logits(net, learn, calibration, look);
-    logits.insert(logits.end(), some.begin(), some.end());
-    clips.insert(clips.end(), calibration.begin(), calibration.end());
+/// Shows clips to the network, and how far that is.
+class Asking {
+ public:
+  Asking(const ClassifierNet& net, std::size_t clips) : net_(net), progress_("clips judged", static_cast<std::int64_t>(clips), 0) {}
+  std::vector<double> operator()(const JudgeClipSource& source, const JudgeClips& clips, const JudgeLook& look) {
+    return Logits(net_, source, clips, look, [this] { progress_.Count(); });
   }
-  return Calibrate(logits, clips, options.unsure, options.caution);
-}
+
+ private:
+  const ClassifierNet& net_;
+  CountProgress progress_;
+};
+
+const char* SeenAs(const JudgeLook& look) { return look.reconstructed ? "given back" : "recorded"; }
 
 Judged MeasureAll(const ClassifierNet& net, const JudgeData& data, const JudgeClips& calibration,
                   const JudgeTrainingOptions& options) {
+  const JudgeClips& holdout = data.holdout.clips;
+  const std::vector<JudgeLook> looks = LooksOf(data.learn, options);
+  const bool masks = data.holdout.KnowsObjects(), has_codec = !data.holdout.Codec().empty(), longer = options.longest > 1;
+  const std::size_t of_holdout = 2 + std::size_t{masks} + std::size_t{has_codec} + std::size_t{longer};
+  Asking ask(net, calibration.size() * looks.size() + holdout.size() * of_holdout);
   Judged judged;
-  judged.card = CardOf(net, data.learn, calibration, options);
-  const auto measure = [&](const JudgeLook& look) {
-    return Measure(Logits(net, data.holdout, data.holdout.clips, look), data.holdout.clips, judged.card);
+  std::vector<double> logits;
+  JudgeClips clips;
+  for (const JudgeLook& look : looks) {
+    const std::vector<double> some = ask(data.learn, calibration, look);
+    logits.insert(logits.end(), some.begin(), some.end());
+    clips.insert(clips.end(), calibration.begin(), calibration.end());
+    if (look.longer == 1) judged.clips.push_back({"calibration", SeenAs(look), &calibration, some});
+  }
+  judged.card = Calibrate(logits, clips, options.unsure, options.caution);
+  const auto measure = [&](const JudgeLook& look, bool is_shown) {
+    const std::vector<double> some = ask(data.holdout, holdout, look);
+    if (is_shown) judged.clips.push_back({"hold-out", SeenAs(look), &holdout, some});
+    return Measure(some, holdout, judged.card);
   };
-  judged.whole = measure({});
-  judged.first_view = measure({.first_view_only = true});
-  if (data.holdout.KnowsObjects()) judged.masked = measure({.masks_object = true});
-  if (!data.holdout.Codec().empty()) judged.reconstructed = measure({.reconstructed = true});
-  if (options.longest > 1) judged.longer = measure({.longer = MiddleLength(options)});
+  judged.whole = measure({}, true);
+  judged.first_view = measure({.first_view_only = true}, false);
+  if (masks) judged.masked = measure({.masks_object = true}, false);
+  if (has_codec) judged.reconstructed = measure({.reconstructed = true}, true);
+  if (longer) judged.longer = measure({.longer = MiddleLength(options)}, false);
   return judged;
 }
 
-void Say(const train::JobPlace& place, const ClassifierNet& net, const JudgeData& data, const Judged& judged) {
+void Say(const train::JobPlace& place, const Judged& judged) {
   if (!place.say) return;
   place.say("hold-out: " + judged.whole.Line());
   place.say("  first view alone: " + judged.first_view.Line());
   if (judged.masked) place.say("  object masked: " + judged.masked->Line());
   if (judged.reconstructed) place.say("  as the codec gives the pictures back: " + judged.reconstructed->Line());
   if (judged.longer) place.say("  as longer clips: " + judged.longer->Line());
-  const std::vector<double> logits = Logits(net, data.holdout, data.holdout.clips, {});
-  place.say("  failures taken for successes: " + MistakesByFate(logits, data.holdout.clips, judged.card));
-  if (judged.reconstructed) {
-    const std::vector<double> given_back = Logits(net, data.holdout, data.holdout.clips, {.reconstructed = true});
-    place.say("  as the codec gives them back: " + MistakesByFate(given_back, data.holdout.clips, judged.card));
+  for (const JudgedClips& some : judged.clips) {
+    if (some.part != "hold-out") continue;
+    place.say(fmt::format("  failures taken for successes, {}: {}", some.seen, MistakesByFate(some.logits, *some.clips, judged.card)));
   }
   if (!(judged.whole.kappa >= kLeastKappa)) {
     place.say(
@@ -157,6 +176,15 @@ TensorMetadata CardText(const Judged& judged, const JudgeData& data, const Judge
   return card;
 }
 
+/// Weights and card, and the tables of what they say.
+void Write(const train::JobPlace& place, const Learners<ClassifierNet>& learners, const Judged& judged,
+           const JudgeData& data, const TensorMetadata& card) {
+  MakeFolders(place.out);
+  WriteFileAtomically(place.out / "judged.csv", JudgedCsv(judged.clips, judged.card, data.learn.tasks));
+  WriteFileAtomically(place.out / "thresholds.csv", ThresholdsCsv(judged.clips, judged.card));
+  learners.Write(place.out / "judge.safetensors", card);
+}
+
 }  // namespace
 
 void CalibrateJudge(const train::JobPlace& place, const JudgeTrainingOptions& options, const JudgeData& data) {
@@ -164,9 +192,8 @@ void CalibrateJudge(const train::JobPlace& place, const JudgeTrainingOptions& op
   const ClassifierShape shape{data.learn.tasks, data.learn.cameras, data.learn.height_px, data.learn.width_px};
   const Learners<ClassifierNet> learners(shape, options.job.trainer.seed, 1, data.init);
   const Judged judged = MeasureAll(learners.net(), data, data.learn.clips, options);
-  Say(place, learners.net(), data, judged);
-  MakeFolders(place.out);
-  learners.Write(place.out / "judge.safetensors", CardText(judged, data, options, 0));
+  Say(place, judged);
+  Write(place, learners, judged, data, CardText(judged, data, options, 0));
 }
 
 train::TrainerSummary TrainJudge(const train::JobPlace& place, const JudgeTrainingOptions& given,
@@ -197,8 +224,8 @@ train::TrainerSummary TrainJudge(const train::JobPlace& place, const JudgeTraini
   if (!summary.IsDone()) return summary;
   trainer.WithBest([&] {
     const Judged judged = MeasureAll(net, data, split.calibration, options);
-    Say(place, net, data, judged);
-    learners.Write(place.out / "judge.safetensors", CardText(judged, data, options, summary.step));
+    Say(place, judged);
+    Write(place, learners, judged, data, CardText(judged, data, options, summary.step));
   });
   return summary;
 }

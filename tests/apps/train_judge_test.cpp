@@ -10,6 +10,7 @@
 #include "apps/networks/codec_identity.h"
 #include "apps/networks/judge_quality.h"
 #include "apps/networks/judge_shard_clips.h"
+#include "apps/networks/judge_tables.h"
 #include "apps/networks/learners.h"
 #include "core/error.h"
 #include "core/file.h"
@@ -166,6 +167,13 @@ TEST_F(CodedJudgeTest, ItLearnsFromClipsAsTheCodecGivesThemBackAndIsMeasuredOnTh
   EXPECT_EQ(file.Text("codec"), CodecSha256(codec_));
   EXPECT_GT(file.Number("kappa"), 0.8);
   EXPECT_GT(file.Number("kappa_reconstructed"), 0.8);
+
+  const std::string judged = ReadFile(folder_ / "judge" / "judged.csv");
+  const ShardClips holdout({folder_ / "shards"}, train::Split::kHoldout, &shard_codec);
+  const JudgeSplit split = SplitForJudge(set.clips, Quick(150));
+  EXPECT_EQ(std::ranges::count(judged, '\n'), 1 + 2 * (holdout.clips.size() + split.calibration.size()))
+      << "recorded and given back, none that was learned from";
+  EXPECT_EQ(std::ranges::count(ReadFile(folder_ / "judge" / "thresholds.csv"), '\n'), 1 + 4 * 19);
 }
 
 TEST_F(CodedJudgeTest, LatentsOfAnotherCodecAreRefused) {
@@ -344,6 +352,31 @@ TEST_F(TrainJudgeTest, CalibratedAnewItKeepsItsWeights) {
   ASSERT_EQ(before.tensors().size(), after.tensors().size());
   for (const TensorView& tensor : before.tensors())
     EXPECT_TRUE(std::ranges::equal(tensor.bytes, after.Get(tensor.name).bytes)) << tensor.name;
+}
+
+TEST(JudgeTables, TheCountsAreThoseOfTheThreshold) {
+  JudgeClips clips(4);
+  clips[0].outcome = clips[1].outcome = 1;
+  clips[2].outcome = clips[3].outcome = 0;
+  clips[3].state = "a,b";
+  clips[3].fate = "drop";
+  ClassifierCard card;
+  card.temperature = 2;
+  card.unsure = 0.1;
+  // .881, .269; .731, .119
+  const std::vector<JudgedClips> judged = {{"hold-out", "recorded", &clips, {4, -2, 2, -4}}};
+  const std::string thresholds = ThresholdsCsv(judged, card);
+  EXPECT_EQ(std::ranges::count(thresholds, '\n'), 20) << "a header, .05 to .95";
+  EXPECT_THAT(thresholds, HasSubstr("hold-out,recorded,0.05,2,2,2,0,0.5000\n"));
+  EXPECT_THAT(thresholds, HasSubstr("hold-out,recorded,0.25,2,1,2,0,0.7500\n"));
+  EXPECT_THAT(thresholds, HasSubstr("hold-out,recorded,0.50,2,1,2,1,0.5000\n"));
+  EXPECT_THAT(thresholds, HasSubstr("hold-out,recorded,0.75,2,0,2,1,0.7500\n"));
+  EXPECT_THAT(thresholds, HasSubstr("hold-out,recorded,0.95,2,0,2,2,0.5000\n"));
+  const std::string rows = JudgedCsv(judged, card, {"carry"});
+  EXPECT_THAT(rows, HasSubstr("hold-out,recorded,carry,0,,,,1,0.8808,success\n"));
+  EXPECT_THAT(rows, HasSubstr("hold-out,recorded,carry,0,\"a,b\",,drop,0,0.1192,failure\n"));
+  card.threshold = 0.8;
+  EXPECT_THAT(JudgedCsv(judged, card, {"carry"}), HasSubstr("0.7311,cannot_tell\n"));
 }
 
 }  // namespace

@@ -1,0 +1,51 @@
+#include "apps/networks/judge_tables.h"
+
+#include <fmt/format.h>
+
+#include <array>
+
+#include "apps/networks/judge_quality.h"
+#include "reports/csv.h"
+
+namespace evac {
+namespace {
+
+constexpr int kThresholds = 19, kThresholdsPerOne = 20;
+
+}  // namespace
+
+std::string JudgedCsv(const std::vector<JudgedClips>& judged, const ClassifierCard& card,
+                      const std::vector<std::string>& tasks) {
+  std::string csv = "part,seen,task,recording,state,behaviour,fate,outcome,probability,verdict\n";
+  for (const JudgedClips& some : judged) {
+    for (std::size_t i = 0; i < some.clips->size(); ++i) {
+      const PackedClip& clip = (*some.clips)[i];
+      const double probability = CalibratedProbability(some.logits[i], card);
+      csv += CsvLine({some.part, some.seen, tasks.at(static_cast<std::size_t>(clip.task)), std::to_string(clip.recording),
+                      clip.state, clip.behaviour, clip.fate, std::to_string(clip.outcome), fmt::format("{:.4f}", probability),
+                      Name(LabelOf(probability, card))});
+    }
+  }
+  return csv;
+}
+
+std::string ThresholdsCsv(const std::vector<JudgedClips>& judged, const ClassifierCard& card) {
+  std::string csv = "part,seen,threshold,failures,called_successes,successes,called_failures,agreement\n";
+  for (const JudgedClips& some : judged) {
+    for (int step = 1; step <= kThresholds; ++step) {
+      const double threshold = static_cast<double>(step) / kThresholdsPerOne;
+      std::array<int, 2> all{}, wrong{};  // by outcome
+      for (std::size_t i = 0; i < some.clips->size(); ++i) {
+        const std::size_t outcome = (*some.clips)[i].outcome == 1 ? 1 : 0;
+        ++all[outcome];
+        wrong[outcome] += (CalibratedProbability(some.logits[i], card) >= threshold) != (outcome == 1);
+      }
+      const int clips = all[0] + all[1];
+      csv += fmt::format("{},{},{:.2f},{},{},{},{},{}\n", some.part, some.seen, threshold, all[0], wrong[0], all[1], wrong[1],
+                         clips == 0 ? "" : fmt::format("{:.4f}", 1 - static_cast<double>(wrong[0] + wrong[1]) / clips));
+    }
+  }
+  return csv;
+}
+
+}  // namespace evac
