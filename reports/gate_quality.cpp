@@ -101,6 +101,8 @@ void HoldCorrelation(const GateRule& rule, const RunSummary& run, const GateSide
     bootstrap = PairedStateBootstrap(comparison.by_state, group.options.convention, group.options.bootstrap);
     if (const auto& resampled = Resampled(bootstrap, rule.metric)) {
       held.interval = [&resampled](double c) { return IntervalsOf(resampled->resampled, c).percentile; };
+    } else {
+      held.interval = [reason = resampled.reason()](double) -> Defined<Interval> { return Undefined{reason}; };
     }
   }
   held.value.confidence = 1 - 2 * rule.alpha;

@@ -200,8 +200,23 @@ std::vector<std::string> LeftOut(const nn::FileWeights& source, const WeightsArg
   return left_out;
 }
 
+/// Weights of other sizes than the published ones need their page: a list of keys that do not fit would not say so.
+void DemandPage(const WeightsArguments& arguments) {
+  if (!arguments.config.empty()) return;
+  const nn::KeyFit fit = nn::CompareKeys(TensorFile::OpenCheckpoint(arguments.in), nn::ModelConfig{});
+  if (fit.Fits()) return;
+  throw InvalidInput(
+      "{}: not of the published network's sizes ({} keys missing, {} not its own, {} of another shape; the first: {}); "
+      "wanted --config PAGE with its own sizes",
+      arguments.in, fit.missing.size(), fit.extra.size(), fit.misshapen.size(),
+      !fit.misshapen.empty() ? fit.misshapen[0]
+      : !fit.missing.empty() ? fit.missing[0] + " is missing"
+                             : fit.extra[0] + " is not its own");
+}
+
 ExitCode RunConvert(const WeightsArguments& arguments) {
   DemandNew(arguments.out);
+  DemandPage(arguments);
   nn::FileWeights source(arguments.in, ConfigOf(arguments), {.dtype = kTypes.at(arguments.dtype), .with_unread = true});
   if (!source.report().schedule.empty()) fmt::print(stderr, "{}\n", source.report().schedule);
   nn::SaveOptions options;

@@ -164,6 +164,16 @@ ResampledRates Resample(const std::vector<TaskOutcomes>& outcomes, const Bootstr
   return result;
 }
 
+/// A state drawn again from one is the same state: every replicate would be the estimate, and the interval of no width.
+std::string WhyNotResampled(const std::vector<TaskOutcomes>& tasks) {
+  for (const TaskOutcomes& task : tasks) {
+    if (!task.points.empty() && StatesOf(task) < kMinBootstrapStates)
+      return fmt::format("{} initial state{} of a task, wanted at least {} to draw from", StatesOf(task),
+                         StatesOf(task) == 1 ? "" : "s", kMinBootstrapStates);
+  }
+  return "";
+}
+
 Defined<BootstrapOf> Bootstrap(const ResampledRates& rates, const Statistic& statistic, double confidence) {
   const Number theta = statistic(rates.all);
   if (!theta) return Undefined{theta.reason()};
@@ -191,11 +201,15 @@ RatePairs RatesOf(const std::vector<TaskOutcomes>& tasks) {
 PairedBootstrap PairedStateBootstrap(const std::vector<TaskOutcomes>& tasks, const MmrvConvention& convention,
                                      const BootstrapOptions& options) {
   Check(tasks, options);
+  PairedBootstrap result;
+  result.method = fmt::format("paired state bootstrap, percentile, B={}, seed {}", options.replicates, options.seed);
+  if (const std::string reason = WhyNotResampled(tasks); !reason.empty()) {
+    result.pearson = result.spearman = result.mmrv = Undefined{reason};
+    return result;
+  }
   const ResampledRates rates =
       FitsAByte(tasks) ? Resample<std::uint16_t>(tasks, options) : Resample<std::int64_t>(tasks, options);
   const auto bootstrap = [&](const Statistic& statistic) { return Bootstrap(rates, statistic, options.confidence); };
-  PairedBootstrap result;
-  result.method = fmt::format("paired state bootstrap, percentile, B={}, seed {}", options.replicates, options.seed);
   result.pearson = bootstrap([](const RatePairs& pairs) { return Pearson(pairs.sim, pairs.real).value; });
   result.spearman = bootstrap([](const RatePairs& pairs) { return Spearman(pairs.sim, pairs.real).value; });
   result.mmrv = bootstrap([&](const RatePairs& pairs) { return Mmrv(pairs, convention).mmrv; });

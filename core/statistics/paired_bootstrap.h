@@ -41,10 +41,13 @@ struct PairedBootstrap {
   std::string method;  ///< "paired state bootstrap, percentile, B=2000, seed 0"
 };
 
+/// Fewer states of a task cannot be drawn in another way.
+inline constexpr std::size_t kMinBootstrapStates = 2;
+
 /// Each replicate draws, task after task, as many of the task's initial states as it has, with replacement, and
 /// recomputes the rates of all its policies in both worlds from the same draw. A replicate with a point that has no
 /// trial left, or where the statistic is undefined, is dropped and counted. The jackknife leaves out one state at a
-/// time.
+/// time. Undefined where a task that has points has fewer than kMinBootstrapStates states.
 /// @throws InvalidInput if the points of a task differ in their number of states, or options are out of range.
 PairedBootstrap PairedStateBootstrap(const std::vector<TaskOutcomes>& tasks, const MmrvConvention& convention = {},
                                      const BootstrapOptions& options = {});

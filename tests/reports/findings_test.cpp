@@ -38,6 +38,13 @@ TEST(Findings, AnIntervalThatHoldsZeroIsNotDecided) {
   EXPECT_THAT(finding.answer, HasSubstr("holds 0"));
 }
 
+TEST(Findings, OneInitialStateDoesNotDecideWhetherAWorldFollows) {
+  const Finding finding =
+      FirstOf({{"a", "pick", "1", "s", "s"}, {"a", "pick", "2", "s", "s"}, {"a", "pick", "3", "f", "f"}});
+  EXPECT_EQ(finding.decision, Decision::kNotDecided);
+  EXPECT_THAT(finding.answer, HasSubstr("1 initial state of a task, wanted at least 2"));
+}
+
 TEST(Findings, TooFewPointsAreNotDecidedAndNoNumberIsGiven) {
   const Finding finding = FirstOf({{"a", "pick", "1", "ssf", "ssf"}, {"a", "pick", "2", "fff", "fff"}});
   EXPECT_EQ(finding.decision, Decision::kNotDecided);

@@ -1,7 +1,10 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <filesystem>
+
 #include "tests/support/command.h"
+#include "tests/support/temp_folder.h"
 
 namespace evac {
 namespace {
@@ -42,6 +45,22 @@ TEST(NetworkProgram, IsTheSameProgramToItsUser) {
     EXPECT_EQ(one.err, other.err) << testing::PrintToString(words);
     EXPECT_FALSE(one.out.empty() && one.err.empty());
   }
+}
+
+/// Weights of another size once made a page of keys that do not fit, and no word of the page that was wanted.
+TEST(NetworkProgram, ConvertingWeightsOfAnotherSizeAsksForTheirPage) {
+  const TempFolder folder;
+  const std::string weights = EVAC_SOURCE_DIR "/worldmodel/weights/desk/evac.safetensors";
+  const std::string out = folder / "out.safetensors";
+  std::vector<std::string> words = {Binary("evac"), "weights", "convert", weights, out, "--lean", "--dtype", "bf16"};
+  const CommandResult refused = RunCommand(words);
+  EXPECT_EQ(refused.exit_code, 2);
+  EXPECT_THAT(refused.err, testing::AllOf(HasSubstr(weights), HasSubstr("wanted --config PAGE")));
+  EXPECT_LT(refused.err.size(), 500u);
+  EXPECT_FALSE(std::filesystem::exists(out));
+  words.insert(words.end(), {"--config", EVAC_SOURCE_DIR "/apps/configs/desk_model.yaml"});
+  EXPECT_EQ(RunCommand(words).exit_code, 0);
+  EXPECT_EQ(std::filesystem::file_size(out) / 1000, std::filesystem::file_size(weights) / 1000);
 }
 
 }  // namespace

@@ -102,6 +102,18 @@ TEST(PairedStateBootstrap, TwoWorldsThatNeverDisagreeCorrelatePerfectlyInEveryRe
   EXPECT_EQ(bootstrap.mmrv->intervals.percentile->high, 0);
 }
 
+/// A report of one state a task once said "follows closely: Pearson 0.76 [0.76, 0.76]".
+TEST(PairedStateBootstrap, OneInitialStateOfATaskGivesNoInterval) {
+  for (const std::vector<TaskOutcomes>& tasks :
+       {std::vector{RandomTask(3, 5, 1)}, std::vector{RandomTask(3, 5, 20), RandomTask(4, 5, 1)}}) {
+    const PairedBootstrap bootstrap = PairedStateBootstrap(tasks, {}, kFew);
+    EXPECT_EQ(bootstrap.pearson.reason(), "1 initial state of a task, wanted at least 2 to draw from");
+    EXPECT_FALSE(bootstrap.spearman);
+    EXPECT_FALSE(bootstrap.mmrv);
+  }
+  EXPECT_TRUE(PairedStateBootstrap({RandomTask(3, 5, 2)}, {}, kFew).mmrv);
+}
+
 TEST(PairedStateBootstrap, ItsThetaIsTheStatisticOfTheRates) {
   const std::vector<TaskOutcomes> tasks = {RandomTask(4, 3, 7), RandomTask(5, 3, 11)};
   const RatePairs rates = RatesOf(tasks);
