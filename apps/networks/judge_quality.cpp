@@ -48,6 +48,15 @@ double KappaAt(const std::vector<double>& probabilities, const JudgeClips& clips
   return kappa ? *kappa : std::numeric_limits<double>::quiet_NaN();
 }
 
+/// How far the share of failures called successes is from that of successes called failures.
+double ImbalanceAt(const std::vector<double>& probabilities, const JudgeClips& clips, double threshold) {
+  const Confusion c = ConfusionAt(probabilities, clips, threshold);
+  const auto share = [](std::int64_t wrong, std::int64_t right) {
+    return static_cast<double>(wrong) / static_cast<double>(wrong + right);
+  };
+  return std::abs(share(c.only_judge_success, c.both_failure) - share(c.only_human_success, c.both_success));
+}
+
 std::vector<double> Probabilities(const std::vector<double>& logits, const ClassifierCard& card) {
   std::vector<double> probabilities;
   for (const double logit : logits) probabilities.push_back(CalibratedProbability(logit, card));
@@ -94,7 +103,7 @@ double LogLoss(const std::vector<double>& logits, const JudgeClips& clips) {
   return OrNotANumber(CalibrationOf(Probabilities(logits, {}), Outcomes(clips)).log_loss);
 }
 
-ClassifierCard Calibrate(const std::vector<double>& logits, const JudgeClips& clips, double unsure, double caution) {
+ClassifierCard Calibrate(const std::vector<double>& logits, const JudgeClips& clips, double unsure) {
   const std::vector<int> outcomes = Outcomes(clips);
   ClassifierCard card;
   card.unsure = unsure;
@@ -106,17 +115,14 @@ ClassifierCard Calibrate(const std::vector<double>& logits, const JudgeClips& cl
     card.temperature = temperature;
   }
   const std::vector<double> probabilities = Probabilities(logits, card);
-  double best_kappa = -2;
+  double least = std::numeric_limits<double>::infinity();
   for (int step = 0; step <= 45; ++step) {
     for (const double threshold : {0.5 - 0.01 * step, 0.5 + 0.01 * step}) {
-      if (threshold < 0.05 || !(KappaAt(probabilities, clips, threshold) > best_kappa)) continue;
-      best_kappa = KappaAt(probabilities, clips, threshold);
+      const double imbalance = ImbalanceAt(probabilities, clips, threshold);
+      if (threshold < 0.05 || !(imbalance < least)) continue;
+      least = imbalance;
       card.threshold = threshold;
     }
-  }
-  for (double threshold = 0.95; threshold > card.threshold; threshold -= 0.01) {
-    if (caution <= 0 || KappaAt(probabilities, clips, threshold) < best_kappa - caution) continue;
-    card.threshold = threshold;
   }
   return card;
 }

@@ -30,11 +30,12 @@ double CalibratedProbability(double logit, const ClassifierCard& card);
 /// Mean logarithmic loss of uncalibrated logits.
 double LogLoss(const std::vector<double>& logits, const JudgeClips& clips);
 
-/// Temperature (Guo et al. 2017) that makes the likelihood of the outcomes largest, and the threshold with the highest
-/// kappa, of those the one next to .5.
-/// @param caution  above 0: the highest threshold whose kappa is lower by no more than this. Where kappa hardly tells them
-///   apart, the judge that calls fewer failures successes is the better one.
-ClassifierCard Calibrate(const std::vector<double>& logits, const JudgeClips& clips, double unsure, double caution = 0);
+/// Temperature (Guo et al. 2017) that makes the likelihood of the outcomes largest, and the threshold at which as large a
+/// share of failures is called successes as of successes failures, or comes closest to that; of several the one next to
+/// .5. Kappa is nearly the same over a wide range of thresholds, so its maximum is chance; where the two errors balance, a
+/// policy that succeeds half of the time is told to.
+/// @param clips  of both outcomes
+ClassifierCard Calibrate(const std::vector<double>& logits, const JudgeClips& clips, double unsure);
 
 /// Each a number, or not a number where it is undefined.
 struct MeasuredJudge {

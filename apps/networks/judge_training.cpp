@@ -68,7 +68,6 @@ train::Settings SettingsOf(JudgeTrainingOptions& options) {
                               {"shift_px", &options.shift_px},
                               {"mirror_share", &options.mirror_share},
                               {"unsure", &options.unsure},
-                              {"caution", &options.caution},
                               {"light", &options.changes.light},
                               {"offset", &options.changes.offset},
                               {"blur_share", &options.changes.blur_share},

@@ -24,7 +24,6 @@ struct JudgeTrainingOptions {
   std::int64_t shift_px = 0;         ///< each view's pictures are moved by up to this each way; the edge is repeated
   double mirror_share = 0;           ///< of clips that are seen mirrored, left for right, in every view
   double unsure = 0.1;               ///< what the card says: closer to the threshold is `cannot tell`
-  double caution = 0;  ///< kappa that may be given up for a higher threshold, and so for fewer failures called successes
   PictureChanges changes;
 };
 train::Settings SettingsOf(JudgeTrainingOptions& options);

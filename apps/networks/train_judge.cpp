@@ -73,7 +73,7 @@ Judged MeasureAll(const ClassifierNet& net, const JudgeData& data, const JudgeCl
     clips.insert(clips.end(), calibration.begin(), calibration.end());
     if (look.longer == 1) judged.clips.push_back({"calibration", SeenAs(look), &calibration, some});
   }
-  judged.card = Calibrate(logits, clips, options.unsure, options.caution);
+  judged.card = Calibrate(logits, clips, options.unsure);
   const auto measure = [&](const JudgeLook& look, bool is_shown) {
     const std::vector<double> some = ask(data.holdout, holdout, look);
     if (is_shown) judged.clips.push_back({"hold-out", SeenAs(look), &holdout, some});

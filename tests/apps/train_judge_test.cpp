@@ -313,28 +313,29 @@ TEST_F(TrainJudgeTest, GoesOnFromAJudgeOfTheSameTasksAloneAndKeepsWhatItLearnedF
   EXPECT_EQ(WeightFile(folder_ / "marked" / "judge.safetensors", "evac-classifier 1").Text("learned_from"), "0123456789ab");
 }
 
-TEST(Calibrate, ACautiousJudgeGivesUpALittleKappaForFewerHallucinations) {
+TEST(Calibrate, AtTheThresholdBothErrorsAreEqualShares) {
   JudgeClips clips;
   std::vector<double> logits;
-  for (int i = 0; i < 1000; ++i) {
-    const double honest = (i % 50 - 24.5) / 6;  // log odds
-    clips.emplace_back().outcome = (i / 50 + 0.5) / 20 < 1 / (1 + std::exp(-honest)) ? 1 : 0;
-    logits.push_back(honest);
-  }
-  const ClassifierCard plain = Calibrate(logits, clips, 0), cautious = Calibrate(logits, clips, 0, 0.05);
-  const auto hallucinated = [&](const ClassifierCard& card) {
-    int count = 0;
-    for (std::size_t i = 0; i < clips.size(); ++i)
-      count += clips[i].outcome == 0 && 1 / (1 + std::exp(-logits[i] / card.temperature)) >= card.threshold;
-    return count;
+  const auto add = [&](int outcome, double logit) {
+    clips.emplace_back().outcome = outcome;
+    logits.push_back(logit);
   };
-  EXPECT_EQ(cautious.temperature, plain.temperature);
-  EXPECT_GT(cautious.threshold, plain.threshold);
-  EXPECT_LT(hallucinated(cautious), hallucinated(plain));
-  EXPECT_GE(Measure(logits, clips, cautious).kappa, Measure(logits, clips, plain).kappa - 0.05);
-  ClassifierCard more = cautious;
-  more.threshold += 0.01;
-  EXPECT_LT(Measure(logits, clips, more).kappa, Measure(logits, clips, plain).kappa - 0.05) << "it is the highest";
+  // 100 failures of which 10 look like successes up to a point, 300 successes of which some look less sure: kappa is
+  // highest where no success is lost.
+  for (int i = 0; i < 90; ++i) add(0, -4);
+  for (int i = 0; i < 10; ++i) add(0, 0.2 * i);
+  for (int i = 0; i < 30; ++i) add(1, 0.05 * i);
+  for (int i = 0; i < 270; ++i) add(1, 4);
+  const ClassifierCard card = Calibrate(logits, clips, 0);
+  double hallucinated = 0, missed = 0;
+  for (std::size_t i = 0; i < clips.size(); ++i) {
+    const bool is_called_success = CalibratedProbability(logits[i], card) >= card.threshold;
+    hallucinated += clips[i].outcome == 0 && is_called_success;
+    missed += clips[i].outcome == 1 && !is_called_success;
+  }
+  EXPECT_GT(hallucinated, 0);
+  EXPECT_NEAR(hallucinated / 100, missed / 300, 0.011);
+  EXPECT_GT(card.threshold, 0.5);
 }
 
 TEST_F(TrainJudgeTest, CalibratedAnewItKeepsItsWeights) {
