@@ -369,6 +369,23 @@ TEST(Windows, ComeFromSuccessesAloneWhenAsked) {
                TensorError);
 }
 
+TEST(Windows, AreOfFailuresAsOftenAsAsked) {
+  const TempFolder folder;
+  WriteSyntheticShards(folder.path(), {.clips = 6, .frames = 12, .failures = 2});
+  const ShardSet shards(folder.path(), Split::kTrain);
+  const auto failures_of = [&](double weight) {
+    const WindowSampler sampler(shards, {.chunk = 3, .memory = 4, .history = 8, .failure_weight = weight});
+    Dice dice({1, 0, 0, 0}, 1);
+    int failures = 0;
+    for (int i = 0; i < 6000; ++i) failures += sampler.Pick(dice).clip->outcome == 0 ? 1 : 0;
+    return failures / 6000.0;
+  };
+  const double plain = failures_of(1), odds = plain / (1 - plain);
+  EXPECT_GT(plain, 0.1);
+  for (const double weight : {0.5, 3.0}) EXPECT_NEAR(failures_of(weight), weight * odds / (1 + weight * odds), 0.03);
+  EXPECT_THROW(WindowSampler(shards, {.chunk = 3, .memory = 4, .history = 8, .failure_weight = 0}), TensorError);
+}
+
 TEST(Rays, AreThoseOfTheWorldThatImagines) {
   Eigen::Matrix4f c2w = Eigen::Matrix4f::Identity();
   c2w.block<3, 3>(0, 0) =

@@ -98,6 +98,7 @@ Settings SettingsOf(WorldOptions& options) {
                        {"contact_share", &w.windows.contact_share},
                        {"closing_share", &w.windows.closing_share},
                        {"successes_only", &w.windows.successes_only},
+                       {"failure_weight", &w.windows.failure_weight},
                        {"first_image", &w.windows.first_image},
                        {"drop", &w.drop},
                        {"memory_noise_kind", &options.memory_noise_kind},

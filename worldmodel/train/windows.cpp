@@ -40,6 +40,8 @@ WindowSampler::WindowSampler(const ShardSet& shards, const WindowOptions& option
   if (options.memory < 1 || options.chunk < 1 || options.history < options.memory)
     throw TensorError("windows: memory " + std::to_string(options.memory) + ", chunk " + std::to_string(options.chunk) +
                       ", history " + std::to_string(options.history) + ", wanted 1 <= memory <= history, 1 <= chunk");
+  if (!(options.failure_weight > 0))
+    throw TensorError("windows: failure_weight " + std::to_string(options.failure_weight) + ", wanted above 0");
   for (const Clip& clip : shards.clips()) {
     if (!options.successes_only || clip.outcome == 1) AddClip(shards, clip);
   }
@@ -79,6 +81,16 @@ std::vector<std::int64_t> WindowSampler::RandomMemory(std::int64_t last, Dice& d
   return picked;
 }
 
+const WindowSampler::Start& WindowSampler::PickStart(const std::vector<Start>& pool, Dice& dice) const {
+  const double failed = std::min(1.0, options_.failure_weight), other = std::min(1.0, 1 / options_.failure_weight);
+  constexpr int kMostDraws = 1000;  // a pool of the rarer kind alone
+  for (int draw = 1;; ++draw) {
+    const Start& start = pool[static_cast<std::size_t>(dice.Below(static_cast<std::int64_t>(pool.size())))];
+    const double kept = start.clip->outcome == 0 ? failed : other;
+    if (kept >= 1 || draw == kMostDraws || dice.Chance(kept)) return start;
+  }
+}
+
 Window WindowSampler::Pick(Dice& dice) const {
   const bool rollout = dice.Chance(options_.rollout_share), contact = dice.Chance(options_.contact_share);
   const std::vector<Start>* pool = rollout ? &rollout_ : &any_;
@@ -86,7 +98,7 @@ Window WindowSampler::Pick(Dice& dice) const {
   if (contact && !touching.empty()) pool = &touching;
   const std::vector<Start>& closing = rollout ? rollout_closing_ : any_closing_;
   if (options_.closing_share > 0 && dice.Chance(options_.closing_share) && !closing.empty()) pool = &closing;
-  const Start& start = (*pool)[static_cast<std::size_t>(dice.Below(static_cast<std::int64_t>(pool->size())))];
+  const Start& start = PickStart(*pool, dice);
   Window window{start.clip, {}, start.last, options_.chunk, 0};
   window.memory = rollout ? RolloutMemory(start.last, options_.memory) : RandomMemory(start.last, dice);
   const auto any = static_cast<std::size_t>(dice.Below(options_.memory));

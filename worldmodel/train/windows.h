@@ -29,6 +29,8 @@ struct WindowOptions {
   /// it is seen, and whether it holds something or not is no part of the choice. The paper: 0
   double closing_share = 0;
   bool successes_only = false;      ///< from clips that ended in success, as a lab that keeps no failures would have. The paper: both
+  /// How many times as often windows of clips that ended in failure are drawn as others. The paper: 1
+  double failure_weight = 1;
   bool first_image = false;         ///< the image encoder sees the oldest memory, as when imagining; else any of it
 };
 
@@ -51,6 +53,7 @@ class WindowSampler {
     std::int64_t last;
   };
   std::vector<std::int64_t> RandomMemory(std::int64_t last, Dice& dice) const;
+  const Start& PickStart(const std::vector<Start>& pool, Dice& dice) const;
   void AddClip(const ShardSet& shards, const Clip& clip);
 
   WindowOptions options_;
