@@ -13,7 +13,8 @@ namespace evac {
 /// not what.
 std::string SuiteHash(const Config& page, const Suite& suite);
 
-/// The same without the worlds of type evac: suites that differ in a world model alone have the same reality.
+/// The same without the worlds of type evac and how many initial states there are: suites that differ in these alone
+/// have the same reality, one perhaps less of it.
 std::string RealityHash(const Config& page, const Suite& suite);
 
 /// The arguments of a policy's command that name files which its `files` do not list. They may decide what it does, and

@@ -22,7 +22,7 @@ void RequireSameReality(const std::filesystem::path& earlier, const Suite& suite
   if (found == wanted) return;
   throw InvalidInput(
       "--reality {}: is about another reality ({:.12}…, this suite's is {:.12}…): wanted the same suite but for its "
-      "world model",
+      "world model and how many initial states it has",
       earlier.string(), found, wanted);
 }
 

@@ -45,6 +45,18 @@ class EvacSuite : public testing::Test {
     }
     return "no complaint";
   }
+  /// A suite of the real world and a model, nine initial states of which both try four.
+  void WriteBoth() const {
+    const std::string source = EVAC_SOURCE_DIR "/worldmodel/sim/";
+    Write("both.yaml",
+          "suite: both\nworlds:\n  - {name: real, type: mujoco, role: real, initial_states: 4, profile: " + source +
+              "profiles/real.yaml}\n  - {name: evac, type: evac, weights: w.safetensors, config: c.yaml, "
+              "initial_states: 4}\n"
+              "tasks: [" +
+              source +
+              "scenes/take_bottle.yaml]\npolicies: [{name: hold, command: [evac-policy, hold]}]\n"
+              "initial_states: {seed: 1, count: 9}\n");
+  }
   TempFolder folder_;
 };
 
@@ -92,16 +104,21 @@ TEST_F(EvacSuite, RealityIsTheSameWhateverTheModelAndAnotherWithAnotherWorldPoli
   EXPECT_EQ(Read().reality_hash, suite.reality_hash);
 }
 
+TEST_F(EvacSuite, RealityIsTheSameHoweverManyStatesOfASeedAreAsked) {
+  WriteBoth();
+  const auto reality = [&](const char* change) { return ReadSuite(folder_ / "both.yaml", {change}).reality_hash; };
+  const Suite suite = ReadSuite(folder_ / "both.yaml", {}), more = ReadSuite(folder_ / "both.yaml", {"initial_states.count=20"});
+  EXPECT_EQ(more.reality_hash, suite.reality_hash);
+  EXPECT_NE(more.hash, suite.hash);
+  for (std::size_t i = 0; i < suite.initial_states.size(); ++i) {
+    EXPECT_EQ(more.initial_states[i].id, suite.initial_states[i].id);
+    EXPECT_EQ(more.initial_states[i].seed, suite.initial_states[i].seed);
+  }
+  EXPECT_NE(reality("initial_states.seed=2"), suite.reality_hash);
+}
+
 TEST_F(EvacSuite, ItTriesNoMoreStatesThanTheRealWorldFromWhoseFramesItStarts) {
-  const std::string source = EVAC_SOURCE_DIR "/worldmodel/sim/";
-  Write("both.yaml",
-        "suite: both\nworlds:\n  - {name: real, type: mujoco, role: real, initial_states: 4, profile: " + source +
-            "profiles/real.yaml}\n  - {name: evac, type: evac, weights: w.safetensors, config: c.yaml, initial_states: "
-            "4}\n"
-            "tasks: [" +
-            source +
-            "scenes/take_bottle.yaml]\npolicies: [{name: hold, command: [evac-policy, hold]}]\n"
-            "initial_states: {seed: 1, count: 9}\n");
+  WriteBoth();
   const Suite suite = ReadSuite(folder_ / "both.yaml", {});
   EXPECT_EQ(StatesOf(suite, suite.worlds[1]).size(), 4u);
   try {
