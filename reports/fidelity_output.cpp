@@ -189,7 +189,7 @@ std::string FidelityText(const Fidelity& fidelity) {
   for (const Fidelity::Counterfactual& one : fidelity.counterfactuals) add(one.kind, one.match);
   text += TextTable(whole) + "\n";
   const CorrelationGroup& correlation = fidelity.model.correlation;
-  text += fmt::format("Pearson {} (low {}), Spearman {}, MMRV {} (real against real {})\n", Words(correlation.pearson.value),
+  text += fmt::format("Pearson {} (low {}), Spearman {}, MMRV within tasks {} (real against real {})\n", Words(correlation.pearson.value),
                       Words(LowOf(correlation.pearson)), Words(correlation.spearman.value), Words(fidelity.mmrv),
                       Words(fidelity.mmrv_again));
   return text;

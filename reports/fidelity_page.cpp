@@ -130,8 +130,8 @@ std::string Clips(const Fidelity& fidelity, const char* kind, std::optional<bool
 
 std::string Headline(const Fidelity& fidelity) {
   const CorrelationGroup& correlation = fidelity.model.correlation;
-  return fmt::format("<p>{} of a task and a policy. Pearson {}; MMRV {} (reality against itself {}); agreement {} (reality "
-                     "against itself {}). {} s per chunk. Judge {}: kappa with the truth {}, with the object painted over {}.</p>",
+  return fmt::format("<p>{} of a task and a policy. Pearson {}; MMRV within tasks, the mean over them, {} (reality against itself {}); agreement "
+                     "{} (reality against itself {}). {} s per chunk. Judge {}: kappa with the truth {}, with the object painted over {}.</p>",
                      Counted(static_cast<std::int64_t>(fidelity.cells.size()), "cell"), WithInterval(correlation.pearson, 1, 2, ""), Decimal(fidelity.mmrv, 3),
                      Decimal(fidelity.mmrv_again, 3), WithInterval(fidelity.closed.agreement, 100, 0, " %"),
                      WithInterval(fidelity.closed_again.agreement, 100, 0, " %"), Decimal(fidelity.input.seconds_per_chunk, 2),

@@ -66,6 +66,7 @@ std::string StatisticsTable(const WorldComparison& comparison) {
     notes += fmt::format("{} replicates without a defined Pearson were dropped. ", group.undefined_replicates);
   notes += fmt::format("MMRV: {}; {} among the points.", Escaped(Name(group.options.convention)),
                        Counted(group.ranks.ties, "tie"));
+  if (!comparison.by_task.empty()) notes += " It ranks all points as one list; within each task: below.";
   if (group.ranks.over_range && group.mmrv.value)
     notes += fmt::format(" Over the range of the {} rates it is {}.", Escaped(comparison.real),
                          Plain(*group.ranks.over_range));

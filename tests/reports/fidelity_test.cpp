@@ -112,6 +112,20 @@ TEST(Fidelity, WithoutAJudgeNothingIsClaimed) {
   EXPECT_THAT(FidelityText(fidelity), HasSubstr("Pearson –"));
 }
 
+TEST(Fidelity, WhereTwoMmrvsAreShownEachSaysOverWhat) {
+  FidelityInput input = Sample();
+  EXPECT_THAT(FidelityPage(FidelityOf(input)), Not(HasSubstr("It ranks all points as one list"))) << "of one task they are the same";
+  for (std::size_t i = 0, n = input.rows.size(); i < n; ++i) {
+    input.rows.push_back(input.rows[i]);
+    input.rows.back().pair.task = "take_ham";
+  }
+  const Fidelity fidelity = FidelityOf(std::move(input));
+  EXPECT_THAT(FidelityPage(fidelity), HasSubstr("MMRV within tasks"));
+  EXPECT_THAT(FidelityText(fidelity), HasSubstr("MMRV within tasks"));
+  ASSERT_FALSE(fidelity.model.by_task.empty());
+  EXPECT_THAT(FidelityPage(fidelity), HasSubstr("It ranks all points as one list; within each task: below."));
+}
+
 TEST(Fidelity, ThePageEscapesWhatASuiteCalledItsPolicies) {
   FidelityInput input = Sample();
   for (FidelityRow& row : input.rows) row.pair.policy = "<script>alert(1)</script>";
