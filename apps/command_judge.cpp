@@ -11,7 +11,9 @@
 
 namespace evac {
 
-void AddCalibrate(CLI::App& judge, ExitCode& exit_code);  // command_calibrate.cpp: a subcommand of this one
+// Subcommands of this one: command_calibrate.cpp, command_balance.cpp.
+void AddCalibrate(CLI::App& judge, ExitCode& exit_code);
+void AddBalance(CLI::App& judge, ExitCode& exit_code);
 
 namespace {
 
@@ -82,6 +84,7 @@ void AddJudge(CLI::App& app, ExitCode& exit_code) {
       "  evac judge calibrate out/demo --judge vlm:qwen-1a2b3c4d");
   AddVlmOptions(*command, arguments->vlm);
   AddCalibrate(*command, exit_code);
+  AddBalance(*command, exit_code);
   AddJudgeTrain(*command, exit_code);
   command->callback([command, arguments, &exit_code] {
     if (command->get_subcommands().empty()) exit_code = Rate(*arguments);

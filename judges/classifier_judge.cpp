@@ -12,15 +12,13 @@
 #include <cstring>
 
 #include "core/error.h"
-#include "core/hash.h"
 #include "core/weight_file.h"
 #include "judges/classifier_clip.h"
 #include "judges/classifier_net.h"
+#include "judges/judge_card.h"
 
 namespace evac {
 namespace {
-
-constexpr int kHashDigits = 12;
 
 ClassifierShape ShapeOf(const WeightFile& file) {
   if (file.Whole("frames", 1, 1000) != kClassifierFrames)
@@ -73,14 +71,14 @@ Label LabelOf(double probability, const ClassifierCard& card) {
 
 ClassifierJudge::ClassifierJudge(const std::filesystem::path& weights, std::filesystem::path run)
     : run_(std::move(run)) {
-  WeightFile file(weights, "evac-classifier 1");
+  WeightFile file(weights, kClassifierFormat);
   card_ = CardOf(file);
   if (file.card().contains("learned_from")) {
     const std::vector<std::string> marks = file.Names("learned_from");
     learned_from_ = {marks.begin(), marks.end()};
   }
   network_ = std::make_unique<const Network>(file);
-  name_ = "classifier:" + Sha256HexOfFile(weights).substr(0, kHashDigits);
+  name_ = ClassifierName(weights);
 }
 
 ClassifierJudge::~ClassifierJudge() = default;
@@ -133,7 +131,7 @@ double ClassifierJudge::Probability(const Task& task, const std::filesystem::pat
 Verdict ClassifierJudge::Rate(const Task& task, const Episode& episode) {
   CheckKnows({&task, 1});
   if (episode.video.empty()) throw InvalidInput("{}: it has no clip", episode.key.Id()).Called("not_judged");
-  if (learned_from_.contains(episode.video_sha256.substr(0, kHashDigits)))
+  if (learned_from_.contains(ClipMark(episode.video_sha256)))
     throw InvalidInput("{}: {} learned from this clip, and cannot judge it", episode.key.Id(), name_);
   Verdict verdict;
   verdict.episode_id = episode.key.Id();

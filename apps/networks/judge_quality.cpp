@@ -9,6 +9,7 @@
 
 #include "core/statistics/confusion.h"
 #include "core/statistics/roc.h"
+#include "core/statistics/threshold.h"
 
 namespace evac {
 namespace {
@@ -46,15 +47,6 @@ Confusion ConfusionAt(const std::vector<double>& probabilities, const JudgeClips
 double KappaAt(const std::vector<double>& probabilities, const JudgeClips& clips, double threshold) {
   const Number kappa = StatisticsOf(ConfusionAt(probabilities, clips, threshold)).kappa.value;
   return kappa ? *kappa : std::numeric_limits<double>::quiet_NaN();
-}
-
-/// How far the share of failures called successes is from that of successes called failures.
-double ImbalanceAt(const std::vector<double>& probabilities, const JudgeClips& clips, double threshold) {
-  const Confusion c = ConfusionAt(probabilities, clips, threshold);
-  const auto share = [](std::int64_t wrong, std::int64_t right) {
-    return static_cast<double>(wrong) / static_cast<double>(wrong + right);
-  };
-  return std::abs(share(c.only_judge_success, c.both_failure) - share(c.only_human_success, c.both_success));
 }
 
 std::vector<double> Probabilities(const std::vector<double>& logits, const ClassifierCard& card) {
@@ -114,16 +106,7 @@ ClassifierCard Calibrate(const std::vector<double>& logits, const JudgeClips& cl
     best_loss = loss;
     card.temperature = temperature;
   }
-  const std::vector<double> probabilities = Probabilities(logits, card);
-  double least = std::numeric_limits<double>::infinity();
-  for (int step = 0; step <= 45; ++step) {
-    for (const double threshold : {0.5 - 0.01 * step, 0.5 + 0.01 * step}) {
-      const double imbalance = ImbalanceAt(probabilities, clips, threshold);
-      if (threshold < 0.05 || !(imbalance < least)) continue;
-      least = imbalance;
-      card.threshold = threshold;
-    }
-  }
+  if (const Number threshold = BalancedThreshold(Probabilities(logits, card), outcomes)) card.threshold = *threshold;
   return card;
 }
 

@@ -12,12 +12,12 @@
 #include "core/seed.h"
 #include "core/store.h"
 #include "judges/classifier_clip.h"
+#include "judges/judge_card.h"
 
 namespace evac {
 namespace {
 
 constexpr int kPictures = 24;  // of a clip: three times what the network sees, so that learning may jitter
-constexpr std::size_t kMarkDigits = 12;
 
 class RunClips final : public JudgeClipSource {
  public:
@@ -85,7 +85,7 @@ void AddRun(const std::filesystem::path& run, const LabelledRuns& options, Tasks
     const Label label = own->second.label;
     if (label != Label::kSuccess && label != Label::kFailure) continue;
     labelled.push_back({known.at(key.pair.task), store.folder() / episode.video,
-                        episode.video_sha256.substr(0, kMarkDigits), key.pair.task + "/" + key.pair.initial_state,
+                        ClipMark(episode.video_sha256), key.pair.task + "/" + key.pair.initial_state,
                         label == Label::kSuccess});
   }
 }

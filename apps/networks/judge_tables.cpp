@@ -2,9 +2,8 @@
 
 #include <fmt/format.h>
 
-#include <array>
-
 #include "apps/networks/judge_quality.h"
+#include "core/statistics/threshold.h"
 #include "reports/csv.h"
 
 namespace evac {
@@ -32,17 +31,18 @@ std::string JudgedCsv(const std::vector<JudgedClips>& judged, const ClassifierCa
 std::string ThresholdsCsv(const std::vector<JudgedClips>& judged, const ClassifierCard& card) {
   std::string csv = "part,seen,threshold,failures,called_successes,successes,called_failures,agreement\n";
   for (const JudgedClips& some : judged) {
+    std::vector<double> probabilities;
+    std::vector<int> outcomes;
+    for (std::size_t i = 0; i < some.clips->size(); ++i) {
+      probabilities.push_back(CalibratedProbability(some.logits[i], card));
+      outcomes.push_back((*some.clips)[i].outcome == 1 ? 1 : 0);
+    }
     for (int step = 1; step <= kThresholds; ++step) {
       const double threshold = static_cast<double>(step) / kThresholdsPerOne;
-      std::array<int, 2> all{}, wrong{};  // by outcome
-      for (std::size_t i = 0; i < some.clips->size(); ++i) {
-        const std::size_t outcome = (*some.clips)[i].outcome == 1 ? 1 : 0;
-        ++all[outcome];
-        wrong[outcome] += (CalibratedProbability(some.logits[i], card) >= threshold) != (outcome == 1);
-      }
-      const int clips = all[0] + all[1];
-      csv += fmt::format("{},{},{:.2f},{},{},{},{},{}\n", some.part, some.seen, threshold, all[0], wrong[0], all[1], wrong[1],
-                         clips == 0 ? "" : fmt::format("{:.4f}", 1 - static_cast<double>(wrong[0] + wrong[1]) / clips));
+      const ThresholdErrors errors = ErrorsAt(probabilities, outcomes, threshold);
+      const Number agreement = errors.Agreement();
+      csv += fmt::format("{},{},{:.2f},{},{},{},{},{}\n", some.part, some.seen, threshold, errors.failures, errors.called_successes,
+                         errors.successes, errors.called_failures, agreement ? fmt::format("{:.4f}", *agreement) : "");
     }
   }
   return csv;

@@ -13,6 +13,7 @@
 #include "core/error.h"
 #include "core/file.h"
 #include "core/weight_file.h"
+#include "judges/judge_card.h"
 
 namespace evac {
 namespace {
@@ -109,7 +110,7 @@ void Say(const train::JobPlace& place, const Judged& judged) {
 /// What a judge to go on from must be, or it would be asked about other tasks than it knows.
 void CheckInit(const JudgeData& data) {
   if (data.init.empty()) return;
-  const WeightFile file(data.init, "evac-classifier 1");
+  const WeightFile file(data.init, kClassifierFormat);
   const auto check = [&](const char* key, const std::string& wanted) {
     if (file.Text(key) != wanted)
       throw InvalidInput("{}: {} is '{}', wanted '{}' as the clips have it", data.init.string(), key, file.Text(key), wanted);
@@ -140,7 +141,7 @@ TensorMetadata CardText(const Judged& judged, const JudgeData& data, const Judge
                         std::int64_t steps) {
   const JudgeClipSource& learn = data.learn;
   const auto number = [](double value) { return fmt::format("{:.6g}", value); };
-  TensorMetadata card = {{"format", "evac-classifier 1"},
+  TensorMetadata card = {{"format", kClassifierFormat},
                          {"tasks", Joined(learn.tasks)},
                          {"cameras", Joined(learn.cameras)},
                          {"frames", std::to_string(kClassifierFrames)},
