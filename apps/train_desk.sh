@@ -1,19 +1,19 @@
 #!/usr/bin/env bash
-# Everything under worldmodel/weights/desk from nothing: recordings, shards, codec, judge, policy, world model, and the
-# page that says how true it is. Every step goes on where it was killed, and one that is done says so at once.
+# Everything under worldmodel/weights/desk from nothing: recordings, shards, codec, judge, policy, world model, the page that
+# says how true it is, and the judge's threshold by what that page saw (OUT/judge/balanced.safetensors). Every step goes on where it was killed, and one that is done says so at once.
 #   apps/train_desk.sh EVAC OUT [LAST [CONFIGS]]
-# EVAC: the program. LAST: the step to end after (default: fidelity). CONFIGS: a folder of other pages. The desk's own
+# EVAC: the program. LAST: the step to end after (default: balance). CONFIGS: a folder of other pages. The desk's own
 # fidelity page is asked about four development states a cell; its forty reported ones would take as long as the training.
 # OUT/time.csv gets a line for each start of a step: step, seconds, peak memory of its largest process in KiB, how it
 # ended. A step that was killed together with this script has none.
 set -euo pipefail
-evac=$1 out=$2 last=${3:-fidelity} configs=${4:-$(dirname "${BASH_SOURCE[0]}")/configs}
+evac=$1 out=$2 last=${3:-balance} configs=${4:-$(dirname "${BASH_SOURCE[0]}")/configs}
 model=$configs/desk_model.yaml training=$configs/desk_training.yaml codec=$out/codec/codec.safetensors
 states=()
 if [ $# -lt 4 ]; then states=(--set initial_states.seed=8101 --set initial_states.count=4); fi
 case $last in
-  collect | pack | codec | encode | judge | policy | world | fidelity) ;;
-  *) echo "train_desk: the last step is '$last', wanted collect, pack, codec, encode, judge, policy, world or fidelity" >&2; exit 2 ;;
+  collect | pack | codec | encode | judge | policy | world | fidelity | balance) ;;
+  *) echo "train_desk: the last step is '$last', wanted collect, pack, codec, encode, judge, policy, world, fidelity or balance" >&2; exit 2 ;;
 esac
 
 finish() {
@@ -22,7 +22,9 @@ finish() {
   exit 0
 }
 step() {  # NAME evac's words …
-  /usr/bin/time -a -o "$out/time.csv" -q -f "$1,%e,%M,%x" "$evac" "${@:2}"
+  local code=0
+  /usr/bin/time -a -o "$out/time.csv" -q -f "$1,%e,%M,%x" "$evac" "${@:2}" || code=$?
+  if [ "$code" != 0 ] && [ "$1,$code" != balance,3 ]; then exit "$code"; fi  # 3: too few pairs to choose a threshold by
   if [ "$1" = "$last" ]; then finish; fi
 }
 learn() { step "$1" train "$1" "$out/shards" --config "$model" --training "$training" --out "$out/$1" "${@:2}"; }
@@ -38,3 +40,4 @@ learn world --codec "$codec"
 step fidelity fidelity "$configs/fidelity.yaml" --set "worlds.2.weights=$out/world/weights.safetensors" \
   --set "worlds.2.statistics=$out/shards/statistics.yaml" \
   --classifier "$out/judge/judge.safetensors" --out "$out/fidelity" "${states[@]}"
+step balance judge balance "$out/fidelity/closed" --weights "$out/judge/judge.safetensors" --out "$out/judge/balanced.safetensors"

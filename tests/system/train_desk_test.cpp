@@ -6,6 +6,7 @@
 #include <map>
 #include <thread>
 
+#include "core/file.h"
 #include "core/hash.h"
 #include "core/seed.h"
 #include "tests/support/temp_folder.h"
@@ -67,6 +68,28 @@ TEST(TrainDesk, AStepThatIsNoneIsRefused) {
   EXPECT_EQ(result.exit_code, 2);
   EXPECT_NE(result.err.find("the last step is 'wold', wanted collect"), std::string::npos) << result.err;
   EXPECT_FALSE(fs::exists(folder / "out"));
+}
+
+/// The script with a program in evac's place that says its words and ends as told.
+CommandResult WithEndings(const fs::path& folder, const std::string& endings) {
+  const fs::path program = folder / "program";
+  WriteFileAtomically(program, "#!/bin/sh\necho \"$1 $2\"\ncase \"$1 $2\" in\n" + endings + "esac\n");
+  fs::permissions(program, fs::perms::owner_exec, fs::perm_options::add);
+  return RunCommand({EVAC_SOURCE_DIR "/apps/train_desk.sh", program.string(), (folder / "out").string()});
+}
+
+TEST(TrainDesk, TooFewPairsToBalanceTheJudgeByAreNoFailure) {
+  const TempFolder folder;
+  const CommandResult result = WithEndings(folder.path(), "'judge balance') exit 3;;\n");
+  EXPECT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_NE(result.out.find("judge balance\n9 starts of steps took"), std::string::npos) << result.out;
+}
+
+TEST(TrainDesk, AStepThatFailsEndsIt) {
+  const TempFolder folder;
+  const CommandResult result = WithEndings(folder.path(), "'train codec') exit 3;;\n");
+  EXPECT_EQ(result.exit_code, 3);
+  EXPECT_EQ(result.out.find("encode"), std::string::npos) << result.out;
 }
 
 }  // namespace
