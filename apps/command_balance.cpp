@@ -20,13 +20,13 @@ struct BalanceArguments {
 };
 
 std::string Share(std::int64_t part, std::int64_t whole) {
-  return fmt::format("{:>5} of {:<5} {:.3f}", part, whole, whole == 0 ? 0 : static_cast<double>(part) / static_cast<double>(whole));
+  return fmt::format("{:>5} of {:<5} {:.3f}", part, whole, static_cast<double>(part) / static_cast<double>(whole));
 }
 
 std::string Row(const std::vector<PairedClip>& clips, double threshold, const char* what) {
-  const ThresholdErrors errors = ErrorsAt(clips, threshold);
-  return fmt::format("{:>9.2f}  {}   {}   {:>9.3f}  {}\n", threshold, Share(errors.called_successes, errors.failures),
-                     Share(errors.called_failures, errors.successes), *errors.Agreement(), what);
+  const Confusion c = ConfusionAt(clips, threshold);
+  return fmt::format("{:>9.2f}  {}   {}   {:>9.3f}  {}\n", threshold, Share(c.only_judge_success, c.only_judge_success + c.both_failure),
+                     Share(c.only_human_success, c.only_human_success + c.both_success), *StatisticsOf(c).accuracy, what);
 }
 
 /// Thresholds from low to high, the card's and the balanced one among them.

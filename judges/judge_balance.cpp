@@ -96,9 +96,9 @@ PairedClips PairedClipsOf(const Store& store, const std::string& judge, const st
   return paired;
 }
 
-ThresholdErrors ErrorsAt(const std::vector<PairedClip>& clips, double threshold) {
+Confusion ConfusionAt(const std::vector<PairedClip>& clips, double threshold) {
   const ThresholdItems items = ItemsOf(clips);
-  return ErrorsAt(items.probabilities, items.outcomes, threshold);
+  return ConfusionAt(items.probabilities, items.outcomes, threshold);
 }
 
 Estimate BalanceOf(const std::vector<PairedClip>& clips, const BootstrapOptions& options) {

@@ -35,7 +35,7 @@ PairedClips PairedClipsOf(const Store& store, const std::string& judge, const st
 /// it says how much other initial states could move it. Both undefined where all outcomes are alike.
 Estimate BalanceOf(const std::vector<PairedClip>& clips, const BootstrapOptions& options = {.replicates = 1000});
 
-/// What a threshold gets wrong of such clips.
-ThresholdErrors ErrorsAt(const std::vector<PairedClip>& clips, double threshold);
+/// What comes of a threshold on such clips.
+Confusion ConfusionAt(const std::vector<PairedClip>& clips, double threshold);
 
 }  // namespace evac

@@ -33,19 +33,8 @@ void MaskObject(const at::Tensor& objects, double radius, const at::Tensor& pict
   }
 }
 
-Confusion ConfusionAt(const std::vector<double>& probabilities, const JudgeClips& clips, double threshold) {
-  Confusion confusion;
-  for (std::size_t i = 0; i < clips.size(); ++i) {
-    const bool judged = probabilities[i] >= threshold, is = clips[i].outcome == 1;
-    ++(judged ? is ? confusion.both_success : confusion.only_judge_success
-       : is   ? confusion.only_human_success
-              : confusion.both_failure);
-  }
-  return confusion;
-}
-
-double KappaAt(const std::vector<double>& probabilities, const JudgeClips& clips, double threshold) {
-  const Number kappa = StatisticsOf(ConfusionAt(probabilities, clips, threshold)).kappa.value;
+double KappaAt(const std::vector<double>& probabilities, const std::vector<int>& outcomes, double threshold) {
+  const Number kappa = StatisticsOf(ConfusionAt(probabilities, outcomes, threshold)).kappa.value;
   return kappa ? *kappa : std::numeric_limits<double>::quiet_NaN();
 }
 
@@ -120,7 +109,7 @@ MeasuredJudge Measure(const std::vector<double>& logits, const JudgeClips& clips
   const std::vector<int> outcomes = Outcomes(clips);
   const auto unsure = std::count_if(probabilities.begin(), probabilities.end(),
                                     [&](double p) { return LabelOf(p, card) == Label::kCannotTell; });
-  return {OrNotANumber(AreaUnderRoc(logits, outcomes)), KappaAt(probabilities, clips, card.threshold),
+  return {OrNotANumber(AreaUnderRoc(logits, outcomes)), KappaAt(probabilities, outcomes, card.threshold),
           OrNotANumber(CalibrationOf(probabilities, outcomes).ece),
           clips.empty() ? 0 : static_cast<double>(unsure) / static_cast<double>(clips.size()), clips.size()};
 }

@@ -39,10 +39,11 @@ std::string ThresholdsCsv(const std::vector<JudgedClips>& judged, const Classifi
     }
     for (int step = 1; step <= kThresholds; ++step) {
       const double threshold = static_cast<double>(step) / kThresholdsPerOne;
-      const ThresholdErrors errors = ErrorsAt(probabilities, outcomes, threshold);
-      const Number agreement = errors.Agreement();
-      csv += fmt::format("{},{},{:.2f},{},{},{},{},{}\n", some.part, some.seen, threshold, errors.failures, errors.called_successes,
-                         errors.successes, errors.called_failures, agreement ? fmt::format("{:.4f}", *agreement) : "");
+      const Confusion c = ConfusionAt(probabilities, outcomes, threshold);
+      const Number agreement = StatisticsOf(c).accuracy;
+      csv += fmt::format("{},{},{:.2f},{},{},{},{},{}\n", some.part, some.seen, threshold, c.only_judge_success + c.both_failure,
+                         c.only_judge_success, c.both_success + c.only_human_success, c.only_human_success,
+                         agreement ? fmt::format("{:.4f}", *agreement) : "");
     }
   }
   return csv;

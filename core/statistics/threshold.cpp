@@ -25,32 +25,18 @@ void Check(std::span<const double> probabilities, std::span<const int> outcomes)
   }
 }
 
-Number Share(std::int64_t part, std::int64_t whole, const char* what) {
-  if (whole == 0) return Undefined{what};
-  return static_cast<double>(part) / static_cast<double>(whole);
-}
-
 }  // namespace
 
-Number ThresholdErrors::HallucinatedShare() const { return Share(called_successes, failures, "no failures"); }
-Number ThresholdErrors::MissedShare() const { return Share(called_failures, successes, "no successes"); }
-Number ThresholdErrors::Agreement() const {
-  const std::int64_t all = failures + successes;
-  return Share(all - called_successes - called_failures, all, "no outcomes");
-}
-
-ThresholdErrors ErrorsAt(std::span<const double> probabilities, std::span<const int> outcomes, double threshold) {
+Confusion ConfusionAt(std::span<const double> probabilities, std::span<const int> outcomes, double threshold) {
   Check(probabilities, outcomes);
-  ThresholdErrors errors;
+  Confusion confusion;
   for (std::size_t i = 0; i < probabilities.size(); ++i) {
-    const bool called_success = probabilities[i] >= threshold;
-    ++(outcomes[i] == 1 ? errors.successes : errors.failures);
-    if (outcomes[i] == 1)
-      errors.called_failures += !called_success;
-    else
-      errors.called_successes += called_success;
+    const bool called = probabilities[i] >= threshold, is = outcomes[i] == 1;
+    ++(called ? is ? confusion.both_success : confusion.only_judge_success
+       : is   ? confusion.only_human_success
+              : confusion.both_failure);
   }
-  return errors;
+  return confusion;
 }
 
 Number BalancedThreshold(std::span<const double> probabilities, std::span<const int> outcomes) {

@@ -118,9 +118,10 @@ TEST(JudgeBalance, MovesTheThresholdByWhatTheJudgeIsTooKind) {
   const Estimate fair = BalanceOf(Clips(0, 100)), kind = BalanceOf(Clips(0.2, 100));
   EXPECT_NEAR(*fair.value, 0.5, 0.04);
   EXPECT_NEAR(*kind.value, 0.7, 0.04);
-  const ThresholdErrors before = ErrorsAt(Clips(0.2, 100), 0.5), after = ErrorsAt(Clips(0.2, 100), *kind.value);
-  EXPECT_GT(*before.HallucinatedShare(), 2 * *before.MissedShare());
-  EXPECT_NEAR(*after.HallucinatedShare(), *after.MissedShare(), 0.02);
+  const ConfusionStatistics before = StatisticsOf(ConfusionAt(Clips(0.2, 100), 0.5)),
+                            after = StatisticsOf(ConfusionAt(Clips(0.2, 100), *kind.value));
+  EXPECT_GT(1 - *before.specificity, 2 * (1 - *before.sensitivity));
+  EXPECT_NEAR(1 - *after.specificity, 1 - *after.sensitivity, 0.02);
 }
 
 TEST(JudgeBalance, SaysHowFarOtherStatesCouldMoveIt) {

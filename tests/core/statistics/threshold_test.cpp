@@ -13,26 +13,27 @@ namespace evac {
 namespace {
 
 double ImbalanceAt(const std::vector<double>& probabilities, const std::vector<int>& outcomes, double threshold) {
-  const ThresholdErrors errors = ErrorsAt(probabilities, outcomes, threshold);
-  return std::abs(*errors.HallucinatedShare() - *errors.MissedShare());
+  const ConfusionStatistics s = StatisticsOf(ConfusionAt(probabilities, outcomes, threshold));
+  return std::abs(*s.specificity - *s.sensitivity);
 }
 
 TEST(Threshold, ErrorsAreCountedOfEachOutcome) {
-  const ThresholdErrors errors = ErrorsAt(std::vector<double>{0.1, 0.5, 0.9, 0.4, 0.5}, std::vector<int>{0, 0, 0, 1, 1}, 0.5);
-  EXPECT_EQ(errors.failures, 3);
-  EXPECT_EQ(errors.called_successes, 2) << "from the threshold on";
-  EXPECT_EQ(errors.successes, 2);
-  EXPECT_EQ(errors.called_failures, 1);
-  EXPECT_DOUBLE_EQ(*errors.HallucinatedShare(), 2.0 / 3);
-  EXPECT_DOUBLE_EQ(*errors.MissedShare(), 1.0 / 2);
-  EXPECT_DOUBLE_EQ(*errors.Agreement(), 2.0 / 5);
+  const Confusion c = ConfusionAt(std::vector<double>{0.1, 0.5, 0.9, 0.4, 0.5}, std::vector<int>{0, 0, 0, 1, 1}, 0.5);
+  EXPECT_EQ(c.both_failure + c.only_judge_success, 3);
+  EXPECT_EQ(c.only_judge_success, 2) << "from the threshold on";
+  EXPECT_EQ(c.both_success + c.only_human_success, 2);
+  EXPECT_EQ(c.only_human_success, 1);
+  const ConfusionStatistics s = StatisticsOf(c);
+  EXPECT_DOUBLE_EQ(*s.specificity, 1 - 2.0 / 3);
+  EXPECT_DOUBLE_EQ(*s.sensitivity, 1.0 / 2);
+  EXPECT_DOUBLE_EQ(*s.accuracy, 2.0 / 5);
 }
 
 TEST(Threshold, NoShareOfNothing) {
-  const ThresholdErrors errors = ErrorsAt(std::vector<double>{0.1}, std::vector<int>{0}, 0.5);
-  EXPECT_FALSE(errors.MissedShare());
-  EXPECT_DOUBLE_EQ(*errors.Agreement(), 1);
-  EXPECT_FALSE(ErrorsAt({}, {}, 0.5).Agreement());
+  const ConfusionStatistics s = StatisticsOf(ConfusionAt(std::vector<double>{0.1}, std::vector<int>{0}, 0.5));
+  EXPECT_FALSE(s.sensitivity);
+  EXPECT_DOUBLE_EQ(*s.accuracy, 1);
+  EXPECT_FALSE(StatisticsOf(ConfusionAt({}, {}, 0.5)).accuracy);
 }
 
 TEST(BalancedThreshold, NoOtherIsMoreBalanced) {
