@@ -6,6 +6,8 @@
 
 namespace evac {
 
+InitialState StateOn(const Task& task, const InitialState& state) { return {state.id, SeedFor(state.seed, task.id)}; }
+
 std::vector<Job> AllJobs(const Suite& suite, const SuiteWorld& world, const SuitePolicy& policy) {
   std::vector<Job> jobs;
   const bool has_own_noise = world.type == "mujoco" && !world.is_real;
@@ -13,7 +15,7 @@ std::vector<Job> AllJobs(const Suite& suite, const SuiteWorld& world, const Suit
     for (const InitialState& state : StatesOf(suite, world)) {
       for (const std::uint64_t seed : suite.seeds) {
         jobs.push_back({.task = &task,
-                        .initial = {state.id, SeedFor(state.seed, task.id)},
+                        .initial = StateOn(task, state),
                         .key = {{task.id, state.id, policy.name, policy.checkpoint, seed}, world.name},
                         .noise = has_own_noise ? world.name : ""});
       }

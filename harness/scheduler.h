@@ -8,6 +8,9 @@
 
 namespace evac {
 
+/// What the suite's initial state is on that task: each task draws its own placements.
+InitialState StateOn(const Task& task, const InitialState& state);
+
 /// Every episode of a suite in one world under one policy: tasks x initial states x seeds, in that order. The jobs point into
 /// `suite.tasks`.
 std::vector<Job> AllJobs(const Suite& suite, const SuiteWorld& world, const SuitePolicy& policy);

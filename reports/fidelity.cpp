@@ -105,6 +105,20 @@ std::vector<FidelityCell> CellsOf(const std::vector<FidelityRow>& rows) {
   return cells;
 }
 
+Fidelity::WrongOutcomes WrongOutcomesOf(const std::vector<FidelityRow>& rows) {
+  std::map<PairKey, bool> come_to;
+  for (const FidelityRow& row : rows) {
+    if (row.kind == "executed" && row.real) come_to[row.pair] = *row.real;
+  }
+  Fidelity::WrongOutcomes wrong;
+  for (const FidelityRow& row : rows) {
+    if (row.kind != "closed_loop" || !row.real || !row.model || *row.real == *row.model) continue;
+    const auto found = come_to.find(row.pair);
+    if (found != come_to.end()) ++(found->second == *row.model ? wrong.led_astray : wrong.of_actions);
+  }
+  return wrong;
+}
+
 std::optional<std::int64_t> UsableHorizon(const std::vector<ChunkDrift>& chunks) {
   if (chunks.empty()) return std::nullopt;
   std::int64_t usable = 0;
@@ -148,6 +162,8 @@ Fidelity FidelityOf(FidelityInput input) {
   fidelity.closed = MatchOf(input.rows, "closed_loop", FidelityColumn::kModel);
   fidelity.closed_again = MatchOf(input.rows, "closed_loop", FidelityColumn::kAgain);
   fidelity.open = MatchOf(input.rows, "open_loop", FidelityColumn::kModel);
+  fidelity.executed = MatchOf(input.rows, "executed", FidelityColumn::kModel);
+  fidelity.wrong = WrongOutcomesOf(input.rows);
   std::set<std::string> kinds;
   for (const FidelityRow& row : input.rows) {
     if (row.kind.starts_with("counterfactual:")) kinds.insert(row.kind);

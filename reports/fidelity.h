@@ -18,7 +18,7 @@ namespace evac {
 /// One initial state under one policy, or under recorded actions. An outcome is empty where there is none: the episode
 /// failed, its judge could not tell, or that world was not asked.
 struct FidelityRow {
-  std::string kind;  ///< closed_loop, open_loop, counterfactual:NAME
+  std::string kind;  ///< closed_loop, open_loop, executed, counterfactual:NAME
   PairKey pair;
   std::optional<bool> real;   ///< what truly happened
   std::optional<bool> again;  ///< in reality once more, with other noise of the world
@@ -83,6 +83,12 @@ struct Fidelity {
   WorldComparison model, again;  ///< of the closed loop, against reality
   Number mmrv = Undefined{"no task has two policies"}, mmrv_again = Undefined{"no task has two policies"};  ///< mean over tasks
   OutcomeMatch closed, closed_again, open;
+  OutcomeMatch executed;  ///< what the model says of the actions chosen in it, against what they come to in reality
+  /// Wrong outcomes of the closed loop whose actions were executed in reality: where the model goes wrong.
+  struct WrongOutcomes {
+    std::int64_t of_actions = 0;  ///< the actions come to something else than the model says: it is wrong about what it is told
+    std::int64_t led_astray = 0;  ///< it is right about them; in reality the policy chose others, or chance decided
+  } wrong;
   struct Counterfactual {
     std::string kind;
     OutcomeMatch match;

@@ -73,6 +73,18 @@ Json OpenLoopJson(const Fidelity& fidelity) {
   return json;
 }
 
+Json ExecutedJson(const Fidelity& fidelity) {
+  const OutcomeMatch& executed = fidelity.executed;
+  NumberWriter writer;
+  writer.Put("n", executed.n);
+  writer.Put("agreement", executed.agreement.value);
+  writer.Put("hallucinated", executed.hallucinated.value);
+  writer.Put("missed", executed.missed.value);
+  writer.Put("wrong_of_actions", fidelity.wrong.of_actions);
+  writer.Put("wrong_led_astray", fidelity.wrong.led_astray);
+  return writer.Take();
+}
+
 Json CellsJson(const std::vector<FidelityCell>& cells) {
   Json list = Json::array();
   for (const FidelityCell& cell : cells) {
@@ -154,6 +166,7 @@ std::string FidelityJson(const Fidelity& fidelity) {
   all.Put("missed", fidelity.closed.missed.value);
   all.Put("missed_real_real", fidelity.closed_again.missed.value);
   all.Put("open_loop", OpenLoopJson(fidelity));
+  all.Put("executed", ExecutedJson(fidelity));
   all.Put("counterfactual", CounterfactualsJson(fidelity));
   all.Put("horizon", DriftsOf(fidelity.input.horizon));
   all.Put("usable_horizon_chunks", fidelity.usable_horizon_chunks ? Json(*fidelity.usable_horizon_chunks) : Json(nullptr));
@@ -186,6 +199,7 @@ std::string FidelityText(const Fidelity& fidelity) {
   add("closed loop", fidelity.closed);
   add("real against real", fidelity.closed_again);
   if (fidelity.open.n > 0) add("open loop", fidelity.open);
+  if (fidelity.executed.n > 0) add("executed", fidelity.executed);
   for (const Fidelity::Counterfactual& one : fidelity.counterfactuals) add(one.kind, one.match);
   text += TextTable(whole) + "\n";
   const CorrelationGroup& correlation = fidelity.model.correlation;

@@ -56,13 +56,23 @@ std::string MatchRow(const std::string& name, const OutcomeMatch& match) {
                      WithInterval(match.missed, 100, 0, " %"), WithInterval(match.kappa, 1, 2, ""));
 }
 
+/// Of the closed loop's wrong outcomes: the model's own, and those of policies that saw something else.
+std::string WhereItGoesWrong(const Fidelity& fidelity) {
+  const auto& [of_actions, led_astray] = fidelity.wrong;
+  if (of_actions + led_astray == 0) return "";
+  return fmt::format("<p>Of {} of the closed loop, {} wrong about the very actions that were chosen: done in reality they come to "
+                     "something else. About the other {} the world model is right: the policy acted otherwise in reality, or chance decided.</p>",
+                     Counted(of_actions + led_astray, "wrong outcome"), Counted(of_actions, "is", "are"), led_astray);
+}
+
 std::string MatchTable(const Fidelity& fidelity) {
   std::string rows = MatchRow("closed loop: the policies act in the world model", fidelity.closed) +
                      MatchRow("reality against reality, other noise", fidelity.closed_again);
   if (fidelity.open.n > 0) rows += MatchRow("open loop: recorded actions replayed", fidelity.open);
+  if (fidelity.executed.n > 0) rows += MatchRow("executed: what policies chose in the world model, done in reality", fidelity.executed);
   for (const Fidelity::Counterfactual& one : fidelity.counterfactuals) rows += MatchRow(one.kind, one.match);
-  return TableHead({"what was asked", "pairs", "agreement", "hallucinated", "missed", "kappa"}) + rows + "</tbody></table></div>"
-         "<p class=\"quiet\">Hallucinated: imagined success of what truly failed. Missed: imagined failure of what truly "
+  return TableHead({"what was asked", "pairs", "agreement", "hallucinated", "missed", "kappa"}) + rows + "</tbody></table></div>" +
+         WhereItGoesWrong(fidelity) + "<p class=\"quiet\">Hallucinated: imagined success of what truly failed. Missed: imagined failure of what truly "
          "succeeded. Intervals: Wilson, 95 %.</p>";
 }
 

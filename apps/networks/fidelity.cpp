@@ -72,6 +72,20 @@ class Measuring {
     input_.open_loop = {drift.object_px(), drift.Chunks()};
   }
 
+  /// What policies chose in the model, done in reality: whether the model is wrong about what it is told, or policies are
+  /// led astray by what it shows them.
+  void Executed() {
+    const Store closed = Store::Open(out_ / "closed", Store::Mode::kReadOnly);
+    const std::vector<Replay> replays = ReplaysOf(closed, worlds_.model.name, suite_);
+    const Store store = RunReplays({suite_, out_ / "executed", "executed", suite_.tasks, {worlds_.again}}, replays);
+    const OutcomesOf imagined(closed, judge_.name()), truth(store, judge_.name());
+    for (const Replay& replay : replays) {
+      const EpisodeKey really{replay.pair, worlds_.again.name}, model{replay.pair, worlds_.model.name};
+      input_.rows.push_back({"executed", replay.pair, truth.Truth(really), std::nullopt, imagined.Said(model),
+                             truth.Clip(really), imagined.Clip(model)});
+    }
+  }
+
   void Counterfactual() {
     const Store closed = Store::Open(out_ / "closed", Store::Mode::kReadOnly);
     const OutcomesOf outcomes(closed, judge_.name());
@@ -195,8 +209,8 @@ FidelityWorlds WorldsOf(const Suite& suite) {
 
 ExitCode RunFidelity(const FidelityArguments& arguments) {
   for (const std::string& part : arguments.parts) {
-    static const std::set<std::string> kParts = {"closed", "open", "counterfactual", "horizon"};
-    if (!kParts.contains(part)) throw InvalidInput("--parts: found '{}', wanted some of closed, open, counterfactual, horizon", part);
+    static const std::set<std::string> kParts = {"closed", "open", "executed", "counterfactual", "horizon"};
+    if (!kParts.contains(part)) throw InvalidInput("--parts: found '{}', wanted some of closed, open, executed, counterfactual, horizon", part);
   }
   const CatchInterrupts catch_interrupts;
   const Suite suite = ReadSuite(arguments.suite, arguments.assignments);
@@ -205,6 +219,7 @@ ExitCode RunFidelity(const FidelityArguments& arguments) {
   const ExitCode closed = measuring.Closed();  // what all other parts are made from
   if (closed != ExitCode::kOk) return closed;
   if (Asks(arguments, "open")) measuring.Open();
+  if (Asks(arguments, "executed")) measuring.Executed();
   if (Asks(arguments, "counterfactual")) measuring.Counterfactual();
   if (Asks(arguments, "horizon")) measuring.Horizon();
   measuring.Speed();

@@ -22,7 +22,7 @@ enum class FidelityPart { kClosed, kOpen, kCounterfactual, kHorizon };
 struct FidelityArguments {
   std::string suite, out;
   std::vector<std::string> assignments;
-  std::vector<std::string> parts = {"closed", "open", "counterfactual", "horizon"};
+  std::vector<std::string> parts = {"closed", "open", "executed", "counterfactual", "horizon"};
   std::string classifier;       ///< weights of the judge of imagined clips
   std::string reality;          ///< an earlier OUT whose episodes in the simulated worlds are taken over; empty: none
   int counterfactual_states = 10;  ///< successes per task that are made to fail

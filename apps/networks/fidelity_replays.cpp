@@ -56,9 +56,14 @@ class GivenActions final : public Policy {
   std::map<SceneId, std::pair<const std::vector<Arms>*, std::size_t>> playing_;
 };
 
+/// Of a run of replays. Those that an earlier evac made, from other scenes than their actions are of, have another.
+std::string HashOf(const ReplayRun& run, const std::string& suite_hash) {
+  return Sha256Hex(run.name + " from the states of " + suite_hash);
+}
+
 RunInfo InfoOf(const ReplayRun& run) {
   return {.suite_text = run.suite.text,
-          .suite_hash = Sha256Hex(run.name + " of " + run.suite.hash),
+          .suite_hash = HashOf(run, run.suite.hash),
           .suite_path = fs::absolute(run.suite.path).lexically_normal().string(),
           .evac_version = EVAC_VERSION};
 }
@@ -87,6 +92,17 @@ std::set<EpisodeKey> SimulatedKeys(const ReplayRun& run, const std::vector<Repla
   return keys;
 }
 
+/// Whether what is in `run.reality` began where the closed loop beside it did.
+bool BeganThere(const ReplayRun& run) {
+  const fs::path closed = run.reality.parent_path() / "closed";
+  if (!fs::exists(run.reality) || !fs::exists(closed)) return false;
+  const std::string found = Store::Open(run.reality, Store::Mode::kReadOnly).run().suite_hash;
+  if (found == HashOf(run, Store::Open(closed, Store::Mode::kReadOnly).run().suite_hash)) return true;
+  fmt::print(stderr, "evac: warning: {}: its replays began in other scenes than their actions are of (an earlier evac): not taken over\n",
+             run.reality.string());
+  return false;
+}
+
 }  // namespace
 
 std::vector<Replay> ReplaysOf(const Store& store, const std::string& world, const Suite& suite) {
@@ -99,7 +115,8 @@ std::vector<Replay> ReplaysOf(const Store& store, const std::string& world, cons
     if (episode.key.world != world || IsFailure(episode.stop)) continue;
     store.LoadSteps(episode);
     const PairKey& pair = episode.key.pair;
-    replays.push_back({pair, tasks.at(pair.task), states.at(pair.initial_state), std::move(episode.commands)});
+    const Task* task = tasks.at(pair.task);
+    replays.push_back({pair, task, StateOn(*task, states.at(pair.initial_state)), std::move(episode.commands)});
   }
   return replays;
 }
@@ -108,7 +125,7 @@ Store RunReplays(const ReplayRun& run, const std::vector<Replay>& replays) {
   Store store = Store::CreateOrContinue(run.folder, InfoOf(run));
   store.RemoveOrphans();
   DeclareReplays(run, replays, store);
-  if (!run.reality.empty()) TakeReality(run.reality, SimulatedKeys(run, replays), store);
+  if (BeganThere(run)) TakeReality(run.reality, SimulatedKeys(run, replays), store);
   std::optional<Store> scenes;
   if (!run.scenes.empty()) scenes = Store::Open(run.scenes, Store::Mode::kReadOnly);
   int total = 0, missing = 0;
@@ -130,6 +147,7 @@ Store RunReplays(const ReplayRun& run, const std::vector<Replay>& replays) {
                     .policy_chunk_size = run.suite.chunk_size,
                     .latency = {},
                     .video = run.suite.video,
+                    .film = world.film,
                     .keep_initial_scene = world.is_real};
     options.failures_left = total;  // a failed replay is a row without an outcome
     options.on_progress = [&](const Progress& progress) { display.Show(progress, ProgressDisplay::Clock::now()); };

@@ -49,6 +49,24 @@ TEST(Fidelity, CountsWhatWasHallucinatedAmongWhatTrulyFailed) {
   EXPECT_DOUBLE_EQ(*fidelity.counterfactuals[0].match.hallucinated.value, 1.0 / 3) << "one succeeded in truth: it is no hallucination";
 }
 
+TEST(Fidelity, SaysWhichWrongOutcomesAreTheModelsOwn) {
+  FidelityInput input = Sample();
+  Add(input.rows, "executed", "good", "ssssssssff", "----------", "ssssssssfs");
+  Add(input.rows, "executed", "fair", "ssss-fffff", "----------", "ssssffffff");
+  Add(input.rows, "executed", "bad", "sfffffffsf", "----------", "sfffffffs-");
+  const Fidelity fidelity = FidelityOf(std::move(input));
+  EXPECT_EQ(fidelity.executed.n, 28);
+  EXPECT_DOUBLE_EQ(*fidelity.executed.hallucinated.value, 1.0 / 14);
+  EXPECT_DOUBLE_EQ(*fidelity.executed.missed.value, 0);
+  EXPECT_EQ(fidelity.wrong.of_actions, 1) << "a success of good that its actions do not come to";
+  EXPECT_EQ(fidelity.wrong.led_astray, 1) << "the success of bad; of the failure of fair nobody knows";
+  const Json json = Json::parse(FidelityJson(fidelity));
+  EXPECT_EQ(json["executed"]["wrong_of_actions"], 1);
+  EXPECT_EQ(json["executed"]["wrong_led_astray"], 1);
+  EXPECT_THAT(FidelityPage(fidelity), HasSubstr("Of 2 wrong outcomes of the closed loop, 1 is wrong about the very actions"));
+  EXPECT_THAT(FidelityPage(FidelityOf(Sample())), Not(HasSubstr("the very actions"))) << "nobody asked";
+}
+
 TEST(Fidelity, RatesOfACellAreOverTheStatesThatCountInBothWorlds) {
   const Fidelity fidelity = FidelityOf(Sample());
   ASSERT_EQ(fidelity.cells.size(), 3u);
@@ -84,7 +102,7 @@ TEST(Fidelity, JsonHasEveryFieldAndSaysWhyOneIsNull) {
   const Json json = Json::parse(FidelityJson(FidelityOf(Sample())));
   for (const char* field : {"cells", "pearson", "pearson_low", "spearman", "mmrv", "mmrv_real_real", "agreement", "agreement_real_real",
                             "kappa", "hallucinated", "hallucinated_real_real", "missed", "missed_real_real", "open_loop",
-                            "counterfactual", "usable_horizon_chunks", "seconds_per_chunk", "judge"})
+                            "executed", "counterfactual", "usable_horizon_chunks", "seconds_per_chunk", "judge"})
     EXPECT_TRUE(json.contains(field)) << field;
   for (const char* field : {"n", "agreement", "hallucinated", "missed", "object_px_error_p85", "gripper_px_error_by_chunk", "psnr_by_chunk",
                             "psnr_moving_by_chunk", "psnr_moving_copy_by_chunk"})

@@ -58,6 +58,19 @@ nlohmann::json Numbers(const fs::path& out) {
   return json;
 }
 
+/// Where the bottle was in reality before anything was done, in a part's one episode.
+Eigen::Vector3d FirstPlaceOfTheBottleIn(const fs::path& part) {
+  const Store store = Store::Open(part, Store::Mode::kReadOnly);
+  for (const Episode& episode : store.Episodes()) {
+    const PrivilegedTrack track = store.LoadPrivileged(episode.key.Id());
+    if (track.empty()) continue;
+    for (const PrivilegedFrame::Body& body : track.front().bodies) {
+      if (body.name == "bottle") return body.base_from_body.translation();
+    }
+  }
+  return Eigen::Vector3d::Constant(std::nan(""));
+}
+
 /// Where the arms were measured to be before anything was done, in an episode of that world.
 Arms FirstArmsIn(const fs::path& out, const std::string& world) {
   const Store store = Store::Open(out / "closed", Store::Mode::kReadOnly);
@@ -80,10 +93,11 @@ TEST_F(FidelityRun, AsksEveryPartAndEndsInTheSameNumbersWhenItWasKilled) {
   std::istringstream rows(ReadFile(whole / "episodes.csv"));
   std::vector<std::string> lines;
   for (std::string line; std::getline(rows, line);) lines.push_back(line);
-  ASSERT_EQ(lines.size(), 6u) << "a head, closed loop, open loop, three counterfactuals";
+  ASSERT_EQ(lines.size(), 7u) << "a head, closed loop, open loop, executed, three counterfactuals";
   EXPECT_EQ(lines[1], "closed_loop,take_bottle,visual_pick,good,3-0000,1,1,1,");
   EXPECT_EQ(lines[2], "open_loop,take_bottle,visual_pick,good,3-0000,1,1,,");
-  for (std::size_t i = 3; i < 6; ++i) EXPECT_THAT(lines[i], HasSubstr(",3-0000,1,0,,")) << "it fails in truth";
+  EXPECT_THAT(lines[3], testing::StartsWith("executed,take_bottle,visual_pick,good,3-0000,1,")) << "what it chose in the model was done in reality";
+  for (std::size_t i = 4; i < 7; ++i) EXPECT_THAT(lines[i], HasSubstr(",3-0000,1,0,,")) << "it fails in truth";
 
   const Arms real = FirstArmsIn(whole, "real"), again_measured = FirstArmsIn(whole, "again");
   ASSERT_FALSE(real.empty());
@@ -112,6 +126,18 @@ TEST_F(FidelityRun, AsksEveryPartAndEndsInTheSameNumbersWhenItWasKilled) {
     EXPECT_THAT(taken.err, HasSubstr(part + "episodes taken over"));
   EXPECT_EQ(Numbers(again), numbers);
   EXPECT_EQ(ReadFile(again / "episodes.csv"), ReadFile(whole / "episodes.csv"));
+}
+
+/// They began from the suite's state, not from what that state is on the task: actions of one scene were done in another.
+TEST_F(FidelityRun, ReplaysInRealityStartFromTheSceneThatTheirActionsAreOf) {
+  const fs::path out = folder_ / "out";
+  std::vector<std::string> words = Words(out);
+  words.insert(words.end(), {"--parts", "executed,counterfactual,horizon"});
+  const CommandResult result = RunCommand(words);
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  const Eigen::Vector3d bottle = FirstPlaceOfTheBottleIn(out / "closed");
+  for (const char* part : {"executed", "counterfactual_shifted", "counterfactual_never_closes", "horizon"})
+    EXPECT_TRUE(FirstPlaceOfTheBottleIn(out / part).isApprox(bottle, 1e-6)) << part;
 }
 
 TEST_F(FidelityRun, AClassifierJudgesTheClipsAndSaysHowFarItIs) {
