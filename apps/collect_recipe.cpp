@@ -13,6 +13,7 @@
 #include "core/seed.h"
 #include "core/task_page.h"
 #include "policies/explorer.h"
+#include "policies/swaying_policy.h"
 #include "policies/visual_pick.h"
 #include "worldmodel/sim/scene_page.h"
 
@@ -29,6 +30,9 @@ struct PickParameter {
 constexpr PickParameter kPickParameters[] = {{"noise_m", &VisualPickOptions::noise_m},
                                              {"request_noise_m", &VisualPickOptions::request_noise_m},
                                              {"place_noise_m", &VisualPickOptions::place_noise_m},
+                                             {"high_m", &VisualPickOptions::high_m},
+                                             {"turn_deg", &VisualPickOptions::turn_deg},
+                                             {"hurry", &VisualPickOptions::hurry},
                                              {"late_close_s", &VisualPickOptions::late_close_s},
                                              {"early_release_s", &VisualPickOptions::early_release_s},
                                              {"blindness", &VisualPickOptions::blindness},
@@ -37,7 +41,11 @@ constexpr PickParameter kPickParameters[] = {{"noise_m", &VisualPickOptions::noi
 /// Besides: `miss_m` and `miss_deg`, the bias in polar form, and `retries`.
 constexpr const char* kPickExtras[] = {"miss_m", "miss_deg", "retries"};
 
+/// Of any policy: its hand strays (policies/swaying_policy.h).
+constexpr const char* kSway = "sway_m";
+
 bool IsKnown(const std::string& policy, const std::string& name) {
+  if (name == kSway) return true;
   if (policy == "learned") return false;
   if (policy == "explorer") return name == "speed";
   const auto is_it = [&](const PickParameter& known) { return name == known.name; };
@@ -167,6 +175,15 @@ VisualPickOptions PickOptions(const std::map<std::string, double>& parameters, i
   return options;
 }
 
+std::unique_ptr<Policy> MakeSteadyPolicy(const CollectJob& job, int chunk_size) {
+  if (job.behaviour->policy == "visual_pick")
+    return std::make_unique<VisualPick>(PickOptions(job.row.parameters, chunk_size));
+  if (job.behaviour->policy == "learned") return MakeLearnedPolicy(job.behaviour->checkpoint, chunk_size);
+  const auto speed = job.row.parameters.find("speed");
+  return std::make_unique<Explorer>(ExplorerOptions{ExplorationFromName(job.behaviour->does), chunk_size,
+                                                    speed == job.row.parameters.end() ? 1.0 : speed->second});
+}
+
 }  // namespace
 
 Recipe ReadRecipe(const fs::path& path, const std::vector<std::string>& assignments) {
@@ -222,12 +239,9 @@ CollectJob JobAt(const Recipe& recipe, std::uint64_t seed, std::int64_t index) {
 }
 
 std::unique_ptr<Policy> MakePolicy(const CollectJob& job, int chunk_size) {
-  if (job.behaviour->policy == "visual_pick")
-    return std::make_unique<VisualPick>(PickOptions(job.row.parameters, chunk_size));
-  if (job.behaviour->policy == "learned") return MakeLearnedPolicy(job.behaviour->checkpoint, chunk_size);
-  const auto speed = job.row.parameters.find("speed");
-  return std::make_unique<Explorer>(ExplorerOptions{ExplorationFromName(job.behaviour->does), chunk_size,
-                                                    speed == job.row.parameters.end() ? 1.0 : speed->second});
+  std::unique_ptr<Policy> policy = MakeSteadyPolicy(job, chunk_size);
+  const auto sway = job.row.parameters.find(kSway);
+  return sway == job.row.parameters.end() ? std::move(policy) : std::make_unique<SwayingPolicy>(std::move(policy), sway->second);
 }
 
 }  // namespace evac

@@ -94,7 +94,10 @@ void AddVisualPick(CLI::App& app, int& exit_code) {
       ->add_option("--place-noise-m", options->place_noise_m,
                    "how far off it takes the place to put it to be: standard deviation, per episode")
       ->capture_default_str();
-  command.app->add_option("--late-close-s", options->late_close_s, "closes the hand this late, the arm does not wait")
+  command.app->add_option("--high-m", options->high_m, "takes hold this much too high");
+  command.app->add_option("--turn-deg", options->turn_deg, "takes hold turned by this about the vertical");
+  command.app->add_option("--hurry", options->hurry, "share of its pauses that it skips, 0 to 1");
+  command.app->add_option("--late-close-s", options->late_close_s, "closes the hand this late (below 0: early), the arm does not wait")
       ->capture_default_str();
   command.app->add_option("--early-release-s", options->early_release_s, "opens the hand this early")
       ->capture_default_str();

@@ -1,5 +1,7 @@
 #include "policies/visual_episode.h"
 
+#include <numbers>
+
 #include "core/error.h"
 #include "core/geometry.h"
 #include "core/seed.h"
@@ -121,25 +123,26 @@ VisualEpisode::Plan VisualEpisode::Approach() const {
 
 VisualEpisode::Plan VisualEpisode::Transfer(const Eigen::Vector2d& error_m) const {
   const Eigen::Vector2d thing_m = thing_.xy_m + error_m;
-  const double yaw_rad = thing_.yaw_rad + knowledge_.turn_rad;
-  const Eigen::Isometry3d grasp = PointingDown(thing_m, knowledge_.grasp_m, yaw_rad);
+  const double yaw_rad = thing_.yaw_rad + knowledge_.turn_rad + options_.turn_deg * std::numbers::pi / 180;
+  const double patience = 1 - options_.hurry;
+  const Eigen::Isometry3d grasp = PointingDown(thing_m, knowledge_.grasp_m + options_.high_m, yaw_rad);
   const Eigen::Isometry3d release = Release();
   Plan plan{Timeline(last_.base_from_gripper, limits_), {}, told_};
   plan.transfers = true;
   plan.gripper_from_thing = grasp.inverse() * BaseFromObject({thing_m, thing_.yaw_rad}, knowledge_.thing.height_m);
   plan.path.MoveTo(PointingDown(thing_m, knowledge_.hover_m, yaw_rad));
   plan.path.MoveTo(grasp);
-  plan.path.Pause(kSettle_s);
+  plan.path.Pause(patience * kSettle_s);
   const double close_s = plan.path.duration_s();
-  plan.path.Pause(kClosing_s);
+  plan.path.Pause(patience * kClosing_s);
   plan.path.MoveTo(Raised(grasp, knowledge_.lift_m));
   plan.lifted_s = plan.path.duration_s();
   plan.path.MoveTo(Raised(release, knowledge_.lift_m));
   plan.lowering_s = plan.path.duration_s();
   plan.path.MoveTo(release);
-  plan.path.Pause(kSettle_s);
+  plan.path.Pause(patience * kSettle_s);
   const double open_s = plan.path.duration_s();
-  plan.path.Pause(kOpening_s);
+  plan.path.Pause(patience * kOpening_s);
   plan.path.MoveTo(release * Eigen::Translation3d(0, 0, -kRetreat_m));
   plan.path.MoveTo(home_);
   plan.hand = {last_.closure, close_s + options_.late_close_s, open_s - options_.early_release_s};
@@ -148,7 +151,7 @@ VisualEpisode::Plan VisualEpisode::Transfer(const Eigen::Vector2d& error_m) cons
 
 /// The thing's lower edge just above where it belongs, leaning so that its top falls towards the robot.
 Eigen::Isometry3d VisualEpisode::Release() const {
-  const double foot_m = knowledge_.grasp_m - knowledge_.thing.height_m;  // below the gripper, in the hand
+  const double foot_m = knowledge_.grasp_m + options_.high_m - knowledge_.thing.height_m;  // below the gripper, in the hand
   const Eigen::Vector2d place_m = target_.xy_m + place_error_m_;
   Eigen::Isometry3d pose = PointingDown(place_m, 0, knowledge_.turn_rad);
   pose.linear() = Eigen::AngleAxisd(-knowledge_.tilt_rad, Eigen::Vector3d::UnitY()) * pose.linear();

@@ -23,7 +23,10 @@ void Check(const VisualPickOptions& options) {
   Require("noise-m", options.noise_m, 0, 0.5);
   Require("request-noise-m", options.request_noise_m, 0, 0.5);
   Require("place-noise-m", options.place_noise_m, 0, 0.5);
-  Require("late-close-s", options.late_close_s, 0, 3);
+  Require("high-m", options.high_m, -0.03, 0.06);
+  Require("turn-deg", options.turn_deg, -90, 90);
+  Require("hurry", options.hurry, 0, 1);
+  Require("late-close-s", options.late_close_s, -0.5, 3);
   Require("early-release-s", options.early_release_s, 0, 3);
   Require("blindness", options.blindness, 0, 1);
   Require("request-blindness", options.request_blindness, 0, 1);

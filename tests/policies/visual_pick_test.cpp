@@ -2,7 +2,9 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <limits>
+#include <numbers>
 
 #include "core/check.h"
 #include "core/error.h"
@@ -165,6 +167,45 @@ TEST(VisualPick, HoweverWrongItIsItAsksForNothingOutsideTheWorkspace) {
   ExpectFollowable({.chunk_size = 9, .bias_m = {0.5, 0.5}});
 }
 
+/// What it tells the hand, seeing a scene that stands still.
+std::vector<ArmState> Told(const VisualPickOptions& options) {
+  sim::MujocoWorld world = SimWorld("sim");
+  const Task task = SimTask("take_bottle");
+  VisualPick policy(options);
+  policy.Reset(0, task, 5);
+  Observation seen = world.Reset(0, task, SimState(0), 1).observation;
+  std::vector<ArmState> told;
+  for (int chunk = 0; chunk < 12; ++chunk) {
+    const SceneObservation asked{0, &seen};
+    const ActionChunk answer = std::get<ActionChunk>(policy.Act({&asked, 1}).front());
+    for (const Arms& arms : answer.targets) told.push_back(arms[0]);
+    seen.arms = answer.targets.back();
+  }
+  return told;
+}
+
+double Height_m(const ArmState& arm) { return arm.base_from_gripper.translation().z(); }
+std::ptrdiff_t FirstClosing(const std::vector<ArmState>& told) {
+  return std::find_if(told.begin(), told.end(), [](const ArmState& arm) { return arm.closure > 0; }) - told.begin();
+}
+
+TEST(VisualPick, TakesHoldHigherTurnedInAHurryOrOnItsWayDown) {
+  const std::vector<ArmState> usual = Told({}), high = Told({.high_m = 0.02}), turned = Told({.turn_deg = 30}),
+                              hurried = Told({.hurry = 1}), early = Told({.late_close_s = -0.3});
+  const std::ptrdiff_t closing = FirstClosing(usual);
+  ASSERT_LT(closing, std::ssize(usual));
+  EXPECT_NEAR(Height_m(high[FirstClosing(high)]) - Height_m(usual[closing]), 0.02, 1e-6);
+  EXPECT_NEAR(RotationBetween(turned[FirstClosing(turned)].base_from_gripper, usual[closing].base_from_gripper),
+              30 * std::numbers::pi / 180, 1e-6);
+  EXPECT_GT(Height_m(early[FirstClosing(early)]), Height_m(usual[closing]) + 0.005) << "it is still on its way down";
+  const auto lifted = [&](const std::vector<ArmState>& told) {
+    std::ptrdiff_t k = FirstClosing(told);
+    while (k < std::ssize(told) && Height_m(told[k]) < Height_m(usual[closing]) + 0.02) ++k;
+    return k;
+  };
+  EXPECT_LE(lifted(hurried), lifted(usual) - 5) << "neither waits .1 s nor .55 s";
+}
+
 void ExpectRefused(const VisualPickOptions& options, const std::string& name) {
   try {
     VisualPick policy(options);
@@ -180,7 +221,11 @@ TEST(VisualPick, OptionsOutsideTheirRangeAreRefusedByName) {
   ExpectRefused({.bias_m = {0, 0.7}}, "bias-m");
   ExpectRefused({.noise_m = -0.01}, "noise-m");
   ExpectRefused({.request_noise_m = std::numeric_limits<double>::quiet_NaN()}, "request-noise-m");
+  ExpectRefused({.high_m = 0.1}, "high-m");
+  ExpectRefused({.turn_deg = 120}, "turn-deg");
+  ExpectRefused({.hurry = 2}, "hurry");
   ExpectRefused({.late_close_s = 9}, "late-close-s");
+  ExpectRefused({.late_close_s = -1}, "late-close-s");
   ExpectRefused({.early_release_s = -1}, "early-release-s");
   ExpectRefused({.blindness = 1.1}, "blindness");
   ExpectRefused({.request_blindness = -0.1}, "request-blindness");
