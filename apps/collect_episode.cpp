@@ -1,5 +1,6 @@
 #include "apps/collect_episode.h"
 
+#include <algorithm>
 #include <limits>
 #include <numeric>
 
@@ -72,16 +73,39 @@ EpisodeCollector::EpisodeCollector(const Recipe& recipe, std::filesystem::path o
     : recipe_(recipe), out_(std::move(out)), world_({.name = "real", .profile = recipe.profile, .threads = 1}) {}
 
 CollectedRun EpisodeCollector::Run(const CollectJob& job) {
-  const Task& task = TaskOf(job);
-  const std::unique_ptr<Policy> policy = MakePolicy(job, recipe_.chunk_size);
-  CollectedRun run;
+  if (!job.behaviour->unaware) return Act(job, TaskOf(job));
+  const CollectedRun there = Act(job, job.task->task);
+  return there.failure.empty() ? Repeat(job, TaskOf(job), there) : there;
+}
+
+Observation EpisodeCollector::Begin(const CollectJob& job, const Task& task, CollectedRun& run) {
   run.recorded.period_s = task.period_s;
   run.recorded.cameras = task.cameras;
   run.stop = Name(StopReason::kMaxChunks);
-  policy->Reset(0, task, job.row.policy_seed);
   WorldStep first = world_.Reset(0, task, {job.row.initial_state, job.row.state_seed}, job.row.world_seed);
   Arms start = first.observation.arms;
-  Observation observation = Append(std::move(first), std::move(start), run);
+  return Append(std::move(first), std::move(start), run);
+}
+
+std::optional<std::vector<Observation>> EpisodeCollector::Execute(const ActionChunk& chunk, CollectedRun& run) {
+  const SceneChunk driven{0, &chunk};
+  Advanced advanced = std::move(world_.Advance({&driven, 1}).front());
+  if (const auto* failure = std::get_if<Failure>(&advanced)) {
+    run.stop = Name(failure->stop);
+    run.failure = failure->message;
+    return std::nullopt;
+  }
+  std::vector<Observation> observed;
+  auto& steps = std::get<std::vector<WorldStep>>(advanced);
+  for (std::size_t k = 0; k < steps.size(); ++k) observed.push_back(Append(std::move(steps[k]), chunk.targets[k], run));
+  return observed;
+}
+
+CollectedRun EpisodeCollector::Act(const CollectJob& job, const Task& task) {
+  const std::unique_ptr<Policy> policy = MakePolicy(job, recipe_.chunk_size);
+  CollectedRun run;
+  policy->Reset(0, task, job.row.policy_seed);
+  Observation observation = Begin(job, task, run);
   StillMeter still(task.still);
   std::vector<Arms> observed;
   for (int chunks = 0; chunks < recipe_.max_chunks; ++chunks) {
@@ -90,20 +114,25 @@ CollectedRun EpisodeCollector::Run(const CollectJob& job) {
       run.stop = Name(StopReason::kStill);
       break;
     }
-    const SceneChunk driven{0, &chunk};
-    Advanced advanced = std::move(world_.Advance({&driven, 1}).front());
-    if (const auto* failure = std::get_if<Failure>(&advanced)) {
-      run.stop = Name(failure->stop);
-      run.failure = failure->message;
-      break;
-    }
     observed = {observation.arms};
-    auto& steps = std::get<std::vector<WorldStep>>(advanced);
-    for (std::size_t k = 0; k < steps.size(); ++k) {
-      observed.push_back(steps[k].observation.arms);
-      observation = Append(std::move(steps[k]), chunk.targets[k], run);
-    }
+    auto seen = Execute(chunk, run);
+    if (!seen) break;
+    for (const Observation& one : *seen) observed.push_back(one.arms);
+    observation = std::move(seen->back());
   }
+  return run;
+}
+
+CollectedRun EpisodeCollector::Repeat(const CollectJob& job, const Task& task, const CollectedRun& before) {
+  CollectedRun run;
+  Begin(job, task, run);
+  const std::vector<Arms>& told = before.recorded.told;  // the first row is where the arms were
+  const auto chunk_size = static_cast<std::size_t>(recipe_.chunk_size);
+  for (std::size_t row = 1; row < told.size(); row += chunk_size) {
+    const auto begin = told.begin() + static_cast<std::ptrdiff_t>(row);
+    if (!Execute({{begin, begin + static_cast<std::ptrdiff_t>(std::min(chunk_size, told.size() - row))}, false, 0}, run)) return run;
+  }
+  run.stop = before.stop;
   return run;
 }
 

@@ -1,6 +1,8 @@
 #pragma once
 
 #include <filesystem>
+#include <optional>
+#include <vector>
 
 #include "apps/collect_recipe.h"
 #include "core/world.h"
@@ -27,6 +29,12 @@ class EpisodeCollector {
 
  private:
   CollectedRun Run(const CollectJob& job);
+  CollectedRun Act(const CollectJob& job, const Task& task);
+  /// What was told in `before`, once more in the scene of `task`.
+  CollectedRun Repeat(const CollectJob& job, const Task& task, const CollectedRun& before);
+  Observation Begin(const CollectJob& job, const Task& task, CollectedRun& run);
+  /// @returns what was observed on the way, the last with its images; nothing if the physics failed: the run says so.
+  std::optional<std::vector<Observation>> Execute(const ActionChunk& chunk, CollectedRun& run);
 
   const Recipe& recipe_;
   std::filesystem::path out_;

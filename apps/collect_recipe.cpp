@@ -60,14 +60,16 @@ Behaviour ReadBehaviour(const Config& page) {
   behaviour.policy = page.Get<std::string>("policy");
   behaviour.does = page.Get<std::string>("does", "");
   behaviour.without_object = page.Get<bool>("without_object", false);
+  behaviour.unaware = page.Get<bool>("unaware", false);
   page.Require(behaviour.share > 0 && std::isfinite(behaviour.share), "share", "a positive number");
   const bool explores = behaviour.policy == "explorer", learned = behaviour.policy == "learned";
   page.Require(explores || learned || behaviour.policy == "visual_pick", "policy", "visual_pick, explorer or learned");
   page.Require(explores == page.Has("does"), "does", "it with policy explorer, and only there");
   page.Require(learned == page.Has("checkpoint"), "checkpoint", "it with policy learned, and only there");
+  page.Require(!behaviour.unaware || behaviour.without_object, "unaware", "it with without_object: true");
   if (explores) ExplorationFromName(behaviour.does);
   if (learned) behaviour.checkpoint = page.Path("checkpoint");
-  static const std::set<std::string> kOwn = {"name", "share", "policy", "does", "checkpoint", "without_object"};
+  static const std::set<std::string> kOwn = {"name", "share", "policy", "does", "checkpoint", "without_object", "unaware"};
   for (const std::string& key : page.Keys()) {
     if (kOwn.contains(key)) continue;
     page.Require(IsKnown(behaviour.policy, key), key, "no such field: it is no parameter of " + behaviour.policy);

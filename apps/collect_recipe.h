@@ -22,6 +22,7 @@ struct Behaviour {
   std::string does;    ///< explorer's: push, wrong_object, roam, random
   std::filesystem::path checkpoint;  ///< learned's weights
   bool without_object = false;  ///< the task's object is taken away
+  bool unaware = false;  ///< and the policy does what it does where it is there: its hand closes where the thing would be
   std::vector<std::pair<std::string, std::pair<double, double>>> parameters;  ///< uniform in [low, high], file's order
 };
 

@@ -43,6 +43,8 @@ def rows(answers):
     yield "open loop: agreement", lambda a: at(a, "open_loop", "agreement"), fixed(.9), ">="
     yield "open loop: hallucinated", lambda a: at(a, "open_loop", "hallucinated"), fixed(.05), "<="
     yield "open loop: object, px at 85 %", lambda a: at(a, "open_loop", "object_px_error_p85"), fixed(6), "<="
+    for what in ("agreement", "hallucinated", "missed"):
+        yield f"executed: {what}", lambda a, what=what: at(a, "executed", what), fixed(None), ">="
     for kind in dict.fromkeys(one["kind"] for answer in answers for one in answer["counterfactual"]):
         of_kind = lambda a, kind=kind: next((one["hallucinated"] for one in a["counterfactual"] if one["kind"] == kind), None)
         yield f"counterfactual: {kind.replace('_', ' ')}", of_kind, fixed(.05), "<="

@@ -100,6 +100,26 @@ TEST(CollectCommand, ALearnedPolicyIsRecordedWithTheSameBytesForAnyNumberOfJobs)
   EXPECT_GT(moved_m, 0.05);  // it went for the bottle
 }
 
+TEST(CollectCommand, AnUnawareHandClosesWhereTheThingWouldBe) {
+  const TempFolder folder;
+  const auto words = [&](const std::string& name, const std::string& how) {
+    return Words(folder / name, {"--episodes", "1", "--set", "chunk_size=16", "--set",
+                                 "mix=[{name: a, share: 1, policy: visual_pick" + how + "}]"});
+  };
+  ASSERT_EQ(RunCommand(words("there", "")).exit_code, 0);
+  ASSERT_EQ(RunCommand(words("away", ", without_object: true, unaware: true")).exit_code, 0);
+  const auto read = [&](const std::string& name) {
+    return ReadRecording(folder / name / "observations/take_bottle/000000", {.read_told = true});
+  };
+  const Recording there = read("there"), away = read("away");
+  ASSERT_EQ(there.told.size(), away.told.size());
+  for (std::size_t row = 1; row < there.told.size(); ++row) {
+    EXPECT_TRUE(there.told[row][0].base_from_gripper.isApprox(away.told[row][0].base_from_gripper, 1e-6)) << row;
+    EXPECT_EQ(there.told[row][0].closure, away.told[row][0].closure) << row;
+  }
+  EXPECT_THAT(ReadFile(folder / "away/manifest.csv"), HasSubstr("pretended_grasp"));
+}
+
 TEST(CollectCommand, RefusesAFolderThatHoldsAnotherCollection) {
   const TempFolder folder;
   ASSERT_EQ(RunCommand(Words(folder / "a", {"--episodes", "1"})).exit_code, 0);
@@ -148,6 +168,8 @@ TEST(Recipe, AMistakeIsNamedWithItsFieldBeforeAnythingRuns) {
   };
   EXPECT_THAT(error_of("mix.0.noise_m=[0.1, 0]"), HasSubstr("noise_m"));
   EXPECT_THAT(error_of("mix.0.noise_m=[0, 3]"), HasSubstr("noise-m"));
+  EXPECT_THAT(error_of("mix.0.sway_m=[0, 3]"), HasSubstr("sway_m"));
+  EXPECT_THAT(error_of("mix=[{name: a, share: 1, policy: visual_pick, unaware: true}]"), HasSubstr("without_object"));
   EXPECT_THAT(error_of("mix.0.courage=[0, 1]"), HasSubstr("courage"));
   EXPECT_THAT(error_of("mix.0.policy=oracle"), HasSubstr("policy"));
   EXPECT_THAT(error_of("tasks.0.object=cup"), HasSubstr("cup"));
