@@ -14,7 +14,7 @@ namespace evac {
 /// actions). What is told is what strays, so nothing is hidden from who learns from it.
 ///
 /// The error is a smooth curve over the way that the hand was sent, not over time: it begins at nothing, and a hand that is
-/// told to stay, stays.
+/// told to stay, stays. A policy that answers from where it sees its arm, and not with places, is pushed anew by each chunk.
 class SwayingPolicy final : public Policy {
  public:
   /// @param sway_m  standard deviation of the error along each axis, [0, 0.1]; it turns by 10 rad for each metre of it, too
