@@ -138,6 +138,17 @@ TEST_F(FidelityRun, ReplaysInRealityStartFromTheSceneThatTheirActionsAreOf) {
   const Eigen::Vector3d bottle = FirstPlaceOfTheBottleIn(out / "closed");
   for (const char* part : {"executed", "counterfactual_shifted", "counterfactual_never_closes", "horizon"})
     EXPECT_TRUE(FirstPlaceOfTheBottleIn(out / part).isApprox(bottle, 1e-6)) << part;
+
+  // Replays that began elsewhere, as those of an earlier evac did, are not taken over; their scene is told by their suite's hash.
+  fs::remove_all(out / "counterfactual_shifted");
+  fs::copy(out / "closed", out / "counterfactual_shifted", fs::copy_options::recursive);
+  words = Words(folder_ / "later");
+  words.insert(words.end(), {"--parts", "counterfactual", "--reality", out.string()});
+  const CommandResult later = RunCommand(words);
+  ASSERT_EQ(later.exit_code, 0) << later.err;
+  EXPECT_THAT(later.err, HasSubstr("counterfactual_shifted: its replays began in other scenes than their actions are of"));
+  EXPECT_THAT(later.err, HasSubstr("/counterfactual_never_closes: 1 episodes taken over"));
+  EXPECT_TRUE(FirstPlaceOfTheBottleIn(folder_ / "later" / "counterfactual_shifted").isApprox(bottle, 1e-6));
 }
 
 TEST_F(FidelityRun, AClassifierJudgesTheClipsAndSaysHowFarItIs) {
