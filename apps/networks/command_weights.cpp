@@ -11,8 +11,10 @@
 
 #include "apps/commands.h"
 #include "apps/network_parts.h"
+#include "core/hash.h"
 #include "core/version.h"
 #include "worldmodel/evac_config.h"
+#include "worldmodel/nn/mean_weights.h"
 #include "worldmodel/nn/weight_keys.h"
 #include "worldmodel/nn/weights.h"
 
@@ -25,6 +27,7 @@ using Json = nlohmann::ordered_json;
 
 struct WeightsArguments {
   std::string in, out, config;
+  std::vector<std::string> several;
   std::string dtype = "f32";
   std::uint64_t seed = 0;
   bool json = false, list = false, touch = false, lean = false, for_training = false;
@@ -182,17 +185,20 @@ void Save(const WeightsArguments& arguments, nn::ParameterSource& source, nn::Sa
   fmt::print("{}: {}\n", arguments.out, Size(fs::file_size(arguments.out)));
 }
 
+/// What nothing reads.
+std::vector<std::string> Unread(const nn::ModelConfig& config) {
+  const std::vector<nn::ParameterShape> keys = nn::CheckpointKeys(config);
+  const std::set<std::string> dead = nn::DeadKeys(keys);
+  std::vector<std::string> unread(dead.begin(), dead.end());
+  for (const auto& [key, shape] : keys) {
+    if (nn::IsClipLeftover(key)) unread.push_back(key);
+  }
+  return unread;
+}
+
 /// What the source lacks, or carries in another shape, among what nothing reads.
 std::vector<std::string> LeftOut(const nn::FileWeights& source, const WeightsArguments& arguments) {
-  if (arguments.lean) {
-    const std::vector<nn::ParameterShape> keys = nn::CheckpointKeys(ConfigOf(arguments));
-    const std::set<std::string> dead = nn::DeadKeys(keys);
-    std::vector<std::string> unread(dead.begin(), dead.end());
-    for (const auto& [key, shape] : keys) {
-      if (nn::IsClipLeftover(key)) unread.push_back(key);
-    }
-    return unread;
-  }
+  if (arguments.lean) return Unread(ConfigOf(arguments));
   std::vector<std::string> left_out;
   for (const auto& [key, shape] : nn::CheckpointKeys(ConfigOf(arguments))) {
     if (!source.Has(key) || source.file().Get(key).shape != shape) left_out.push_back(key);
@@ -224,6 +230,21 @@ ExitCode RunConvert(const WeightsArguments& arguments) {
   for (const auto& [key, value] : source.file().metadata()) {
     if (key != "layout") options.metadata.emplace(key, value);
   }
+  Save(arguments, source, std::move(options));
+  return ExitCode::kOk;
+}
+
+ExitCode RunMean(const WeightsArguments& arguments) {
+  DemandNew(arguments.out);
+  nn::MeanWeights source({arguments.several.begin(), arguments.several.end()}, ConfigOf(arguments));
+  nn::SaveOptions options;
+  options.without = Unread(ConfigOf(arguments));
+  for (const auto& [key, value] : source.Metadata()) {
+    if (key != "layout") options.metadata.emplace(key, value);
+  }
+  std::string hashes;
+  for (const std::string& file : arguments.several) hashes += (hashes.empty() ? "" : ",") + Sha256HexOfFile(file);
+  options.metadata["mean_of"] = hashes;
   Save(arguments, source, std::move(options));
   return ExitCode::kOk;
 }
@@ -281,6 +302,22 @@ void AddConvert(CLI::App& group, const Arguments& arguments, ExitCode& exit_code
   command->callback([arguments, &exit_code] { exit_code = RunConvert(*arguments); });
 }
 
+void AddMean(CLI::App& group, const Arguments& arguments, ExitCode& exit_code) {
+  CLI::App* command =
+      group.add_subcommand("mean", "Write the mean of several trainings of one network, without what nothing reads.");
+  command->add_option("IN", arguments->several, "two or more files of one size")->required()->expected(2, 1000);
+  command->add_option("-o,--out", arguments->out, "a new .safetensors; there whole or not at all")->required();
+  command->add_option("--dtype", arguments->dtype, "f32, bf16 or f16")
+      ->check(CLI::IsMember({"f32", "bf16", "f16"}))
+      ->capture_default_str();
+  AddConfig(*command, arguments);
+  command->footer(
+      "For trainings that began from common weights; its metadata say which files it is of (mean_of: SHA-256).\n"
+      "Example:\n"
+      "  evac weights mean first.safetensors second.safetensors --config mine.yaml --dtype bf16 --out mean.safetensors");
+  command->callback([arguments, &exit_code] { exit_code = RunMean(*arguments); });
+}
+
 void AddInit(CLI::App& group, const Arguments& arguments, ExitCode& exit_code) {
   CLI::App* command =
       group.add_subcommand("init", "Write random weights: a seed gives the same file on every machine.");
@@ -302,6 +339,7 @@ void AddWeights(CLI::App& app, ExitCode& exit_code) {
   const auto arguments = std::make_shared<WeightsArguments>();
   AddInspect(*group, arguments, exit_code);
   AddConvert(*group, arguments, exit_code);
+  AddMean(*group, arguments, exit_code);
   AddInit(*group, arguments, exit_code);
 }
 

@@ -84,6 +84,21 @@ TEST_F(WeightsCommand, ConvertThereAndBackLosesNothing) {
   EXPECT_EQ(Hash("bf16.safetensors"), Hash("again.safetensors"));
 }
 
+TEST_F(WeightsCommand, MeanFitsAndSaysWhatItIsOf) {
+  Init("a.safetensors", "--seed 7");
+  Init("b.safetensors", "--seed 8");
+  const Answer made = Evac("mean a.safetensors b.safetensors --config tiny.yaml --dtype bf16 --out mean.safetensors");
+  ASSERT_EQ(made.exit_code, 0) << made.text;
+  const Answer answer = Evac("inspect mean.safetensors --config tiny.yaml --json");
+  EXPECT_EQ(answer.exit_code, 0) << answer.text;
+  EXPECT_EQ(nlohmann::json::parse(answer.text).at("metadata").at("mean_of"), Hash("a.safetensors") + "," + Hash("b.safetensors"));
+  const Answer alone = Evac("mean a.safetensors --config tiny.yaml --out alone.safetensors");
+  EXPECT_EQ(alone.exit_code, 2) << alone.text;
+  const Answer there = Evac("mean a.safetensors b.safetensors --config tiny.yaml --out a.safetensors");
+  EXPECT_EQ(there.exit_code, 2);
+  EXPECT_THAT(there.text, HasSubstr("is there already"));
+}
+
 TEST_F(WeightsCommand, ConvertReadsWhatTorchSavedInEveryLayout) {
   Init("f32.safetensors");
   const std::string script = "python3 " EVAC_SOURCE_DIR "/tests/support/torch_checkpoint.py ";
