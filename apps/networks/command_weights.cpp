@@ -266,8 +266,9 @@ void AddConfig(CLI::App& command, const Arguments& arguments) {
       ->check(CLI::ExistingFile);
 }
 
-void AddOut(CLI::App& command, const Arguments& arguments) {
-  command.add_option("OUT", arguments->out, "a new .safetensors; there whole or not at all")->required();
+/// @param name  "OUT", or "--out" behind any number of files
+void AddOut(CLI::App& command, const Arguments& arguments, const std::string& name = "OUT") {
+  command.add_option(name, arguments->out, "a new .safetensors; there whole or not at all")->required();
   command.add_option("--dtype", arguments->dtype, "f32, bf16 or f16")
       ->check(CLI::IsMember({"f32", "bf16", "f16"}))
       ->capture_default_str();
@@ -306,11 +307,7 @@ void AddMean(CLI::App& group, const Arguments& arguments, ExitCode& exit_code) {
   CLI::App* command =
       group.add_subcommand("mean", "Write the mean of several trainings of one network, without what nothing reads.");
   command->add_option("IN", arguments->several, "two or more files of one size")->required()->expected(2, 1000);
-  command->add_option("-o,--out", arguments->out, "a new .safetensors; there whole or not at all")->required();
-  command->add_option("--dtype", arguments->dtype, "f32, bf16 or f16")
-      ->check(CLI::IsMember({"f32", "bf16", "f16"}))
-      ->capture_default_str();
-  AddConfig(*command, arguments);
+  AddOut(*command, arguments, "-o,--out");
   command->footer(
       "For trainings that began from common weights; its metadata say which files it is of (mean_of: SHA-256).\n"
       "Example:\n"
