@@ -34,6 +34,11 @@ at::Tensor Places(std::int64_t h, std::int64_t w) {
   return at::stack({x.unsqueeze(0).expand({h, w}), y.unsqueeze(1).expand({h, w})}, -1).reshape({h * w, 2});
 }
 
+/// The first look has the plain name: files of one look have no other.
+std::string LookKey(const char* name, std::int64_t look) {
+  return std::string(name) + (look == 0 ? "" : std::to_string(look)) + ".embedding";
+}
+
 }  // namespace
 
 at::Tensor ClassifierNet::Convolution::operator()(const at::Tensor& x) const {
@@ -48,15 +53,17 @@ ClassifierNet::ClassifierNet(const ClassifierShape& shape, const TakeParameter& 
     const auto convolution = [&](const char* name, const std::vector<std::int64_t>& sizes, std::int64_t stride = 1) {
       return Convolution{take(at + name + ".weight", sizes), take(at + name + ".bias", {sizes[0]}), stride};
     };
+    std::vector<at::Tensor> where;
+    for (std::int64_t i = 0; i < shape.looks; ++i) where.push_back(take(at + LookKey("where", i), {tasks, kFar}));
     views_.push_back({convolution("patches", {kNear, kPatch * kPatch * 3, 1, 1}),
                       convolution("near", {kNear, kNear, 3, 3}), convolution("down", {kFar, kNear, 3, 3}, 2),
-                      convolution("far", {kFar, kFar, 3, 3}), convolution("nudge", {2, kFar, 1, 1}),
+                      convolution("far", {kFar, kFar, 3, 3}), convolution("nudge", {2 * shape.looks, kFar, 1, 1}),
                       convolution("what", {kWhat, kFar, 1, 1}),
                       convolution("over_time", {kCoarse, kClassifierFrames * kWhat, 3, 3}),
                       convolution("coarse", {kCoarse, kCoarse, 3, 3}, 2), take(at + "task.embedding", {tasks, kFar}),
-                      take(at + "where.embedding", {tasks, kFar})});
+                      std::move(where)});
   }
-  const std::int64_t seen = kClassifierFrames * (2 + kWhat) + kCoarse;
+  const std::int64_t seen = shape.looks * kClassifierFrames * (2 + kWhat) + kCoarse;
   const auto dense = [&](const std::string& name, std::int64_t in, std::int64_t out) {
     return Dense{take(name + ".weight", {out, in}), take(name + ".bias", {out})};
   };
@@ -73,14 +80,22 @@ ClassifierNet::Seen ClassifierNet::Look(const View& view, const at::Tensor& pict
   const at::Tensor of_task = view.task.index_select(0, task).repeat_interleave(t, 0);  // [B T, C]
   x = at::relu(view.far(x) + of_task.unsqueeze(-1).unsqueeze(-1));                     // [B T, C, h, w]
   const std::int64_t h = x.size(2), w = x.size(3);
-  const at::Tensor wanted = view.where.index_select(0, task).repeat_interleave(t, 0).unsqueeze(-1);  // [B T, C, 1]
-  const at::Tensor attention = at::softmax((x.flatten(2) * wanted).sum(1), -1).unsqueeze(-1);        // [B T, h w, 1]
-  const at::Tensor nudges = view.nudge(x).flatten(2).transpose(1, 2) * 0.1;                          // [B T, h w, 2]
-  const at::Tensor what = view.what(x);  // [B T, kWhat, h, w]
-  const at::Tensor object = ((Places(h, w) + nudges) * attention).sum(1).reshape({b, t, 2});
-  const at::Tensor there = (what.flatten(2).transpose(1, 2) * attention).sum(1);  // [B T, kWhat]
-  const at::Tensor whole = at::relu(view.coarse(at::relu(view.over_time(what.reshape({b, t * kWhat, h, w})))));
-  return {at::cat({object.flatten(1) * 2 - 1, there.reshape({b, t * kWhat}), whole.mean({2, 3})}, 1), object};
+  const at::Tensor nudges = view.nudge(x).flatten(2).transpose(1, 2) * 0.1;  // [B T, h w, 2 looks]
+  const at::Tensor what = view.what(x);                                      // [B T, kWhat, h, w]
+  const at::Tensor places = Places(h, w), each = what.flatten(2).transpose(1, 2);
+  std::vector<at::Tensor> seen;
+  at::Tensor object;
+  for (std::size_t i = 0; i < view.where.size(); ++i) {
+    const at::Tensor wanted = view.where[i].index_select(0, task).repeat_interleave(t, 0).unsqueeze(-1);  // [B T, C, 1]
+    const at::Tensor attention = at::softmax((x.flatten(2) * wanted).sum(1), -1).unsqueeze(-1);           // [B T, h w, 1]
+    const at::Tensor nudge = nudges.narrow(2, 2 * static_cast<std::int64_t>(i), 2);
+    const at::Tensor place = ((places + nudge) * attention).sum(1).reshape({b, t, 2});
+    if (i == 0) object = place;
+    seen.push_back(place.flatten(1) * 2 - 1);
+    seen.push_back((each * attention).sum(1).reshape({b, t * kWhat}));
+  }
+  seen.push_back(at::relu(view.coarse(at::relu(view.over_time(what.reshape({b, t * kWhat, h, w}))))).mean({2, 3}));
+  return {at::cat(seen, 1), object};
 }
 
 ClassifierAnswer ClassifierNet::operator()(const ClassifierClips& clips) const {

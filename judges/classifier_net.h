@@ -19,6 +19,7 @@ inline constexpr std::int64_t kClassifierFrames = 8;
 struct ClassifierShape {
   std::vector<std::string> tasks, cameras;
   int height_px = 64, width_px = 96;  ///< of a picture as the network sees it, multiples of 8
+  std::int64_t looks = 1;             ///< places that are looked at in each picture, at least 1
 };
 
 /// B clips of V views and T = kClassifierFrames pictures.
@@ -30,12 +31,13 @@ struct ClassifierClips {
 
 struct ClassifierAnswer {
   at::Tensor logit;   ///< [B] of success, before calibration
-  at::Tensor object;  ///< [B, V, T, 2] where it looked: x, y in parts of the picture. Trained to be the task's object
+  at::Tensor object;  ///< [B, V, T, 2] where it looked first: x, y in parts of the picture. Trained to be the task's object
 };
 
 /// Says from eight pictures whether a task was done. Each view has an encoder of its own (four convolutions, to a map
-/// an eighth of the picture's size) and a place where it looks, found anew in every picture: what is there and where
-/// that is, over time, decides, together with a coarse look at the whole.
+/// an eighth of the picture's size) and places where it looks, found anew in every picture: what is there and where
+/// that is, over time, decides, together with a coarse look at the whole. The first place is trained to be the task's
+/// object; what the others are (where the object belongs, the hand) is for the training to find.
 class ClassifierNet {
  public:
   /// @param shape  with at least one task and one camera
@@ -54,11 +56,11 @@ class ClassifierNet {
   struct View {
     Convolution patches, near, down, far, nudge, what, over_time, coarse;
     at::Tensor task;   ///< [tasks, C] what each task adds to the encoder's last features
-    at::Tensor where;  ///< [tasks, C] which features each task looks for
+    std::vector<at::Tensor> where;  ///< of each look [tasks, C]: which features each task looks for
   };
   struct Seen {
     at::Tensor features;  ///< [B, …]
-    at::Tensor object;    ///< [B, T, 2]
+    at::Tensor object;    ///< [B, T, 2] of the first look
   };
   Seen Look(const View& view, const at::Tensor& pictures, const at::Tensor& task) const;
 

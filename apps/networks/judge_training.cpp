@@ -63,6 +63,7 @@ train::Settings SettingsOf(JudgeTrainingOptions& options) {
                               {"drop_view", &options.drop_view},
                               {"jitter", &options.jitter},
                               {"longest", &options.longest},
+                              {"looks", &options.looks},
                               {"object_weight", &options.object_weight},
                               {"reconstructed_share", &options.reconstructed_share},
                               {"shift_px", &options.shift_px},
@@ -114,6 +115,7 @@ ClassifierClips ForNetwork(const at::Tensor& bytes, const JudgeClips& clips) {
 JudgeTraining::JudgeTraining(const JudgeClipSource& source, const JudgeClips& fit, const JudgeTrainingOptions& options)
     : source_(source), fit_(fit), options_(options) {
   if (options.batch < 1) throw InvalidInput("judge training: batch is {}, wanted at least 1", options.batch);
+  if (options.looks < 1 || options.looks > 16) throw InvalidInput("judge training: looks is {}, wanted 1 … 16", options.looks);
   if (!(options.longest >= 1)) throw InvalidInput("judge training: longest is {}, wanted at least 1", options.longest);
   if (options.changes.blur_times < 1)
     throw InvalidInput("judge training: blur_times is {}, wanted at least 1", options.changes.blur_times);

@@ -18,6 +18,7 @@ struct JudgeTrainingOptions {
   double calibration = 0.15;  ///< share of the training split's initial states that only calibrates
   double drop_view = 0.5;     ///< share of clips of which the first view alone is shown
   double jitter = 0.3;        ///< pictures between first and last move by up to this part of their distance
+  std::int64_t looks = 1;     ///< places that each view looks at in each picture; the first is trained to be the object
   double longest = 1;         ///< clips are seen as up to so many times as long, as if they had stood still at the end
   double object_weight = 1;   ///< of looking where the object is, beside the verdict
   double reconstructed_share = 0.5;  ///< share of clips seen as a codec gives them back; without one, none

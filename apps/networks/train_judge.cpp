@@ -107,8 +107,12 @@ void Say(const train::JobPlace& place, const Judged& judged) {
   }
 }
 
+ClassifierShape ShapeOf(const JudgeClipSource& clips, const JudgeTrainingOptions& options) {
+  return {clips.tasks, clips.cameras, clips.height_px, clips.width_px, options.looks};
+}
+
 /// What a judge to go on from must be, or it would be asked about other tasks than it knows.
-void CheckInit(const JudgeData& data) {
+void CheckInit(const JudgeData& data, const JudgeTrainingOptions& options) {
   if (data.init.empty()) return;
   const WeightFile file(data.init, kClassifierFormat);
   const auto check = [&](const char* key, const std::string& wanted) {
@@ -119,6 +123,9 @@ void CheckInit(const JudgeData& data) {
   check("cameras", Joined(data.learn.cameras));
   check("height_px", std::to_string(data.learn.height_px));
   check("width_px", std::to_string(data.learn.width_px));
+  const std::int64_t looks = file.card().contains("looks") ? file.Whole("looks", 1, 16) : 1;
+  if (looks != options.looks)
+    throw InvalidInput("{}: it looks at {} places, wanted {} as the training page's judge.looks", data.init.string(), looks, options.looks);
 }
 
 /// Marks of the clips that were learned from or calibrated with, those of the judge it went on from among them.
@@ -159,6 +166,7 @@ TensorMetadata CardText(const Judged& judged, const JudgeData& data, const Judge
                          {"ece", number(judged.whole.ece)},
                          {"kappa_first_view", number(judged.first_view.kappa)},
                          {"licence", "as the project"}};
+  if (options.looks > 1) card["looks"] = std::to_string(options.looks);
   if (judged.masked) card["kappa_masked"] = number(judged.masked->kappa);
   if (const std::string marks = MarksOf(learn, data.init); !marks.empty()) card["learned_from"] = marks;
   if (learn.KnowsLengths()) {
@@ -189,8 +197,8 @@ void Write(const train::JobPlace& place, const Learners<ClassifierNet>& learners
 }  // namespace
 
 void CalibrateJudge(const train::JobPlace& place, const JudgeTrainingOptions& options, const JudgeData& data) {
-  CheckInit(data);
-  const ClassifierShape shape{data.learn.tasks, data.learn.cameras, data.learn.height_px, data.learn.width_px};
+  CheckInit(data, options);
+  const ClassifierShape shape = ShapeOf(data.learn, options);
   const Learners<ClassifierNet> learners(shape, options.job.trainer.seed, 1, data.init);
   const Judged judged = MeasureAll(learners.net(), data, data.learn.clips, options);
   Say(place, judged);
@@ -200,9 +208,9 @@ void CalibrateJudge(const train::JobPlace& place, const JudgeTrainingOptions& op
 train::TrainerSummary TrainJudge(const train::JobPlace& place, const JudgeTrainingOptions& given,
                                  const JudgeData& data) {
   JudgeTrainingOptions options = given;
-  CheckInit(data);
+  CheckInit(data, options);
   const JudgeSplit split = SplitForJudge(data.learn.clips, options);
-  const ClassifierShape shape{data.learn.tasks, data.learn.cameras, data.learn.height_px, data.learn.width_px};
+  const ClassifierShape shape = ShapeOf(data.learn, options);
   const Learners<ClassifierNet> learners(shape, options.job.trainer.seed, Workers(place, options.job), data.init);
   const ClassifierNet& net = learners.net();
   const JudgeTraining training(data.learn, split.fit, options);

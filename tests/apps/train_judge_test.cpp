@@ -118,6 +118,22 @@ TEST_F(TrainJudgeTest, TrainedForLongerClipsItIsMeasuredOnThem) {
   EXPECT_THROW(loss(0.5), Error);
 }
 
+TEST_F(TrainJudgeTest, ItMayLookAtMorePlacesThanTheObject) {
+  JudgeTrainingOptions options = Quick(150);
+  options.looks = 3;
+  Train(Place("looks"), options);
+  const std::filesystem::path weights = folder_ / "looks" / "judge.safetensors";
+  const WeightFile file(weights, "evac-classifier 1");
+  EXPECT_EQ(file.Text("looks"), "3");
+  EXPECT_GT(file.Number("kappa"), 0.8);
+  EXPECT_NO_THROW(ClassifierJudge(weights, folder_.path()));
+
+  EXPECT_THAT([&] { Train(Place("on"), Quick(2), nullptr, weights); },
+              ThrowsMessage<Error>(HasSubstr("looks at 3 places, wanted 1")));
+  options.looks = 0;
+  EXPECT_THAT([&] { Train(Place("none"), options); }, ThrowsMessage<Error>(HasSubstr("looks is 0, wanted 1 … 16")));
+}
+
 TEST_F(TrainJudgeTest, OneThatLearnedNothingIsWarnedOf) {
   train::JobPlace place = Place("nothing");
   std::string said;
