@@ -12,6 +12,7 @@
 #include "apps/work_share.h"
 #include "core/error.h"
 #include "core/file.h"
+#include "core/store_lock.h"
 #include "judges/attempt.h"
 
 namespace evac {
@@ -28,7 +29,6 @@ void Claim(const CollectArguments& arguments, const Recipe& recipe) {
                      {"recipe_sha256", recipe.hash},
                      {"recipe", recipe.text}};
   const fs::path path = arguments.out / "collection.json";
-  MakeFolders(arguments.out);
   if (!fs::exists(path)) return WriteFileAtomically(path, page.dump(2) + "\n");
   const Json before = Json::parse(ReadFile(path), nullptr, /*allow_exceptions=*/false);
   for (const char* field : {"version", "seed", "recipe_sha256"}) {
@@ -128,6 +128,8 @@ void PrintFates(const Recipe& recipe, const std::vector<CollectedEpisode>& rows)
 void Collect(const CollectArguments& arguments) {
   Recipe recipe = ReadRecipe(arguments.recipe, arguments.assignments);
   if (arguments.episodes > 0) recipe.episodes = arguments.episodes;
+  MakeFolders(arguments.out);
+  const RunLock lock(arguments.out / "lock");
   Claim(arguments, recipe);
   std::vector<std::int64_t> todo;
   for (std::int64_t index = 0; index < recipe.episodes; ++index) {

@@ -31,7 +31,7 @@ RunLock::RunLock(const std::filesystem::path& file)
     const std::string holder = Holder(descriptor_);
     ::close(descriptor_);
     if (error != EWOULDBLOCK) throw InternalError("{}: cannot be locked: {}", file.string(), std::strerror(error));
-    throw InvalidInput("{}: {} is writing this run; wait for it or stop it", file.parent_path().string(), holder);
+    throw InvalidInput("{}: {} is writing here; wait for it or stop it", file.parent_path().string(), holder);
   }
   const std::string number = std::to_string(::getpid()) + "\n";
   if (::ftruncate(descriptor_, 0) != 0 || ::pwrite(descriptor_, number.data(), number.size(), 0) < 0) {

@@ -4,7 +4,7 @@
 
 namespace evac {
 
-/// RUN/lock, held by the one process that may write the run. The kernel releases it with the process, however that
+/// FOLDER/lock, held by the one process that may write the folder: a run, a collection, shards. The kernel releases it with the process, however that
 /// ends.
 class RunLock {
  public:

@@ -26,7 +26,7 @@ ClassifierShape ShapeOf(const WeightFile& file) {
                        kClassifierFrames);
   ClassifierShape shape{file.Names("tasks"), file.Names("cameras"), file.Whole("height_px", 8, 4096),
                         file.Whole("width_px", 8, 4096)};
-  if (file.card().contains("looks")) shape.looks = file.Whole("looks", 1, 16);
+  shape.looks = LooksOnCard(file);
   if (shape.height_px % 8 != 0 || shape.width_px % 8 != 0)
     throw InvalidInput("{}: pictures of {}x{}, wanted multiples of 8", file.name(), shape.width_px, shape.height_px);
   return shape;

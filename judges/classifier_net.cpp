@@ -41,6 +41,8 @@ std::string LookKey(const char* name, std::int64_t look) {
 
 }  // namespace
 
+ClassifierColumns ColumnsOfAView() { return {kClassifierFrames * (2 + kWhat), kCoarse}; }
+
 at::Tensor ClassifierNet::Convolution::operator()(const at::Tensor& x) const {
   const std::int64_t padding = weight.size(2) / 2;
   return at::conv2d(x, weight, bias, stride, padding);
@@ -63,7 +65,7 @@ ClassifierNet::ClassifierNet(const ClassifierShape& shape, const TakeParameter& 
                       convolution("coarse", {kCoarse, kCoarse, 3, 3}, 2), take(at + "task.embedding", {tasks, kFar}),
                       std::move(where)});
   }
-  const std::int64_t seen = shape.looks * kClassifierFrames * (2 + kWhat) + kCoarse;
+  const std::int64_t seen = shape.looks * ColumnsOfAView().look + ColumnsOfAView().whole;
   const auto dense = [&](const std::string& name, std::int64_t in, std::int64_t out) {
     return Dense{take(name + ".weight", {out, in}), take(name + ".bias", {out})};
   };

@@ -15,6 +15,13 @@ using TakeParameter = std::function<at::Tensor(const std::string& key, const std
 /// How many pictures of a clip the classifier looks at, evenly spaced in time, first and last among them.
 inline constexpr std::int64_t kClassifierFrames = 8;
 
+/// How many numbers of a view the decision is told, view after view, and behind them the task's.
+struct ClassifierColumns {
+  std::int64_t look = 0;   ///< of each place that is looked at
+  std::int64_t whole = 0;  ///< of the look at the whole, behind those
+};
+ClassifierColumns ColumnsOfAView();
+
 /// What a classifier can judge.
 struct ClassifierShape {
   std::vector<std::string> tasks, cameras;

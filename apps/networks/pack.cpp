@@ -13,6 +13,7 @@
 #include "core/file.h"
 #include "core/hash.h"
 #include "core/seed.h"
+#include "core/store_lock.h"
 #include "worldmodel/clip.h"
 #include "worldmodel/evac_config.h"
 #include "worldmodel/nn/threads.h"
@@ -179,7 +180,6 @@ fs::path ShardPath(const fs::path& out, std::size_t number) {
 
 /// OUT/packing.json says which packing the shards beside it are of.
 void Claim(const PackArguments& arguments, const Packing& packing) {
-  MakeFolders(arguments.out);
   const fs::path path = arguments.out / "packing.json";
   const std::string text =
       Json{{"format", "evac-packing"}, {"recipe", packing.recipe}, {"shards", packing.shards.size()}}.dump(1) + "\n";
@@ -278,6 +278,8 @@ void WriteIndex(const PackArguments& arguments, const Packing& packing) {
 
 void Pack(const PackArguments& arguments) {
   const Packing packing = Plan(arguments);
+  MakeFolders(arguments.out);
+  const RunLock lock(arguments.out / "lock");
   Claim(arguments, packing);
   WriteLists(arguments, packing);
   std::vector<std::size_t> todo;

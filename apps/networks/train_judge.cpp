@@ -8,6 +8,7 @@
 
 #include "apps/networks/judge_quality.h"
 #include "apps/networks/judge_tables.h"
+#include "apps/networks/judge_widen.h"
 #include "apps/networks/learners.h"
 #include "apps/work_share.h"
 #include "core/error.h"
@@ -123,9 +124,18 @@ void CheckInit(const JudgeData& data, const JudgeTrainingOptions& options) {
   check("cameras", Joined(data.learn.cameras));
   check("height_px", std::to_string(data.learn.height_px));
   check("width_px", std::to_string(data.learn.width_px));
-  const std::int64_t looks = file.card().contains("looks") ? file.Whole("looks", 1, 16) : 1;
-  if (looks != options.looks)
-    throw InvalidInput("{}: it looks at {} places, wanted {} as the training page's judge.looks", data.init.string(), looks, options.looks);
+  if (LooksOnCard(file) > options.looks)
+    throw InvalidInput("{}: it looks at {} places, wanted at most {} as the training page's judge.looks", data.init.string(), LooksOnCard(file), options.looks);
+}
+
+/// The judge to go on from, with as many looks as are wanted: itself, or one beside the weights that will be written.
+std::filesystem::path BeginningOf(const train::JobPlace& place, const ClassifierShape& shape, const JudgeTrainingOptions& options,
+                                  const std::filesystem::path& init) {
+  if (init.empty() || LooksOnCard(WeightFile(init, kClassifierFormat)) == shape.looks) return init;
+  MakeFolders(place.out);
+  std::filesystem::path widened = place.out / "begin.safetensors";
+  WidenJudge(init, shape, options.job.trainer.seed, widened);
+  return widened;
 }
 
 /// Marks of the clips that were learned from or calibrated with, those of the judge it went on from among them.
@@ -199,7 +209,7 @@ void Write(const train::JobPlace& place, const Learners<ClassifierNet>& learners
 void CalibrateJudge(const train::JobPlace& place, const JudgeTrainingOptions& options, const JudgeData& data) {
   CheckInit(data, options);
   const ClassifierShape shape = ShapeOf(data.learn, options);
-  const Learners<ClassifierNet> learners(shape, options.job.trainer.seed, 1, data.init);
+  const Learners<ClassifierNet> learners(shape, options.job.trainer.seed, 1, BeginningOf(place, shape, options, data.init));
   const Judged judged = MeasureAll(learners.net(), data, data.learn.clips, options);
   Say(place, judged);
   Write(place, learners, judged, data, CardText(judged, data, options, 0));
@@ -211,7 +221,8 @@ train::TrainerSummary TrainJudge(const train::JobPlace& place, const JudgeTraini
   CheckInit(data, options);
   const JudgeSplit split = SplitForJudge(data.learn.clips, options);
   const ClassifierShape shape = ShapeOf(data.learn, options);
-  const Learners<ClassifierNet> learners(shape, options.job.trainer.seed, Workers(place, options.job), data.init);
+  const Learners<ClassifierNet> learners(shape, options.job.trainer.seed, Workers(place, options.job),
+                                          BeginningOf(place, shape, options, data.init));
   const ClassifierNet& net = learners.net();
   const JudgeTraining training(data.learn, split.fit, options);
   options.job.trainer.identity = IdentityOf(SettingsOf(options)) + data.learn.recipe + data.learn.Codec() +

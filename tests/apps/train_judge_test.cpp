@@ -11,6 +11,7 @@
 #include "apps/networks/judge_quality.h"
 #include "apps/networks/judge_shard_clips.h"
 #include "apps/networks/judge_tables.h"
+#include "apps/networks/judge_widen.h"
 #include "apps/networks/learners.h"
 #include "core/error.h"
 #include "core/file.h"
@@ -129,9 +130,27 @@ TEST_F(TrainJudgeTest, ItMayLookAtMorePlacesThanTheObject) {
   EXPECT_NO_THROW(ClassifierJudge(weights, folder_.path()));
 
   EXPECT_THAT([&] { Train(Place("on"), Quick(2), nullptr, weights); },
-              ThrowsMessage<Error>(HasSubstr("looks at 3 places, wanted 1")));
+              ThrowsMessage<Error>(HasSubstr("looks at 3 places, wanted at most 1")));
   options.looks = 0;
   EXPECT_THAT([&] { Train(Place("none"), options); }, ThrowsMessage<Error>(HasSubstr("looks is 0, wanted 1 … 16")));
+}
+
+TEST_F(TrainJudgeTest, AJudgeThatIsGivenMoreLooksBeginsAsItWas) {
+  Train(Place("first"), Quick(60));
+  const std::filesystem::path first = folder_ / "first" / "judge.safetensors", wide = folder_ / "wide.safetensors";
+  const ShardClips set({folder_ / "shards"}, train::Split::kTrain, nullptr);
+  const auto logits = [&](std::int64_t looks, const std::filesystem::path& weights) {
+    const Learners<ClassifierNet> learners(ClassifierShape{set.tasks, set.cameras, 16, 24, looks}, 3, 1, weights);
+    return Logits(learners.net(), set, set.clips, {});
+  };
+  WidenJudge(first, ClassifierShape{set.tasks, set.cameras, 16, 24, 3}, 3, wide);
+  EXPECT_THAT(logits(3, wide), testing::Pointwise(testing::DoubleNear(1e-5), logits(1, first)));
+
+  JudgeTrainingOptions more = Quick(4);
+  more.looks = 3;
+  Train(Place("more"), more, nullptr, first);
+  EXPECT_EQ(WeightFile(folder_ / "more" / "judge.safetensors", "evac-classifier 1").Text("looks"), "3");
+  EXPECT_NO_THROW(ClassifierJudge(folder_ / "more" / "judge.safetensors", folder_.path()));
 }
 
 TEST_F(TrainJudgeTest, OneThatLearnedNothingIsWarnedOf) {

@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 #include <signal.h>
 #include <sys/wait.h>
+#include <unistd.h>
 
 #include <set>
 
@@ -11,6 +12,7 @@
 #include "core/hash.h"
 #include "core/recording.h"
 #include "core/seed.h"
+#include "core/store_lock.h"
 #include "core/tensor_file.h"
 #include "tests/support/command.h"
 #include "tests/support/temp_folder.h"
@@ -37,7 +39,7 @@ std::vector<std::string> Words(const fs::path& out, const std::vector<std::strin
 std::string HashesBelow(const fs::path& root) {
   std::set<fs::path> files;
   for (const auto& entry : fs::recursive_directory_iterator(root)) {
-    if (entry.is_regular_file()) files.insert(fs::relative(entry.path(), root));
+    if (entry.is_regular_file() && entry.path().filename() != "lock") files.insert(fs::relative(entry.path(), root));
   }
   std::string all;
   for (const fs::path& file : files) all += file.string() + " " + Sha256HexOfFile(root / file) + "\n";
@@ -58,6 +60,25 @@ TEST(CollectCommand, KilledAndGoneOnWithItGivesTheSameBytesForAnyNumberOfJobs) {
     if (entry.path().extension() == ".tmp") fs::remove(entry.path());  // of the file that was being written
   }
   EXPECT_EQ(HashesBelow(cut), HashesBelow(folder / "whole"));
+}
+
+TEST(CollectCommand, AFolderThatAnotherProcessWritesIsRefusedWithItsNumber) {
+  const TempFolder folder;
+  fs::create_directory(folder / "all");
+  {
+    const RunLock lock(folder / "all/lock");
+    const CommandResult second = RunCommand(Words(folder / "all", {"--episodes", "1"}));
+    EXPECT_EQ(second.exit_code, 2);
+    EXPECT_THAT(second.err, HasSubstr("process " + std::to_string(::getpid()) + " is writing here"));
+    EXPECT_FALSE(fs::exists(folder / "all/collection.json"));
+  }
+  ASSERT_EQ(RunCommand(Words(folder / "all", {"--episodes", "1"})).exit_code, 0);
+  fs::create_directory(folder / "shards");
+  const RunLock lock(folder / "shards/lock");
+  const CommandResult packed = RunCommand({Binary("evac"), "pack", folder / "all", "--out", folder / "shards", "--config", kModel});
+  EXPECT_EQ(packed.exit_code, 2);
+  EXPECT_THAT(packed.err, HasSubstr("is writing here"));
+  EXPECT_FALSE(fs::exists(folder / "shards/packing.json"));
 }
 
 TEST(CollectCommand, ACollectionIsARecordingTreeThatPacks) {

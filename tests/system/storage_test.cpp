@@ -94,7 +94,7 @@ TEST(Storage, ARunThatAnotherProcessWritesIsRefusedWithItsNumberAndGoesOnUnharme
        {RunWords(kFaults, folder / "run"), {Binary("evac"), "resume", (folder / "run").string(), "--retry-failed"}}) {
     const CommandResult second = RunCommand(words);
     EXPECT_EQ(second.exit_code, 2);
-    EXPECT_THAT(second.err, HasSubstr(fmt::format("process {} is writing this run", first)));
+    EXPECT_THAT(second.err, HasSubstr(fmt::format("process {} is writing here", first)));
   }
   int status = -1;
   ::waitpid(first, &status, 0);
