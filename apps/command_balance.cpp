@@ -2,6 +2,7 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
+#include <cmath>
 #include <memory>
 #include <set>
 
@@ -25,7 +26,7 @@ std::string Share(std::int64_t part, std::int64_t whole) {
 
 std::string Row(const std::vector<PairedClip>& clips, double threshold, const char* what) {
   const Confusion c = ConfusionAt(clips, threshold);
-  return fmt::format("{:>9.2f}  {}   {}   {:>9.3f}  {}\n", threshold, Share(c.only_judge_success, c.only_judge_success + c.both_failure),
+  return fmt::format("{:>9.3f}  {}   {}   {:>9.3f}  {}\n", threshold, Share(c.only_judge_success, c.only_judge_success + c.both_failure),
                      Share(c.only_human_success, c.only_human_success + c.both_success), *StatisticsOf(c).accuracy, what);
 }
 
@@ -39,8 +40,9 @@ std::string Table(const std::vector<PairedClip>& clips, double card, double bala
   return text;
 }
 
-/// The card with another threshold. What was measured with the threshold before keeps its number, and says so; the clips
-/// that chose the new one are none that it may be asked about.
+/// The card with an offset of the logit that makes the balanced probability .5, and the threshold there: so `unsure`
+/// is as wide on both sides, wherever the balance was found. What was measured with the threshold before keeps its number,
+/// and says so; the clips that chose the new one are none that it may be asked about.
 TensorMetadata Balanced(const WeightFile& file, const PairedClips& paired, const Estimate& balance, const std::string& run_hash) {
   TensorMetadata card = file.card();
   std::set<std::string> marks;
@@ -51,7 +53,9 @@ TensorMetadata Balanced(const WeightFile& file, const PairedClips& paired, const
     if (!clip.video_sha256.empty()) marks.insert(ClipMark(clip.video_sha256));
   }
   card.try_emplace("threshold_of_kappas", card.at("threshold"));
-  card["threshold"] = fmt::format("{:.2f}", *balance.value);
+  const double before = card.contains("offset") ? file.Number("offset") : 0;
+  card["offset"] = fmt::format("{:.6g}", before + file.Number("temperature") * std::log(*balance.value / (1 - *balance.value)));
+  card["threshold"] = "0.5";
   card["balanced_on"] = fmt::format("{} clips of world {} of run {}", paired.clips.size(), paired.world, run_hash.substr(0, 12));
   if (!marks.empty()) card["learned_from"] = fmt::format("{}", fmt::join(marks, ","));
   return card;
@@ -81,7 +85,7 @@ ExitCode Balance(const BalanceArguments& arguments) {
   const Estimate balance = BalanceOf(paired.clips);
   fmt::print("{}", Table(paired.clips, before, *balance.value));
   if (balance.interval)
-    fmt::print("balanced: {:.2f}, [{:.2f}, {:.2f}] had there been other initial states ({:.0f} %, {})\n", *balance.value, balance.interval->low,
+    fmt::print("balanced: {:.3f}, [{:.3f}, {:.3f}] had there been other initial states ({:.0f} %, {})\n", *balance.value, balance.interval->low,
                balance.interval->high, 100 * balance.confidence, balance.method);
   if (!arguments.out.empty()) Write(arguments, Balanced(file, paired, balance, store.run().suite_hash));
   return ExitCode::kOk;

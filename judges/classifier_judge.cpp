@@ -37,6 +37,7 @@ ClassifierCard CardOf(const WeightFile& file) {
   if (card.temperature <= 0 || card.threshold <= 0 || card.threshold >= 1 || card.unsure < 0)
     throw InvalidInput("{}: temperature {}, threshold {}, unsure {}: wanted above 0, in (0, 1), at least 0",
                        file.name(), card.temperature, card.threshold, card.unsure);
+  if (file.card().contains("offset")) card.offset = file.Number("offset");
   if (file.card().contains("longest_frames")) card.longest_frames = file.Whole("longest_frames", 1, 1000000);
   return card;
 }
@@ -126,7 +127,7 @@ double ClassifierJudge::Probability(const Task& task, const std::filesystem::pat
     }
   }
   clip.pictures = bytes.to(at::kFloat) / 127.5 - 1;
-  return 1 / (1 + std::exp(-network_->net(clip).logit.item<double>() / card_.temperature));
+  return 1 / (1 + std::exp((card_.offset - network_->net(clip).logit.item<double>()) / card_.temperature));
 }
 
 Verdict ClassifierJudge::Rate(const Task& task, const Episode& episode) {

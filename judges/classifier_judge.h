@@ -13,10 +13,11 @@ namespace evac {
 
 /// What a classifier's card says of its answers.
 struct ClassifierCard {
-  double temperature = 1;  ///< the network's logit is divided by it: then its probabilities can be believed
+  double temperature = 1;  ///< the network's logit, less the offset, is divided by it: then its probabilities can be believed
   double threshold = 0.5;  ///< success from here on
   double unsure = 0;       ///< closer than this to the threshold: cannot tell
   int longest_frames = 0;  ///< no clip that it learned from was longer; 0: unknown
+  double offset = 0;       ///< of the logit: where `evac judge balance` found that imagined clips are even
 };
 
 /// Success, failure or cannot tell, by the card.

@@ -4,8 +4,11 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
+#include <cmath>
 #include <map>
+#include <optional>
 #include <set>
+#include <utility>
 
 #include "core/error.h"
 #include "core/seed.h"
@@ -13,19 +16,44 @@
 namespace evac {
 namespace {
 
-struct ThresholdItems {
-  std::vector<double> probabilities;
-  std::vector<int> outcomes;
-  void Add(const PairedClip& clip) {
-    probabilities.push_back(clip.probability);
-    outcomes.push_back(clip.succeeded ? 1 : 0);
-  }
+constexpr double kNearest = 1e-9;  // to 0 or 1: what is closer has a logit of rounding
+
+double Logit(double p) {
+  const double inside = std::clamp(p, kNearest, 1 - kNearest);
+  return std::log(inside / (1 - inside));
+}
+
+/// What a threshold between two clips gets wrong both ways, and where that is.
+struct Gap {
+  std::int64_t imbalance;  ///< the difference of the two shares, times both counts: whole, so that ties are ties
+  double logit;            ///< the middle
 };
 
-ThresholdItems ItemsOf(const std::vector<PairedClip>& clips) {
-  ThresholdItems items;
-  for (const PairedClip& clip : clips) items.Add(clip);
-  return items;
+/// Of all gaps between clips of different probability the one whose shares differ least; of two the one next to .5.
+Number BalancedLogit(std::vector<const PairedClip*> clips) {
+  const auto successes = std::ranges::count_if(clips, &PairedClip::succeeded);
+  const auto failures = static_cast<std::int64_t>(clips.size()) - successes;
+  if (failures == 0 || successes == 0) return Undefined{"all outcomes are alike"};
+  std::ranges::sort(clips, {}, &PairedClip::probability);
+  std::optional<Gap> best;
+  std::int64_t called_good = failures, called_bad = 0;
+  for (std::size_t i = 0; i + 1 < clips.size(); ++i) {
+    if (clips[i]->succeeded) ++called_bad;
+    else --called_good;
+    const double low = clips[i]->probability, high = clips[i + 1]->probability;
+    if (low == high) continue;
+    const Gap gap{std::abs(called_good * successes - called_bad * failures), (Logit(low) + Logit(high)) / 2};
+    const auto rank = [](const Gap& of) { return std::pair(of.imbalance, std::abs(of.logit)); };
+    if (!best || rank(gap) < rank(*best)) best = gap;
+  }
+  if (!best) return Undefined{"all probabilities are alike"};
+  return best->logit;
+}
+
+Number BalancedProbability(const std::vector<const PairedClip*>& clips) {
+  const Number logit = BalancedLogit(clips);
+  if (!logit) return logit;
+  return 1 / (1 + std::exp(-*logit));
 }
 
 /// An episode's verdicts, by judge.
@@ -97,8 +125,13 @@ PairedClips PairedClipsOf(const Store& store, const std::string& judge, const st
 }
 
 Confusion ConfusionAt(const std::vector<PairedClip>& clips, double threshold) {
-  const ThresholdItems items = ItemsOf(clips);
-  return ConfusionAt(items.probabilities, items.outcomes, threshold);
+  std::vector<double> probabilities;
+  std::vector<int> outcomes;
+  for (const PairedClip& clip : clips) {
+    probabilities.push_back(clip.probability);
+    outcomes.push_back(clip.succeeded ? 1 : 0);
+  }
+  return ConfusionAt(probabilities, outcomes, threshold);
 }
 
 Estimate BalanceOf(const std::vector<PairedClip>& clips, const BootstrapOptions& options) {
@@ -106,8 +139,9 @@ Estimate BalanceOf(const std::vector<PairedClip>& clips, const BootstrapOptions&
   balance.n = static_cast<std::int64_t>(clips.size());
   balance.confidence = options.confidence;
   balance.method = fmt::format("bootstrap over initial states, percentile, B={}, seed {}", options.replicates, options.seed);
-  const ThresholdItems items = ItemsOf(clips);
-  balance.value = BalancedThreshold(items.probabilities, items.outcomes);
+  std::vector<const PairedClip*> all;
+  for (const PairedClip& clip : clips) all.push_back(&clip);
+  balance.value = BalancedProbability(all);
   if (!balance.value) {
     balance.interval = Undefined{balance.value.reason()};
     return balance;
@@ -119,11 +153,12 @@ Estimate BalanceOf(const std::vector<PairedClip>& clips, const BootstrapOptions&
   Resampled resampled{*balance.value, {}, {}};
   SplitMix64 random(options.seed);
   for (int replicate = 0; replicate < options.replicates; ++replicate) {
-    ThresholdItems drawn;
+    std::vector<const PairedClip*> drawn;
     for (std::size_t i = 0; i < clusters.size(); ++i) {
-      for (const PairedClip* clip : *clusters[random.Below(clusters.size())]) drawn.Add(*clip);
+      const std::vector<const PairedClip*>& cluster = *clusters[random.Below(clusters.size())];
+      drawn.insert(drawn.end(), cluster.begin(), cluster.end());
     }
-    if (const Number threshold = BalancedThreshold(drawn.probabilities, drawn.outcomes)) resampled.replicates.push_back(*threshold);
+    if (const Number threshold = BalancedProbability(drawn)) resampled.replicates.push_back(*threshold);
   }
   balance.interval = clusters.size() < 2 ? Defined<Interval>(Undefined{"one initial state"}) : IntervalsOf(resampled, options.confidence).percentile;
   return balance;

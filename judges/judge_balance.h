@@ -31,7 +31,9 @@ struct PairedClips {
 /// @throws InvalidInput if the run has no real world, the world is none, real, or not judged; or, unnamed, one of several.
 PairedClips PairedClipsOf(const Store& store, const std::string& judge, const std::string& truth, const std::string& world);
 
-/// The balanced threshold (core/statistics/threshold.h) of such clips. Interval: percentile bootstrap over states, so that
+/// The threshold at which as large a share of failures is called successes as of successes failures, or comes closest to
+/// that: the middle, by logit, of the gap between two clips. Not of a grid, as core/statistics/threshold.h has it: a judge
+/// that is surer than it should be has it close to 1. Interval: percentile bootstrap over states, so that
 /// it says how much other initial states could move it. Both undefined where all outcomes are alike.
 Estimate BalanceOf(const std::vector<PairedClip>& clips, const BootstrapOptions& options = {.replicates = 1000});
 

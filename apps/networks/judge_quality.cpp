@@ -77,7 +77,7 @@ std::vector<double> Logits(const ClassifierNet& net, const JudgeClipSource& sour
 }
 
 double CalibratedProbability(double logit, const ClassifierCard& card) {
-  return 1 / (1 + std::exp(-logit / card.temperature));
+  return 1 / (1 + std::exp((card.offset - logit) / card.temperature));
 }
 
 double LogLoss(const std::vector<double>& logits, const JudgeClips& clips) {

@@ -1,6 +1,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <filesystem>
 
 #include "apps/commands.h"
@@ -69,9 +70,9 @@ TEST_F(Balance, WritesTheSameNetworkWithTheThresholdThatBalances) {
   const std::string said = Printed(AddBalance, Words({"--out", out.string()}));
   EXPECT_THAT(said, HasSubstr("240 clips of evac whose pair truly succeeded (120) or failed (120) by oracle"));
   EXPECT_THAT(said, HasSubstr("   60 of 120   0.500"));
-  EXPECT_THAT(said, HasSubstr("balanced: 0.71"));
+  EXPECT_THAT(said, HasSubstr("balanced: 0.753"));
   const TensorFile before = TensorFile::Open(kJudge), after = TensorFile::Open(out);
-  EXPECT_EQ(after.metadata().at("threshold"), "0.71");
+  EXPECT_EQ(after.metadata().at("threshold"), "0.5");
   EXPECT_EQ(after.metadata().at("threshold_of_kappas"), before.metadata().contains("threshold_of_kappas") ? before.metadata().at("threshold_of_kappas") : before.metadata().at("threshold"));
   EXPECT_EQ(after.metadata().at("balanced_on"), "240 clips of world evac of run aaaaaaaaaaaa");
   EXPECT_EQ(after.metadata().at("kappa"), before.metadata().at("kappa"));
@@ -80,7 +81,11 @@ TEST_F(Balance, WritesTheSameNetworkWithTheThresholdThatBalances) {
     const TensorView& same = after.Get(tensor.name);
     EXPECT_TRUE(std::ranges::equal(same.bytes, tensor.bytes)) << tensor.name;
   }
-  EXPECT_NEAR(ClassifierJudge(out, folder_.path()).card().threshold, 0.71, 1e-9);
+  const ClassifierCard was = ClassifierJudge(kJudge, folder_.path()).card(), is = ClassifierJudge(out, folder_.path()).card();
+  EXPECT_EQ(is.threshold, 0.5);
+  EXPECT_EQ(is.temperature, was.temperature);
+  const double logit = was.offset + was.temperature * (std::log(0.7 / 0.3) + std::log(0.8 / 0.2)) / 2;  // between .7 and .8
+  EXPECT_NEAR(1 / (1 + std::exp((is.offset - logit) / is.temperature)), 0.5, 1e-5);
   EXPECT_NE(ClassifierName(out), ClassifierName(kJudge)) << "another card is another judge";
 }
 

@@ -124,6 +124,15 @@ TEST(JudgeBalance, MovesTheThresholdByWhatTheJudgeIsTooKind) {
   EXPECT_NEAR(1 - *after.specificity, 1 - *after.sensitivity, 0.02);
 }
 
+TEST(JudgeBalance, LiesWhereAJudgeThatIsTooSureNeedsIt) {
+  std::vector<PairedClip> clips;
+  for (int state = 0; state < 40; ++state) clips.push_back({std::to_string(state), state % 2 == 0 ? 0.99 : state % 4 == 1 ? 0.97 : 0.02, state % 2 == 0, ""});
+  const Estimate sure = BalanceOf(clips);
+  EXPECT_GT(*sure.value, 0.97);
+  EXPECT_LE(*sure.value, 0.99);
+  EXPECT_EQ(*StatisticsOf(ConfusionAt(clips, *sure.value)).accuracy, 1);
+}
+
 TEST(JudgeBalance, SaysHowFarOtherStatesCouldMoveIt) {
   const Estimate few = BalanceOf(Clips(0.1, 12)), many = BalanceOf(Clips(0.1, 200));
   ASSERT_TRUE(few.interval && many.interval);
