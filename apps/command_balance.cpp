@@ -83,6 +83,10 @@ ExitCode Balance(const BalanceArguments& arguments) {
     return ExitCode::kInconclusive;
   }
   const Estimate balance = BalanceOf(paired.clips);
+  if (!balance.value) {
+    fmt::print("no threshold balances them: {}\n", balance.value.reason());
+    return ExitCode::kInconclusive;
+  }
   fmt::print("{}", Table(paired.clips, before, *balance.value));
   if (balance.interval)
     fmt::print("balanced: {:.3f}, [{:.3f}, {:.3f}] had there been other initial states ({:.0f} %, {})\n", *balance.value, balance.interval->low,

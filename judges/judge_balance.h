@@ -34,7 +34,7 @@ PairedClips PairedClipsOf(const Store& store, const std::string& judge, const st
 /// The threshold at which as large a share of failures is called successes as of successes failures, or comes closest to
 /// that: the middle, by logit, of the gap between two clips. Not of a grid, as core/statistics/threshold.h has it: a judge
 /// that is surer than it should be has it close to 1. Interval: percentile bootstrap over states, so that
-/// it says how much other initial states could move it. Both undefined where all outcomes are alike.
+/// it says how much other initial states could move it. Both undefined where all outcomes or all probabilities are alike.
 Estimate BalanceOf(const std::vector<PairedClip>& clips, const BootstrapOptions& options = {.replicates = 1000});
 
 /// What comes of a threshold on such clips.

@@ -145,6 +145,7 @@ TEST(JudgeBalance, SaysHowFarOtherStatesCouldMoveIt) {
 TEST(JudgeBalance, IsUndefinedWhereAllOutcomesAreAlikeOrThereIsOneState) {
   EXPECT_FALSE(BalanceOf({}).value);
   EXPECT_FALSE(BalanceOf({{"0", 0.5, true, ""}}).value);
+  EXPECT_FALSE(BalanceOf({{"0", 0.5, true, ""}, {"1", 0.5, false, ""}}).value) << "all probabilities are alike";
   const Estimate one_state = BalanceOf({{"0", 0.2, false, ""}, {"0", 0.8, true, ""}});
   EXPECT_TRUE(one_state.value);
   EXPECT_FALSE(one_state.interval);
