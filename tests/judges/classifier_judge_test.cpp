@@ -101,6 +101,17 @@ TEST_F(ClassifierJudgeTest, RatesAClipWithAProbabilityAndTheLabelOfItsCard) {
   EXPECT_EQ(judge.Rate(BottleTask(), episode).probability, verdict.probability) << "the same clip again";
 }
 
+TEST_F(ClassifierJudgeTest, AnOffsetOfTheCardIsTakenFromTheLogit) {
+  TensorMetadata card = kCard;
+  card["offset"] = "3";
+  const Episode episode = Stored("1-0000", 40);
+  const auto logit = [&](const fs::path& weights) {
+    const double p = *ClassifierJudge(weights, folder_.path()).Rate(BottleTask(), episode).probability;
+    return std::log(p / (1 - p));
+  };
+  EXPECT_NEAR(logit(Weights(folder_ / "plain.safetensors")) - logit(Weights(folder_ / "offset.safetensors", card)), 3 / 1.5, 1e-5);
+}
+
 TEST_F(ClassifierJudgeTest, SeesTheClipAndNothingElseOfTheEpisode) {
   ClassifierJudge judge(Weights(folder_ / "w.safetensors"), folder_.path());
   Episode episode = Stored("1-0000", 40);
@@ -174,6 +185,9 @@ TEST_F(ClassifierJudgeTest, WeightsThatDoNotFitAreRefusedWithWhatDiffers) {
   EXPECT_THAT(complaint("tasks", "take_bottle"), HasSubstr("wanted F32 [1, 48]"));
   EXPECT_THAT(complaint("cameras", "head"), HasSubstr("wanted F32"));
   EXPECT_THAT(complaint("threshold", "1.5"), HasSubstr("threshold 1.5"));
+  EXPECT_THAT(complaint("offset", "far"), HasSubstr("offset"));
+  EXPECT_THAT(complaint("looks", "0"), HasSubstr("looks"));
+  EXPECT_THAT(complaint("looks", "3"), HasSubstr("where1.embedding")) << "weights of one look";
 }
 
 TEST(ClassifierCard, SaysCannotTellNearItsThreshold) {
