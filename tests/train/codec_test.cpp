@@ -123,5 +123,22 @@ TEST(ShardSet, SeveralPackingsAreOneSetAndOneThatIsNamedTwiceCountsTwice) {
               testing::ThrowsMessage<TensorError>(testing::HasSubstr("statistics differs")));
 }
 
+TEST(ShardSet, PackingsOfOtherTasksAreOneSetWithAllOfTheirs) {
+  const TempFolder folder;
+  const std::filesystem::path a = folder / "a", b = folder / "b", broken = folder / "broken";
+  WriteSyntheticShards(a, {.clips = 2, .tasks = "pour,wipe", .task = 1});
+  WriteSyntheticShards(b, {.clips = 3, .tasks = "fold,pour", .task = 1});
+  for (const Split split : {Split::kTrain, Split::kHoldout}) {
+    const ShardSet shards(ShardFolders{a, b}, split);
+    EXPECT_EQ(shards.metadata().at("tasks"), "pour,wipe,fold");
+    ASSERT_EQ(shards.clips().size(), 5u);
+    EXPECT_EQ(shards.clips()[0].task, 1) << "wipe";
+    EXPECT_EQ(shards.clips()[4].task, 0) << "pour";
+  }
+  WriteSyntheticShards(broken, {.tasks = "pour,wipe", .task = 2});
+  EXPECT_THAT([&] { ShardSet(broken, Split::kTrain); },
+              testing::ThrowsMessage<TensorError>(testing::HasSubstr("clip 0 is of task 2, wanted 0 … 1")));
+}
+
 }  // namespace
 }  // namespace evac::train

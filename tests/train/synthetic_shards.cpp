@@ -53,6 +53,7 @@ void Draw(const SyntheticShards& o, const Tensors& t, std::int64_t row, const st
 }
 
 void Fill(const SyntheticShards& o, const Tensors& t, Dice& dice) {
+  t.task.fill_(o.task);
   for (std::int64_t clip = 0; clip < o.clips; ++clip) {
     double x = dice.Uniform(4, static_cast<double>(o.width_px) - 4), y = dice.Uniform(4, static_cast<double>(o.height_px) - 4);
     const double ground = dice.Uniform(20, 150);
@@ -63,7 +64,8 @@ void Fill(const SyntheticShards& o, const Tensors& t, Dice& dice) {
       if (i > 0) y = std::clamp(y + dice.Uniform(-3, 3), 4.0, static_cast<double>(o.height_px) - 4);
       t.deltas[row][7] = (x - before_x) / 2;
       t.deltas[row][8] = (y - before_y) / 2;
-      t.actions[row][15] = clip == 1 && o.closes_at > 0 && i >= o.closes_at ? 120 : 0;
+      const bool has_opened = o.opens_at > 0 && i >= o.opens_at;
+      t.actions[row][15] = clip == 1 && o.closes_at > 0 && i >= o.closes_at && !has_opened ? 120 : 0;
       t.contact[row] = i == o.frames / 2 ? 1 : 0;
       Draw(o, t, row, {x, y, ground});
     }
@@ -97,7 +99,7 @@ void WriteSyntheticShards(const std::filesystem::path& folder, const SyntheticSh
            {"width_px", std::to_string(options.width_px)},
            {"cameras", options.views == 1 ? "head" : "head,hand_right"},
            {"arms", "right"},
-           {"tasks", "follow"},
+           {"tasks", options.tasks},
            {"pose_map", "radius_px=2 thickness_px=1"},
            {"delta_frames", "3"},
            {"statistics", options.statistics},

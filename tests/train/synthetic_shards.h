@@ -13,10 +13,13 @@ struct SyntheticShards {
   std::int64_t frames = 9;       ///< of a clip
   std::int64_t failures = 0;     ///< of the clips of each split; the others are successes
   std::int64_t closes_at = 0;    ///< above 0: the second clip's hand is told to close at this frame, no other is
+  std::int64_t opens_at = 0;     ///< above 0: and to open again at this one
   std::int64_t views = 1;
   std::int64_t height_px = 16, width_px = 24;
   std::uint64_t seed = 1;
   const char* statistics = "synthetic";
+  const char* tasks = "follow";  ///< with commas between them
+  int task = 0;                  ///< of these, that of all clips
 };
 
 /// Writes shard_00000 (train), shard_00001 (hold-out) and shards.json, as docs/formats/shards.md says.

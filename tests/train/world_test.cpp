@@ -142,6 +142,7 @@ TEST(TrainWorld, TheLossFallsWithEverythingThatThePaperLacks) {
   at.config.schedule.carry_plane_m = 0;
   at.config.unet.in_channels += at.config.vae.z_channels + 1;
   at.config.unet.frame_actions = true;
+  at.config.unet.hand_views = 1;
   at.config.action_resampler.embedding_dim = 18;
   const auto [before, after] = LossBeforeAndAfter(at, options);
   EXPECT_LT(after, 0.9 * before);
@@ -332,12 +333,8 @@ TEST(Windows, LieInTheirClipNewestLastAndHoldContactWhenAsked) {
   }
 }
 
-TEST(Windows, ShowWhatComesOfAHandThatClosesWhenAsked) {
-  const TempFolder folder;
-  constexpr std::int64_t kClosing = 17, kChunk = 8;
-  WriteSyntheticShards(folder.path(), {.clips = 4, .frames = 40, .closes_at = kClosing});
-  const ShardSet shards(folder.path(), Split::kTrain);
-  WindowOptions options{.chunk = kChunk, .memory = 4, .history = 8, .closing_share = 1};  // one hand closes, once
+/// Picks only windows in which one clip's hand turns at `turn`: all of those, and where rollouts' chunks begin the one at `chunk_start`.
+void ExpectTheTurn(const ShardSet& shards, WindowOptions options, std::int64_t turn, std::int64_t chunk_start) {
   Dice dice({1, 0, 0, 0}, 1);
   std::set<std::int64_t> seen;
   for (const double rollout_share : {0.0, 1.0}) {
@@ -346,12 +343,32 @@ TEST(Windows, ShowWhatComesOfAHandThatClosesWhenAsked) {
     for (int i = 0; i < 200; ++i) {
       const Window window = sampler.Pick(dice);
       EXPECT_EQ(window.clip->first, 40);
-      EXPECT_LE(std::abs(window.last - kClosing), kChunk / 2);
-      EXPECT_TRUE(rollout_share == 0 || window.last == 16) << window.last;
+      EXPECT_LE(std::abs(window.last - turn), options.chunk / 2);
+      EXPECT_TRUE(rollout_share == 0 || window.last == chunk_start) << window.last;
       seen.insert(window.last);
     }
   }
-  EXPECT_EQ(seen.size(), kChunk) << "every place of it that the options name";
+  EXPECT_EQ(std::ssize(seen), options.chunk) << "every place of it that the options name";
+}
+
+TEST(Windows, ShowWhatComesOfAHandThatClosesAndOfOneThatOpensWhenAsked) {
+  const TempFolder folder;
+  WriteSyntheticShards(folder.path(), {.clips = 4, .frames = 40, .closes_at = 9, .opens_at = 25});  // one hand, once
+  const ShardSet shards(folder.path(), Split::kTrain);
+  ExpectTheTurn(shards, {.chunk = 8, .memory = 4, .history = 8, .closing_share = 1}, 9, 8);
+  ExpectTheTurn(shards, {.chunk = 8, .memory = 4, .history = 8, .opening_share = 1}, 25, 24);
+}
+
+TEST(Windows, OfHandsThatOpenAreDrawnOfWhatClosingsLeave) {
+  const TempFolder folder;
+  WriteSyntheticShards(folder.path(), {.clips = 4, .frames = 40, .closes_at = 9, .opens_at = 25});
+  const ShardSet shards(folder.path(), Split::kTrain);
+  const WindowSampler sampler(shards, {.chunk = 8, .memory = 4, .history = 8, .closing_share = 0.5, .opening_share = 1});
+  Dice dice({1, 0, 0, 0}, 1);
+  int closings = 0;
+  constexpr int kPicks = 2000;
+  for (int i = 0; i < kPicks; ++i) closings += sampler.Pick(dice).last < 16 ? 1 : 0;
+  EXPECT_NEAR(closings, kPicks / 2, 4 * std::sqrt(kPicks) / 2);
 }
 
 TEST(Windows, ComeFromSuccessesAloneWhenAsked) {

@@ -9,16 +9,15 @@ constexpr std::int64_t kArmNumbers = 8;  // of a row
 constexpr double kClosed = 120, kPositions_per_m = 4, kChanges_per_m = 10;
 constexpr double kWaves_m[] = {0.25, 0.0625};
 
-/// [..., 4] xyzw → [..., 6]: where the x and y axes point.
-Tensor Axes(const Tensor& quaternion) {
+}  // namespace
+
+Tensor HandAxes(const Tensor& quaternion) {
   const Tensor q = quaternion / quaternion.square().sum(-1, true).sqrt().clamp_min(1e-6);
   const Tensor x = q.select(-1, 0), y = q.select(-1, 1), z = q.select(-1, 2), w = q.select(-1, 3);
   return at::stack({1 - 2 * (y * y + z * z), 2 * (x * y + z * w), 2 * (x * z - y * w),  //
                     2 * (x * y - z * w), 1 - 2 * (x * x + z * z), 2 * (y * z + x * w)},
                    -1);
 }
-
-}  // namespace
 
 Tensor FrameActions(const Tensor& rows, std::int64_t memory) {
   CheckShape("arms of the frames", rows, {-1, -1, 2 * kArmNumbers});
@@ -27,7 +26,7 @@ Tensor FrameActions(const Tensor& rows, std::int64_t memory) {
     const Tensor row = rows.narrow(-1, arm * kArmNumbers, kArmNumbers);
     const Tensor xyz_m = row.narrow(-1, 0, 3), closure = row.narrow(-1, 7, 1) / kClosed;
     const auto since = [&](const Tensor& x) { return x - x.narrow(1, memory - 1, 1); };
-    numbers.insert(numbers.end(), {xyz_m * kPositions_per_m, Axes(row.narrow(-1, 3, 4)), closure * 2 - 1,
+    numbers.insert(numbers.end(), {xyz_m * kPositions_per_m, HandAxes(row.narrow(-1, 3, 4)), closure * 2 - 1,
                                    since(xyz_m) * kChanges_per_m, since(closure)});
     for (const double wave_m : kWaves_m) {
       const Tensor angle = xyz_m * (2 * std::numbers::pi / wave_m);

@@ -9,6 +9,10 @@ namespace evac::nn {
 
 constexpr std::int64_t kFrameActionNumbers = 52;
 
+/// @param quaternion  [..., 4] xyzw, of any length but 0
+/// @returns           [..., 6]: where the x and the y axis point
+Tensor HandAxes(const Tensor& quaternion);
+
 /// Per arm: position, the first two columns of its rotation, closure; position and closure counted from the newest
 /// memory frame; waves of the position of .25 m and .0625 m.
 /// @param rows    [B, T, 16]: left xyz (m), quaternion xyzw, gripper (0 open … 120 closed), then right; base frame

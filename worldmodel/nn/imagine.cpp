@@ -5,6 +5,7 @@
 
 #include "worldmodel/nn/dpm_solver.h"
 #include "worldmodel/nn/frame_actions.h"
+#include "worldmodel/nn/hand_views.h"
 
 namespace evac::nn {
 
@@ -20,6 +21,8 @@ Conditioning Condition(const EvacModel& model, const ChunkRequest& request) {
   Remember(model, request.memory, concat);
   conditioning.tokens = model.ContextTokens(model.ImageTokens(request.image), model.ActionTokens(request.deltas));
   if (model.config().unet.frame_actions) conditioning.frames = FrameActions(request.arms, conditioning.memory);
+  if (model.config().unet.hand_views > 0)
+    conditioning.hands = HandViews(request.image, request.direction, request.origin, request.arms);
   return conditioning;
 }
 
@@ -29,6 +32,8 @@ Conditioning Unconditioned(const EvacModel& model, const ChunkRequest& request, 
   const Tensor& mask = conditioning.concat.mask;
   without.concat.mask = at::cat({mask.narrow(2, 0, memory), at::zeros_like(mask.narrow(2, memory, chunk))}, 2);
   Remember(model, request.memory, without.concat);
+  if (conditioning.hands.defined())
+    without.hands = HandViews(at::zeros_like(request.image), request.direction, request.origin, request.arms);
   without.tokens =
       model.ContextTokens(model.ImageTokens(at::zeros_like(request.image)), model.ActionTokens(request.deltas));
   return without;
@@ -40,7 +45,7 @@ Denoise MakeDenoise(const EvacModel& model, const Conditioning& conditioning) {
   const at::Device device = conditioning.tokens.device();
   PreparedContext context =
       model.unet().Prepare({conditioning.tokens, constant(model.config().fps).to(device),
-                            constant(model.config().domain).to(device), views, conditioning.frames});
+                            constant(model.config().domain).to(device), views, conditioning.frames, conditioning.hands});
   return [&model, concat = conditioning.concat, context = std::move(context), views, rows, memory](const Tensor& x_t,
                                                                                                    std::int64_t t) {
     const Tensor steps = at::full({rows}, t, at::kLong).to(x_t.device());

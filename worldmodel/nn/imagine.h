@@ -20,7 +20,7 @@ struct ChunkRequest {
   Tensor direction;  ///< [BV, 3, T, h, w]
   Tensor origin;     ///< [BV, 3, T, h, w]
   Tensor deltas;     ///< [B, any, 14], normalised
-  Tensor arms = {};  ///< [B, T, 16] rows as in frame_actions.h; read if the network has `frame_actions`
+  Tensor arms = {};  ///< [B, T, 16] rows as in frame_actions.h; read if the network has `frame_actions` or `hand_views`
 };
 
 /// Everything random, drawn by the caller.
@@ -35,6 +35,7 @@ struct Conditioning {
   Concat concat;
   Tensor tokens;       ///< [BV, image tokens + action tokens, context_dim]
   Tensor frames = {};  ///< [B, T, kFrameActionNumbers] or undefined
+  Tensor hands = {};   ///< HandViews or undefined
 };
 
 Conditioning Condition(const EvacModel& model, const ChunkRequest& request);

@@ -110,6 +110,8 @@ void ModelConfig::Check() const {
           "1 … memory = " + std::to_string(memory));
   if (!(pose_map.lag_frames >= 0 && pose_map.lag_frames <= 1))
     throw TensorError("pose_map.lag_frames: found" + Field("", pose_map.lag_frames).substr(2) + ", wanted 0 … 1");
+  Require(unet.hand_views == 0 || unet.hand_views == views, "unet.hand_views", unet.hand_views,
+          "0, or views = " + std::to_string(views));
   Require(unet.out_channels == vae.z_channels, "unet.out_channels", unet.out_channels, "vae.z_channels");
   Require(domain >= 0 && domain < unet.domains, "domain", domain, "a row of unet.domains");
   const std::int64_t multiple = vae.Stride() << (unet.channel_mult.size() - 1);

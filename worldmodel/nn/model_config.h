@@ -27,6 +27,8 @@ struct UNetConfig {
   std::int64_t action_tokens = 16;  ///< after them
   /// Each frame's arms are added to its time embedding (frame_actions.h). Not in the paper.
   bool frame_actions = false;
+  /// What the first picture of so many views shows about each hand is added too (hand_views.h). 0: none, as published.
+  std::int64_t hand_views = 0;
 };
 
 /// The latent codec: AutoencoderKL of Stable Diffusion.

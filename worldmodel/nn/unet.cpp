@@ -5,6 +5,7 @@
 #include <algorithm>
 
 #include "worldmodel/nn/frame_actions.h"
+#include "worldmodel/nn/hand_views.h"
 
 namespace evac::nn {
 namespace {
@@ -60,6 +61,9 @@ UNet::UNet(const Scope& at, const UNetConfig& config)
       width_(config.model_channels) {
   if (config.frame_actions)
     frame_embedding_.emplace(at / "frame_action_embedding", kFrameActionNumbers, 4 * config.model_channels);
+  if (config.hand_views > 0)
+    hand_embedding_.emplace(at / "hand_view_embedding", config.hand_views * kHandPoints * kHandPointNumbers,
+                            4 * config.model_channels);
   MakeInput(at / "input_blocks");
   init_attention_.emplace(
       at / "init_attn" / "0",
@@ -159,6 +163,13 @@ PreparedContext UNet::Prepare(const Context& context) const {
     if (!context.frames.defined()) throw TensorError("the network wants the arms of each frame, found none");
     CheckShape("arms of each frame", context.frames, {prepared.embedding.size(0), -1, kFrameActionNumbers});
     prepared.frames = (*frame_embedding_)(context.frames);
+  }
+  if (hand_embedding_) {
+    if (!context.hands.defined()) throw TensorError("the network wants what is about each hand, found nothing");
+    CheckShape("what is about each hand", context.hands,
+               {prepared.embedding.size(0), -1, 2, config_.hand_views * kHandPoints * kHandPointNumbers});
+    const Tensor about_hands = (*hand_embedding_)(context.hands).sum(2);
+    prepared.frames = prepared.frames.defined() ? prepared.frames + about_hands : about_hands;
   }
   return prepared;
 }

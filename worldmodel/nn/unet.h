@@ -15,7 +15,7 @@ namespace evac::nn {
 struct PreparedContext {
   std::vector<std::vector<KeyValue>> keys_values;  ///< [spatial transformer][layer]
   Tensor embedding;                                ///< [B, E]: frame rate and robot
-  Tensor frames;                                   ///< [B, T, E]: arms of each frame, or undefined
+  Tensor frames;                                   ///< [B, T, E]: arms of each frame and what is about them, or undefined
 };
 
 /// Called with "input_blocks.1.0", …, and what that module answered, in the layout of the reference's module.
@@ -31,6 +31,7 @@ class UNet {
     Tensor domain;  ///< [B] integers: rows of the table of robots
     std::int64_t views = 1;
     Tensor frames = {};  ///< [B, T, kFrameActionNumbers]; read if the network has `frame_actions`
+    Tensor hands = {};   ///< [B, T, 2, any]: HandViews; read if the network has `hand_views`
   };
   PreparedContext Prepare(const Context& context) const;
 
@@ -71,7 +72,7 @@ class UNet {
   ProductType product_;   ///< where it is not that of the weights, values between the layers are kept so too
   Tensor domain_embedding_;  ///< [domains, E]
   EmbeddingMlp time_embed_, fps_embedding_;
-  std::optional<EmbeddingMlp> frame_embedding_;
+  std::optional<EmbeddingMlp> frame_embedding_, hand_embedding_;
   std::vector<Block> input_blocks_;
   std::optional<TemporalTransformer> init_attention_;
   Block middle_;

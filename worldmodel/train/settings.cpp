@@ -97,6 +97,7 @@ Settings SettingsOf(WorldOptions& options) {
                        {"rollout_share", &w.windows.rollout_share},
                        {"contact_share", &w.windows.contact_share},
                        {"closing_share", &w.windows.closing_share},
+                       {"opening_share", &w.windows.opening_share},
                        {"successes_only", &w.windows.successes_only},
                        {"failure_weight", &w.windows.failure_weight},
                        {"first_image", &w.windows.first_image},

@@ -1,11 +1,12 @@
 #include "worldmodel/train/shards.h"
 
 #include <algorithm>
+#include <sstream>
 
 namespace evac::train {
 namespace {
 
-constexpr const char* kCommon[] = {"period_s", "tasks", "cameras", "arms", "pose_map", "delta_frames", "statistics"};
+constexpr const char* kCommon[] = {"period_s", "cameras", "arms", "pose_map", "delta_frames", "statistics"};
 
 std::string Text(const TensorFile& file, const std::string& key) {
   const auto found = file.metadata().find(key);
@@ -16,6 +17,13 @@ std::string Text(const TensorFile& file, const std::string& key) {
 void RequireText(const TensorFile& file, const std::string& key, const std::string& wanted) {
   const std::string found = Text(file, key);
   if (found != wanted) throw TensorError(file.name() + ": " + key + " is '" + found + "', wanted '" + wanted + "'");
+}
+
+std::vector<std::string> TasksOf(const TensorFile& file) {
+  std::vector<std::string> tasks;
+  std::istringstream names(Text(file, "tasks"));
+  for (std::string name; std::getline(names, name, ',');) tasks.push_back(name);
+  return tasks;
 }
 
 /// A tensor of the wanted type and shape (-1: any).
@@ -47,7 +55,8 @@ Shard Read(const std::filesystem::path& path, const nn::MappedTensors& file) {
   return shard;
 }
 
-std::vector<Clip> ClipsOf(const Shard& shard, std::size_t index) {
+/// @param tasks  of this shard's numbers, what they are in the set
+std::vector<Clip> ClipsOf(const Shard& shard, std::size_t index, const std::vector<std::int32_t>& tasks) {
   std::vector<Clip> clips;
   const auto* starts = shard.clip_start.data_ptr<std::int64_t>();
   const std::int64_t count = shard.clip_start.size(0) - 1;
@@ -55,7 +64,11 @@ std::vector<Clip> ClipsOf(const Shard& shard, std::size_t index) {
     if (starts[i] < 0 || starts[i + 1] <= starts[i] || starts[i + 1] > shard.frames.size(0))
       throw TensorError(shard.path.string() + ": clip " + std::to_string(i) + " has rows " + std::to_string(starts[i]) +
                         " to " + std::to_string(starts[i + 1]) + " of " + std::to_string(shard.frames.size(0)));
-    clips.push_back({index, starts[i], starts[i + 1] - starts[i], shard.task.data_ptr<std::int32_t>()[i],
+    const std::int32_t task = shard.task.data_ptr<std::int32_t>()[i];
+    if (task < 0 || task >= std::ssize(tasks))
+      throw TensorError(shard.path.string() + ": clip " + std::to_string(i) + " is of task " + std::to_string(task) +
+                        ", wanted 0 … " + std::to_string(std::ssize(tasks) - 1) + ", one of its metadata's");
+    clips.push_back({index, starts[i], starts[i + 1] - starts[i], tasks[static_cast<std::size_t>(task)],
                      shard.outcome.data_ptr<std::int8_t>()[i]});
   }
   return clips;
@@ -82,20 +95,27 @@ std::vector<std::filesystem::path> ShardPaths(const std::filesystem::path& folde
 }
 
 ShardSet::ShardSet(const ShardFolders& folders, Split split) {
-  std::string recipes, names;
+  std::string recipes, names, tasks;
   const auto append = [](std::string& list, const char* separator, const std::string& one) {
     if (!list.empty()) list += separator;
     list += one;
   };
   for (const std::filesystem::path& folder : folders) {
     const std::vector<std::filesystem::path> paths = ShardPaths(folder);
-    for (const std::filesystem::path& path : paths) Add(path, split);
     append(names, ", ", folder.string());
-    if (!paths.empty()) append(recipes, ",", Text(TensorFile::Open(paths.front()), "recipe"));
+    if (paths.empty()) continue;
+    const TensorFile first = TensorFile::Open(paths.front());
+    append(recipes, ",", Text(first, "recipe"));
+    for (const std::string& task : TasksOf(first)) {  // whether this split has clips of it or not
+      if (std::find(tasks_.begin(), tasks_.end(), task) == tasks_.end()) tasks_.push_back(task);
+    }
+    for (const std::filesystem::path& path : paths) Add(path, split);
   }
+  for (const std::string& task : tasks_) append(tasks, ",", task);
   if (shards_.empty())
     throw TensorError(names + " has no shard with split " + (split == Split::kTrain ? "train" : "holdout"));
   metadata_["recipe"] = recipes;
+  metadata_["tasks"] = tasks;
 }
 
 void ShardSet::Add(const std::filesystem::path& path, Split split) {
@@ -107,7 +127,14 @@ void ShardSet::Add(const std::filesystem::path& path, Split split) {
   if (!shards_.empty()) nn::CheckShape(path.string() + ": frames", shard.frames, {-1, views(), height_px(), width_px(), 3});
   if (shards_.empty()) metadata_ = file.file().metadata();
   CheckSame(path.string(), file.file().metadata());
-  for (const Clip& clip : ClipsOf(shard, shards_.size())) clips_.push_back(clip);
+  std::vector<std::int32_t> tasks;
+  for (const std::string& task : TasksOf(file.file())) {
+    const auto found = std::find(tasks_.begin(), tasks_.end(), task);
+    if (found == tasks_.end())
+      throw TensorError(path.string() + ": task '" + task + "' is none of its folder's first shard");
+    tasks.push_back(static_cast<std::int32_t>(found - tasks_.begin()));
+  }
+  for (const Clip& clip : ClipsOf(shard, shards_.size(), tasks)) clips_.push_back(clip);
   shards_.push_back(std::move(shard));
 }
 

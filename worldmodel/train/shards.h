@@ -16,7 +16,7 @@ namespace evac::train {
 struct Clip {
   std::size_t shard = 0;
   std::int64_t first = 0, frames = 0;
-  std::int32_t task = 0;
+  std::int32_t task = 0;     ///< of the set's `tasks`
   std::int8_t outcome = -1;  ///< 1 success, 0 failure, -1 unknown
 };
 
@@ -43,8 +43,7 @@ using ShardFolders = std::vector<std::filesystem::path>;
 class ShardSet {
  public:
   /// @throws TensorError naming the file and what was found and wanted: packing not done, no shard of this split, a
-  ///   tensor that is missing or misshapen, another version, shards of different pictures, periods, tasks, cameras or
-  ///   statistics
+  ///   tensor that is missing or misshapen, another version, shards of different pictures, periods, cameras or statistics
   ShardSet(const ShardFolders& folders, Split split);
   ShardSet(const std::filesystem::path& folder, Split split) : ShardSet(ShardFolders{folder}, split) {}
 
@@ -55,8 +54,8 @@ class ShardSet {
 
   const std::vector<Shard>& shards() const { return shards_; }
   const std::vector<Clip>& clips() const { return clips_; }
-  /// Of all its shards: period_s, tasks, cameras, arms, pose_map, delta_frames, statistics; and recipe, those of the
-  /// folders with commas between them.
+  /// Of all its shards: period_s, cameras, arms, pose_map, delta_frames, statistics; and those of the folders with
+  /// commas between them: recipe, tasks.
   const TensorMetadata& metadata() const { return metadata_; }
   std::int64_t views() const { return shards_.front().frames.size(1); }
   std::int64_t height_px() const { return shards_.front().frames.size(2); }
@@ -71,6 +70,7 @@ class ShardSet {
 
   std::vector<Shard> shards_;
   std::vector<Clip> clips_;
+  std::vector<std::string> tasks_;
   TensorMetadata metadata_;
   std::string codec_;
 };

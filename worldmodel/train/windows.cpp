@@ -10,19 +10,25 @@ bool HasContact(const Shard& shard, const Clip& clip, std::int64_t from, std::in
   return std::any_of(contact, contact + count, [](std::uint8_t value) { return value != 0; });
 }
 
-/// The frames of a clip at which a hand is told to close beyond half, from below it.
-std::vector<std::int64_t> Closings(const Shard& shard, const Clip& clip) {
+/// The frames of a clip at which a hand is told to close beyond half, from below it, and to open.
+struct Turns {
+  std::vector<std::int64_t> closings, openings;
+};
+
+Turns TurnsOf(const Shard& shard, const Clip& clip) {
   constexpr float kHalfClosed = 60;  // 0 open … 120 closed
   const Tensor actions = shard.actions.narrow(0, clip.first, clip.frames).to(at::kFloat).contiguous();
   const float* numbers = actions.data_ptr<float>();
-  std::vector<std::int64_t> frames;
+  Turns turns;
   for (std::int64_t frame = 1; frame < clip.frames; ++frame) {
     for (const std::int64_t hand : {7, 15}) {
-      if (numbers[16 * frame + hand] > kHalfClosed && numbers[16 * (frame - 1) + hand] <= kHalfClosed)
-        frames.push_back(frame);
+      const bool is_closed = numbers[16 * frame + hand] > kHalfClosed,
+                 was_closed = numbers[16 * (frame - 1) + hand] > kHalfClosed;
+      if (is_closed && !was_closed) turns.closings.push_back(frame);
+      if (!is_closed && was_closed) turns.openings.push_back(frame);
     }
   }
-  return frames;
+  return turns;
 }
 
 }  // namespace
@@ -45,7 +51,7 @@ WindowSampler::WindowSampler(const ShardSet& shards, const WindowOptions& option
   for (const Clip& clip : shards.clips()) {
     if (!options.successes_only || clip.outcome == 1) AddClip(shards, clip);
   }
-  if (any_.empty())
+  if (all_.any.empty())
     throw TensorError("no clip of " + shards.shards().front().path.parent_path().string() + " has " +
                       std::to_string(options.chunk + 1) + " frames" +
                       (options.successes_only ? " and ended in success" : ""));
@@ -53,18 +59,18 @@ WindowSampler::WindowSampler(const ShardSet& shards, const WindowOptions& option
 
 void WindowSampler::AddClip(const ShardSet& shards, const Clip& clip) {
   const Shard& shard = shards.shards()[clip.shard];
-  const std::vector<std::int64_t> closings = Closings(shard, clip);
+  const Turns turns = TurnsOf(shard, clip);
   const std::int64_t half = options_.chunk / 2;
   for (std::int64_t last = 0; last + options_.chunk < clip.frames; ++last) {
-    const bool closes = std::any_of(closings.begin(), closings.end(),
-                                    [&](std::int64_t frame) { return frame > last - half && frame <= last + half; });
-    const bool starts = last % options_.chunk == 0, touches = HasContact(shard, clip, last + 1, options_.chunk);
-    any_.push_back({&clip, last});
-    if (starts) rollout_.push_back({&clip, last});
-    if (touches) any_contact_.push_back({&clip, last});
-    if (starts && touches) rollout_contact_.push_back({&clip, last});
-    if (closes) any_closing_.push_back({&clip, last});
-    if (starts && closes) rollout_closing_.push_back({&clip, last});
+    const auto shows_what_comes_of = [&](std::int64_t frame) { return frame > last - half && frame <= last + half; };
+    const auto add_to = [&](Pool& pool) {
+      pool.any.push_back({&clip, last});
+      if (last % options_.chunk == 0) pool.rollout.push_back({&clip, last});
+    };
+    add_to(all_);
+    if (HasContact(shard, clip, last + 1, options_.chunk)) add_to(contact_);
+    if (std::any_of(turns.closings.begin(), turns.closings.end(), shows_what_comes_of)) add_to(closing_);
+    if (std::any_of(turns.openings.begin(), turns.openings.end(), shows_what_comes_of)) add_to(opening_);
   }
 }
 
@@ -81,11 +87,11 @@ std::vector<std::int64_t> WindowSampler::RandomMemory(std::int64_t last, Dice& d
   return picked;
 }
 
-const WindowSampler::Start& WindowSampler::PickStart(const std::vector<Start>& pool, Dice& dice) const {
+const WindowSampler::Start& WindowSampler::PickStart(const std::vector<Start>& starts, Dice& dice) const {
   const double failed = std::min(1.0, options_.failure_weight), other = std::min(1.0, 1 / options_.failure_weight);
-  constexpr int kMostDraws = 1000;  // a pool of the rarer kind alone
+  constexpr int kMostDraws = 1000;  // all may be of the rarer kind
   for (int draw = 1;; ++draw) {
-    const Start& start = pool[static_cast<std::size_t>(dice.Below(static_cast<std::int64_t>(pool.size())))];
+    const Start& start = starts[static_cast<std::size_t>(dice.Below(static_cast<std::int64_t>(starts.size())))];
     const double kept = start.clip->outcome == 0 ? failed : other;
     if (kept >= 1 || draw == kMostDraws || dice.Chance(kept)) return start;
   }
@@ -93,12 +99,16 @@ const WindowSampler::Start& WindowSampler::PickStart(const std::vector<Start>& p
 
 Window WindowSampler::Pick(Dice& dice) const {
   const bool rollout = dice.Chance(options_.rollout_share), contact = dice.Chance(options_.contact_share);
-  const std::vector<Start>* pool = rollout ? &rollout_ : &any_;
-  const std::vector<Start>& touching = rollout ? rollout_contact_ : any_contact_;
-  if (contact && !touching.empty()) pool = &touching;
-  const std::vector<Start>& closing = rollout ? rollout_closing_ : any_closing_;
-  if (options_.closing_share > 0 && dice.Chance(options_.closing_share) && !closing.empty()) pool = &closing;
-  const Start& start = PickStart(*pool, dice);
+  const auto starts_of = [&](const Pool& pool) -> const std::vector<Start>& { return rollout ? pool.rollout : pool.any; };
+  const std::vector<Start>* starts = &starts_of(all_);
+  if (contact && !starts_of(contact_).empty()) starts = &starts_of(contact_);
+  const auto is_drawn = [&](double share) { return share > 0 && dice.Chance(share); };
+  if (is_drawn(options_.closing_share)) {
+    if (!starts_of(closing_).empty()) starts = &starts_of(closing_);
+  } else if (is_drawn(options_.opening_share)) {
+    if (!starts_of(opening_).empty()) starts = &starts_of(opening_);
+  }
+  const Start& start = PickStart(*starts, dice);
   Window window{start.clip, {}, start.last, options_.chunk, 0};
   window.memory = rollout ? RolloutMemory(start.last, options_.memory) : RandomMemory(start.last, dice);
   const auto any = static_cast<std::size_t>(dice.Below(options_.memory));
@@ -108,9 +118,9 @@ Window WindowSampler::Pick(Dice& dice) const {
 
 std::vector<Window> WindowSampler::Spread(std::int64_t count) const {
   std::vector<Window> windows;
-  const auto all = static_cast<std::int64_t>(rollout_.size());
+  const auto all = static_cast<std::int64_t>(all_.rollout.size());
   for (std::int64_t i = 0; i < std::min(count, all); ++i) {
-    const Start& start = rollout_[static_cast<std::size_t>(i * all / std::min(count, all))];
+    const Start& start = all_.rollout[static_cast<std::size_t>(i * all / std::min(count, all))];
     windows.push_back({start.clip, RolloutMemory(start.last, options_.memory), start.last, options_.chunk, 0});
   }
   return windows;

@@ -28,6 +28,9 @@ struct WindowOptions {
   /// Of the samples in which a hand is told to close, in the chunk's first half or half a chunk before it: what comes of
   /// it is seen, and whether it holds something or not is no part of the choice. The paper: 0
   double closing_share = 0;
+  /// Of the samples in which a hand that was closed is told to open, there likewise: where what it held falls is seen.
+  /// Drawn of those that `closing_share` leaves. The paper: 0
+  double opening_share = 0;
   bool successes_only = false;      ///< from clips that ended in success, as a lab that keeps no failures would have. The paper: both
   /// How many times as often windows of clips that ended in failure are drawn as others. The paper: 1
   double failure_weight = 1;
@@ -52,12 +55,16 @@ class WindowSampler {
     const Clip* clip;
     std::int64_t last;
   };
+  /// Where windows of one kind begin: anywhere, and where a rollout's chunks do.
+  struct Pool {
+    std::vector<Start> any, rollout;
+  };
   std::vector<std::int64_t> RandomMemory(std::int64_t last, Dice& dice) const;
-  const Start& PickStart(const std::vector<Start>& pool, Dice& dice) const;
+  const Start& PickStart(const std::vector<Start>& starts, Dice& dice) const;
   void AddClip(const ShardSet& shards, const Clip& clip);
 
   WindowOptions options_;
-  std::vector<Start> any_, rollout_, any_contact_, rollout_contact_, any_closing_, rollout_closing_;
+  Pool all_, contact_, closing_, opening_;
 };
 
 }  // namespace evac::train

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "worldmodel/nn/frame_actions.h"
+#include "worldmodel/nn/hand_views.h"
 #include "worldmodel/nn/weight_keys.h"
 #include "worldmodel/train/reach.h"
 
@@ -28,6 +29,8 @@ void Check(const WorldTrainingOptions& o, const nn::ModelConfig& config) {
     throw TensorError("world training: windows of " + std::to_string(o.windows.memory) + " + " +
                       std::to_string(o.windows.chunk) + " frames, the model has " + std::to_string(config.memory) +
                       " + " + std::to_string(config.chunk));
+  if (config.unet.hand_views > 0 && !o.windows.first_image)
+    throw TensorError("world training: first_image is false, wanted true: unet.hand_views reads the oldest memory");
   if (o.self_memory_chunks < 1)
     throw TensorError("world training: self_memory_chunks is " + std::to_string(o.self_memory_chunks) +
                       ", wanted at least 1");
@@ -98,6 +101,8 @@ nn::UNet::Context WorldTraining::ContextOf(const Tensor& tokens, const WorldBatc
   const auto constant = [&](std::int64_t value) { return at::full({batch.scenes}, value, at::kLong); };
   nn::UNet::Context context{tokens, constant(model_.config().fps), constant(model_.config().domain), batch.views};
   if (model_.config().unet.frame_actions) context.frames = nn::FrameActions(batch.arms, batch.memory);
+  if (model_.config().unet.hand_views > 0)
+    context.hands = nn::HandViews(batch.images, batch.direction, batch.origin, batch.arms);
   return context;
 }
 
@@ -157,6 +162,7 @@ Tensor WorldTraining::LossOf(const WorldBatch& given, const Drops& drops, const 
                           n,
                           std::nullopt};
   if (step.context.frames.defined()) step.context.frames = step.context.frames * PerRow(drops.actions, 3);
+  if (step.context.hands.defined()) step.context.hands = step.context.hands * PerRow(drops.actions, 4);
   if (noisy_memory && options_.memory_noise_kind == MemoryNoise::kPublished) {
     std::vector<float> angles;
     for (std::int64_t i = 0; i < rows * n; ++i) angles.push_back(static_cast<float>(dice.Uniform(-1.57, 1.57)));

@@ -1,0 +1,22 @@
+#pragma once
+
+#include "worldmodel/nn/tensor.h"
+
+/// What the first picture shows about each hand, frame by frame, for networks that are told (`unet.hand_views`). Not in
+/// the paper, whose network sees poses as pictures and has to compare places in two of them: whether the fingers close
+/// about a thing or beside it is a matter of millimetres, a tenth of a latent. Here the picture is read where the hand
+/// will be, in the hand's own axes, so that a grasp looks the same wherever it is done.
+namespace evac::nn {
+
+/// Points about a fingertip: in each of the three planes of the hand's axes 7x7 every 12 mm and 5x5 every 40 mm.
+constexpr std::int64_t kHandPoints = 3 * (7 * 7 + 5 * 5);
+constexpr std::int64_t kHandPointNumbers = 4;  ///< red, green, blue; 1 where the picture shows the point
+
+/// @param image      [BV, 3, H, W] in [-1, 1]: what the cameras of frame 0 saw
+/// @param direction  [BV, 3, T, h, w] unit rays of pinhole cameras, base frame
+/// @param origin     [BV, 3, T, h, w] metres, base frame
+/// @param arms       [B, T, 16]: rows as in frame_actions.h
+/// @returns          [B, T, 2, V kHandPoints kHandPointNumbers]: left hand, right hand; 0 where the picture does not reach
+Tensor HandViews(const Tensor& image, const Tensor& direction, const Tensor& origin, const Tensor& arms);
+
+}  // namespace evac::nn
