@@ -53,6 +53,7 @@ std::string ChunkKey(const ImaginerOptions& options, const ImaginedScene& scene,
   }
   for (const DeltaRow& row : conditioning.deltas) all.Add(row.data(), sizeof(row));
   all.Add(conditioning.arms);
+  all.Add(conditioning.turns);
   for (const std::vector<cv::Mat>& views : conditioning.pose_maps)
     for (const cv::Mat& map : views) all.Add(map);
   for (const std::vector<RayMap>& views : conditioning.rays) {

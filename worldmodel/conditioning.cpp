@@ -5,6 +5,7 @@
 #include "core/error.h"
 #include "core/geometry.h"
 #include "worldmodel/action_delta.h"
+#include "worldmodel/nn/hand_turns.h"
 
 namespace evac {
 namespace {
@@ -34,6 +35,19 @@ std::vector<RayMap> Rays(const Arms& arms, std::span<const Camera> cameras, cons
                               static_cast<int>(config.LatentHeight()), static_cast<int>(config.LatentWidth())));
   }
   return rays;
+}
+
+/// What every frame since the oldest memory was told says of those that the network is told of.
+std::vector<float> TurnsOf(const ImaginedScene& scene, const std::vector<std::size_t>& memory, std::span<const Arms> chunk) {
+  const std::size_t oldest = memory.front(), known = scene.frames.size() - oldest;
+  std::vector<float> rows;
+  const auto add = [&](const Arms& arms) { std::ranges::copy(ActionRow(arms), std::back_inserter(rows)); };
+  for (std::size_t frame = oldest; frame < scene.frames.size(); ++frame) add(scene.frames[frame].arms);
+  std::ranges::for_each(chunk, add);
+  std::vector<std::size_t> frames;
+  for (const std::size_t frame : memory) frames.push_back(frame - oldest);
+  for (std::size_t k = 0; k < chunk.size(); ++k) frames.push_back(known + k);
+  return nn::HandTurns(rows, frames);
 }
 
 }  // namespace
@@ -91,9 +105,10 @@ ChunkConditioning Condition(const ImaginedScene& scene, std::vector<std::size_t>
     const Arms& told = scene.frames.at(frame).arms;
     add(told, SeenArms(frame == 0 ? told : scene.frames[frame - 1].arms, told, lag_frames));
   }
+  std::vector<Arms> told(targets.begin(), targets.end());
+  told.resize(chunk, targets.back());
   const Arms* before = &scene.frames.back().arms;
-  for (std::size_t k = 0; k < chunk; ++k) {
-    const Arms& arms = targets[std::min(k, targets.size() - 1)];
+  for (const Arms& arms : told) {
     const ActionDelta delta = DeltaBetween(GrippersOf(*before), GrippersOf(arms));
     conditioning.deltas.push_back(Normalised(delta, options.statistics, options.stride));
     const Arms seen = SeenArms(*before, arms, lag_frames);
@@ -101,6 +116,7 @@ ChunkConditioning Condition(const ImaginedScene& scene, std::vector<std::size_t>
     add(arms, seen);
     before = &arms;
   }
+  conditioning.turns = TurnsOf(scene, memory, told);
   conditioning.memory = std::move(memory);
   conditioning.count = targets.size();
   return conditioning;

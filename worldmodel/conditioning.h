@@ -47,6 +47,7 @@ struct ChunkConditioning {
   Pictures pose_maps;                     ///< [K][V]: of the frames to imagine alone
   std::vector<std::vector<RayMap>> rays;  ///< [N + K][V], latent pixels
   std::vector<float> arms;                ///< [N + K, 16]: ActionRow of each frame
+  std::vector<float> turns;               ///< [N + K, nn::kTurnRow]: nn::HandTurns since the oldest memory
   std::size_t count = 0;                  ///< targets given, 1 … K: what lies beyond is padding
 };
 

@@ -10,6 +10,7 @@
 #include "core/seed.h"
 #include "worldmodel/chunk_key.h"
 #include "worldmodel/frame_memory.h"
+#include "worldmodel/nn/hand_turns.h"
 #include "worldmodel/nn/imagine.h"
 #include "worldmodel/nn/noise.h"
 #include "worldmodel/nn/pictures.h"
@@ -215,6 +216,8 @@ ChunkLatents Imaginer::DenoiseAnew(const ImaginedScene& scene, const ChunkCondit
   request.origin = request.origin.to(device);
   request.deltas = DeltasOf(conditioning.deltas).to(device);
   request.arms = TensorOf(conditioning.arms, {1, config().Frames(), 16}).to(device);
+  request.turns =
+      TensorOf(conditioning.turns, {1, config().Frames(), static_cast<std::int64_t>(nn::kTurnRow)}).to(device);
 
   std::uint32_t step = 0;  // first the noise from which the chunk is denoised, then the sampler's
   const auto draw = [&](std::int64_t frames) {

@@ -75,11 +75,61 @@ TEST(HandViews, AreNothingWhereThePictureDoesNotReach) {
   EXPECT_EQ(PointOf(ArmsAt(0, 0, 2), kPlaneOfXAndY + kMiddle), nothing) << "behind the camera";
 }
 
+/// What is shown of the right hand's closing in frame 2, if it was last closed at `then` and is at `now`.
+struct ShownTurn {
+  ShownTurn(const Tensor& then, const Tensor& now) {
+    const Scene scene(1);
+    Tensor turns = at::zeros({1, kFrames, kHandsOfARow, kKinds, kNumbers});
+    Tensor closing = turns[0][2][1][0];
+    closing[0] = 1;
+    closing[1] = 4;
+    closing.narrow(0, 2, 8).copy_(then[0][1].narrow(0, 8, 8));
+    closing.narrow(0, 10, 8).copy_(then[0][1].narrow(0, 8, 8));
+    closing[10] -= 0.02;  // it came along x
+    Tensor arms = ArmsAt(0, 0, 0);
+    arms[0][2].copy_(now[0][1]);
+    all = TurnViews(scene.image, scene.direction, scene.origin, arms, turns.flatten(2));
+    const Tensor mine = all[0][2][1][0].contiguous();
+    numbers.assign(mine.data_ptr<float>(), mine.data_ptr<float>() + mine.numel());
+  }
+  float Picture(std::int64_t point, std::int64_t colour) const {
+    return numbers[static_cast<std::size_t>(point * kHandPointNumbers + colour)];
+  }
+  float Feature(std::int64_t index) const {
+    return numbers[static_cast<std::size_t>(kHandPoints * kHandPointNumbers + index)];
+  }
+  static constexpr std::int64_t kHandsOfARow = kHands, kKinds = kTurnKinds, kNumbers = kTurnNumbers;
+  Tensor all;
+  std::vector<float> numbers;
+};
+
+TEST(TurnViews, AreReadWhereTheHandTurned) {
+  const ShownTurn shown(ArmsAt(0.12, -0.07, 0), ArmsAt(-0.1, 0.1, 0.3));
+  EXPECT_NEAR(shown.Picture(kPlaneOfXAndY + kMiddle, 0), 0.12, 1e-5);
+  EXPECT_NEAR(shown.Picture(kPlaneOfXAndY + kMiddle, 1), -0.07, 1e-5);
+  Tensor others = shown.all.clone();
+  others[0][2][1][0].zero_();
+  EXPECT_TRUE(at::equal(others, at::zeros_like(others))) << "of what did not turn nothing is shown";
+}
+
+TEST(TurnViews, SayHowTheHandMovedSince) {
+  const double quarter = std::acos(0.0);
+  const ShownTurn shown(ArmsAt(0.1, 0, 0, quarter), ArmsAt(0.1, 0.05, 0.2, quarter));
+  const float wanted[] = {1, 0.25F, std::exp(-1.0F),  // there was one, four frames ago
+                          0.5F, 0, 2,                // its x axis pointed along y
+                          0, 0.5F, 2,                // base frame
+                          1, 0, 0, 1, 0, 0,          // not turned since
+                          0.6F, 0, 0};               // 2 cm a frame
+  for (std::size_t i = 0; i < std::size(wanted); ++i)
+    EXPECT_NEAR(shown.Feature(static_cast<std::int64_t>(i)), wanted[i], 1e-5) << i;
+}
+
 /// What a UNet that is told of arms, and of `hand_views` views about them, prepares of them.
-Tensor PreparedFrames(std::int64_t hand_views, RandomWeights::LastLayers last_layers) {
+Tensor PreparedFrames(std::int64_t hand_views, RandomWeights::LastLayers last_layers, bool hand_turns = false) {
   ModelConfig config = TinyConfig();
   config.unet.frame_actions = true;
   config.unet.hand_views = hand_views;
+  config.unet.hand_turns = hand_turns;
   RandomWeights random(5, last_layers);
   const UNet unet(Scope(random, "model.diffusion_model"), config.unet);
   UNet::Context context;
@@ -88,6 +138,7 @@ Tensor PreparedFrames(std::int64_t hand_views, RandomWeights::LastLayers last_la
   context.domain = at::zeros({1}, at::kLong);
   context.frames = at::ones({1, kFrames, 52});
   context.hands = at::ones({1, kFrames, 2, kHandPoints * kHandPointNumbers});
+  context.turns = at::ones({1, kFrames, 2, 2, kHandPoints * kHandPointNumbers + kTurnFeatures});
   return unet.Prepare(context).frames;
 }
 
@@ -95,6 +146,14 @@ TEST(HandViews, ChangeNothingBeforeTheyAreTrainedAndSomethingAfter) {
   using enum RandomWeights::LastLayers;
   EXPECT_TRUE(at::equal(PreparedFrames(0, kZero), PreparedFrames(1, kZero)));
   EXPECT_FALSE(at::equal(PreparedFrames(0, kDrawn), PreparedFrames(1, kDrawn)));
+  EXPECT_TRUE(at::equal(PreparedFrames(0, kZero), PreparedFrames(1, kZero, true)));
+  EXPECT_FALSE(at::equal(PreparedFrames(1, kDrawn), PreparedFrames(1, kDrawn, true)));
+}
+
+TEST(TurnViews, WithoutHandViewsAreRefused) {
+  ModelConfig config = TinyConfig();
+  config.unet.hand_turns = true;
+  EXPECT_THROW(config.Check(), TensorError);
 }
 
 TEST(HandViews, OfOtherThanAllViewsAreRefused) {

@@ -143,6 +143,7 @@ TEST(TrainWorld, TheLossFallsWithEverythingThatThePaperLacks) {
   at.config.unet.in_channels += at.config.vae.z_channels + 1;
   at.config.unet.frame_actions = true;
   at.config.unet.hand_views = 1;
+  at.config.unet.hand_turns = true;
   at.config.action_resampler.embedding_dim = 18;
   const auto [before, after] = LossBeforeAndAfter(at, options);
   EXPECT_LT(after, 0.9 * before);

@@ -9,6 +9,7 @@
 #include "core/geometry.h"
 #include "tests/worldmodel/imagined_support.h"
 #include "worldmodel/action_delta.h"
+#include "worldmodel/nn/hand_turns.h"
 
 namespace evac {
 namespace {
@@ -65,6 +66,28 @@ TEST(Conditioning, ArmsThatFollowLateCarryTheirCamerasLateToo) {
   EXPECT_EQ(late.arms, at_once.arms);
   EXPECT_NE(cv::norm(late.pose_maps[0][0], at_once.pose_maps[0][0], cv::NORM_INF), 0);
   EXPECT_EQ(cv::norm(late.pose_maps[1][0], at_once.pose_maps[1][0], cv::NORM_INF), 0) << "there by then";
+}
+
+TEST(Conditioning, WhereAHandClosedIsKnownAfterItsFrameIsForgotten) {
+  ImaginedScene scene = Started();
+  for (const double closure : {0.0, 1.0, 1.0, 1.0}) {
+    Arms arms = scene.frames.back().arms;
+    arms[0].base_from_gripper.translation().x() += 0.01;
+    arms[0].closure = closure;
+    scene.frames.push_back({{}, arms});
+  }
+  const double closed_at_m = scene.frames[3].arms[0].base_from_gripper.translation().x();
+  const ChunkConditioning told = Condition(scene, {0, 5}, Targets(3), SmallConfig(), FewSteps().conditioning);
+  ASSERT_EQ(told.turns.size(), 5 * nn::kTurnRow);
+  const auto right_hand = [&](std::size_t frame, std::size_t kind, std::size_t number) {
+    return told.turns[frame * nn::kTurnRow + (nn::kTurnKinds + kind) * nn::kTurnNumbers + number];
+  };
+  EXPECT_EQ(right_hand(0, 0, 0), 0) << "not closed at first";
+  EXPECT_EQ(right_hand(1, 0, 1), 2) << "two frames ago, which memory leaves out";
+  EXPECT_FLOAT_EQ(right_hand(1, 0, 2), static_cast<float>(closed_at_m));
+  EXPECT_EQ(right_hand(2, 1, 0), 1) << "told .4 closed: open again";
+  EXPECT_EQ(right_hand(4, 1, 1), 2);
+  EXPECT_EQ(right_hand(4, 0, 1), 5) << "and yet it had closed";
 }
 
 TEST(Conditioning, ATurnIsSeenOnTheShortWay) {

@@ -66,4 +66,31 @@ Tensor HandViews(const Tensor& image, const Tensor& direction, const Tensor& ori
       .flatten(3);
 }
 
+Tensor TurnViews(const Tensor& image, const Tensor& direction, const Tensor& origin, const Tensor& arms,
+                 const Tensor& turns) {
+  CheckShape("turns of the hands", turns, {arms.size(0), arms.size(1), static_cast<std::int64_t>(kTurnRow)});
+  constexpr auto kKinds = static_cast<std::int64_t>(kTurnKinds), kNumbers = static_cast<std::int64_t>(kTurnNumbers);
+  const Tensor each = turns.to(at::kFloat).unflatten(2, {kArms, kKinds, kNumbers});  // [B, T, arms, kinds, …]
+  const Tensor was = each.narrow(4, 0, 1), then = each.narrow(4, 2, kArmNumbers),
+               before = each.narrow(4, 2 + kArmNumbers, kArmNumbers);
+  const Tensor as_frames = then.permute({0, 1, 3, 2, 4}).flatten(3).flatten(1, 2);  // [B, T kinds, 16]
+  const Tensor views = HandViews(image, direction, origin, as_frames)
+                           .unflatten(1, {arms.size(1), kKinds})
+                           .transpose(2, 3);  // [B, T, arms, kinds, any]
+  const Tensor now = arms.to(at::kFloat).unflatten(2, {kArms, 1, kArmNumbers}).expand_as(then);
+  const auto place = [](const Tensor& hand) { return hand.narrow(4, 0, 3); };
+  const auto axes = [](const Tensor& hand) {  // [..., 3, 3], rows: x, y, z of the hand
+    const Tensor xy = HandAxes(hand.narrow(4, 3, 4)), x = xy.narrow(4, 0, 3), y = xy.narrow(4, 3, 3);
+    return at::stack({x, y, at::linalg_cross(x, y)}, 4);
+  };
+  constexpr double kFewFrames = 4, kManyFrames = 16, kPer_m = 10, kMovesPer_m = 30;
+  const Tensor since = each.narrow(4, 1, 1), moved_m = place(now) - place(then), axes_then = axes(then);
+  const Tensor turned = at::matmul(axes_then, axes(now).transpose(4, 5)).narrow(5, 0, 2).flatten(4);
+  const Tensor numbers = at::cat({at::ones_like(was), since / kManyFrames, (since / -kFewFrames).exp(),
+                                  at::matmul(axes_then, moved_m.unsqueeze(5)).squeeze(5) * kPer_m, moved_m * kPer_m,
+                                  turned, (place(then) - place(before)) * kMovesPer_m},
+                                 4);
+  return at::cat({views, numbers}, 4) * was;
+}
+
 }  // namespace evac::nn

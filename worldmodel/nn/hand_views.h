@@ -1,5 +1,6 @@
 #pragma once
 
+#include "worldmodel/nn/hand_turns.h"
 #include "worldmodel/nn/tensor.h"
 
 /// What the first picture shows about each hand, frame by frame, for networks that are told (`unet.hand_views`). Not in
@@ -18,5 +19,15 @@ constexpr std::int64_t kHandPointNumbers = 4;  ///< red, green, blue; 1 where th
 /// @param arms       [B, T, 16]: rows as in frame_actions.h
 /// @returns          [B, T, 2, V kHandPoints kHandPointNumbers]: left hand, right hand; 0 where the picture does not reach
 Tensor HandViews(const Tensor& image, const Tensor& direction, const Tensor& origin, const Tensor& arms);
+
+/// Beside the pictures of a turn: whether there was one; how long ago, slowly and quickly forgotten; where the hand is
+/// now, seen from there, in that hand's axes and in the base frame; how it is turned against then; how it moved then.
+constexpr std::int64_t kTurnFeatures = 1 + 2 + 3 + 3 + 6 + 3;
+
+/// The same where each hand last closed, and where it last opened (`unet.hand_turns`).
+/// @param turns  [B, T, kTurnRow]: HandTurns
+/// @returns      [B, T, 2, kTurnKinds, V kHandPoints kHandPointNumbers + kTurnFeatures]: zeros where there was no turn
+Tensor TurnViews(const Tensor& image, const Tensor& direction, const Tensor& origin, const Tensor& arms,
+                 const Tensor& turns);
 
 }  // namespace evac::nn

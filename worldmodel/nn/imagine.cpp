@@ -23,6 +23,8 @@ Conditioning Condition(const EvacModel& model, const ChunkRequest& request) {
   if (model.config().unet.frame_actions) conditioning.frames = FrameActions(request.arms, conditioning.memory);
   if (model.config().unet.hand_views > 0)
     conditioning.hands = HandViews(request.image, request.direction, request.origin, request.arms);
+  if (model.config().unet.hand_turns)
+    conditioning.turns = TurnViews(request.image, request.direction, request.origin, request.arms, request.turns);
   return conditioning;
 }
 
@@ -32,10 +34,12 @@ Conditioning Unconditioned(const EvacModel& model, const ChunkRequest& request, 
   const Tensor& mask = conditioning.concat.mask;
   without.concat.mask = at::cat({mask.narrow(2, 0, memory), at::zeros_like(mask.narrow(2, memory, chunk))}, 2);
   Remember(model, request.memory, without.concat);
+  const Tensor nothing = at::zeros_like(request.image);
   if (conditioning.hands.defined())
-    without.hands = HandViews(at::zeros_like(request.image), request.direction, request.origin, request.arms);
-  without.tokens =
-      model.ContextTokens(model.ImageTokens(at::zeros_like(request.image)), model.ActionTokens(request.deltas));
+    without.hands = HandViews(nothing, request.direction, request.origin, request.arms);
+  if (conditioning.turns.defined())
+    without.turns = TurnViews(nothing, request.direction, request.origin, request.arms, request.turns);
+  without.tokens = model.ContextTokens(model.ImageTokens(nothing), model.ActionTokens(request.deltas));
   return without;
 }
 
@@ -45,7 +49,8 @@ Denoise MakeDenoise(const EvacModel& model, const Conditioning& conditioning) {
   const at::Device device = conditioning.tokens.device();
   PreparedContext context =
       model.unet().Prepare({conditioning.tokens, constant(model.config().fps).to(device),
-                            constant(model.config().domain).to(device), views, conditioning.frames, conditioning.hands});
+                            constant(model.config().domain).to(device), views, conditioning.frames, conditioning.hands,
+                            conditioning.turns});
   return [&model, concat = conditioning.concat, context = std::move(context), views, rows, memory](const Tensor& x_t,
                                                                                                    std::int64_t t) {
     const Tensor steps = at::full({rows}, t, at::kLong).to(x_t.device());

@@ -21,6 +21,7 @@ struct ChunkRequest {
   Tensor origin;     ///< [BV, 3, T, h, w]
   Tensor deltas;     ///< [B, any, 14], normalised
   Tensor arms = {};  ///< [B, T, 16] rows as in frame_actions.h; read if the network has `frame_actions` or `hand_views`
+  Tensor turns = {};  ///< [B, T, kTurnRow]: HandTurns; read if the network has `hand_turns`
 };
 
 /// Everything random, drawn by the caller.
@@ -36,6 +37,7 @@ struct Conditioning {
   Tensor tokens;       ///< [BV, image tokens + action tokens, context_dim]
   Tensor frames = {};  ///< [B, T, kFrameActionNumbers] or undefined
   Tensor hands = {};   ///< HandViews or undefined
+  Tensor turns = {};   ///< TurnViews or undefined
 };
 
 Conditioning Condition(const EvacModel& model, const ChunkRequest& request);

@@ -55,7 +55,8 @@ void Advance(const nn::EvacModel& model, const ShardSet& shards, const std::vect
                                  batch.direction,
                                  batch.origin,
                                  batch.deltas,
-                                 batch.arms};
+                                 batch.arms,
+                                 batch.turns};
   const std::vector<std::int64_t> one_scene = {batch.views, batch.latents.size(1), config.chunk, batch.latents.size(3),
                                                batch.latents.size(4)};
   nn::ImagineOptions sampler;

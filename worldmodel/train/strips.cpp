@@ -29,7 +29,8 @@ Tensor Imagine(const nn::EvacModel& model, const WorldBatch& batch, const StripO
                                  batch.direction,
                                  batch.origin,
                                  batch.deltas,
-                                 batch.arms};
+                                 batch.arms,
+                                 batch.turns};
   std::vector<std::int64_t> shape = batch.latents.sizes().vec();
   const auto step = [&] { return steps.Normal(batch.latents.sizes()); };
   shape[2] = chunk;

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 
+#include "worldmodel/nn/hand_turns.h"
+
 namespace evac::train {
 namespace {
 
@@ -16,14 +18,13 @@ struct Turns {
 };
 
 Turns TurnsOf(const Shard& shard, const Clip& clip) {
-  constexpr float kHalfClosed = 60;  // 0 open … 120 closed
   const Tensor actions = shard.actions.narrow(0, clip.first, clip.frames).to(at::kFloat).contiguous();
   const float* numbers = actions.data_ptr<float>();
   Turns turns;
   for (std::int64_t frame = 1; frame < clip.frames; ++frame) {
     for (const std::int64_t hand : {7, 15}) {
-      const bool is_closed = numbers[16 * frame + hand] > kHalfClosed,
-                 was_closed = numbers[16 * (frame - 1) + hand] > kHalfClosed;
+      const bool is_closed = nn::IsClosed(numbers[16 * frame + hand]),
+                 was_closed = nn::IsClosed(numbers[16 * (frame - 1) + hand]);
       if (is_closed && !was_closed) turns.closings.push_back(frame);
       if (!is_closed && was_closed) turns.openings.push_back(frame);
     }

@@ -2,6 +2,8 @@
 
 #include <ATen/ops/linalg_vector_norm.h>
 
+#include "worldmodel/nn/hand_turns.h"
+
 namespace evac::train {
 namespace {
 
@@ -11,6 +13,19 @@ Tensor RowsOf(const Window& window) {
   for (const std::int64_t frame : window.memory) rows.push_back(window.clip->first + frame);
   for (std::int64_t k = 1; k <= window.chunk; ++k) rows.push_back(window.clip->first + window.last + k);
   return at::tensor(rows, at::kLong);
+}
+
+/// [T, kTurnRow]
+Tensor TurnsOf(const Shard& shard, const Window& window) {
+  const std::int64_t oldest = window.memory.front();
+  std::vector<std::size_t> frames;
+  for (const std::int64_t frame : window.memory) frames.push_back(static_cast<std::size_t>(frame - oldest));
+  for (std::int64_t k = 1; k <= window.chunk; ++k) frames.push_back(static_cast<std::size_t>(window.last + k - oldest));
+  const Tensor rows =
+      shard.actions.narrow(0, window.clip->first + oldest, window.last + window.chunk + 1 - oldest).to(at::kFloat).contiguous();
+  const float* numbers = rows.data_ptr<float>();
+  const std::vector<float> turns = nn::HandTurns({numbers, numbers + rows.numel()}, frames);
+  return at::tensor(turns).reshape({static_cast<std::int64_t>(frames.size()), static_cast<std::int64_t>(nn::kTurnRow)});
 }
 
 /// [B][T, V, C, h, w] → [BV, C, T, h, w] floats
@@ -43,8 +58,8 @@ WorldBatch MakeWorldBatch(const ShardSet& shards, const std::vector<Window>& win
   const auto memory = static_cast<std::int64_t>(first.memory.size());
   const std::int64_t chunk = first.chunk;
   const std::int64_t views = shards.views(), height = shards.height_px(), width = shards.width_px();
-  WorldBatch batch{static_cast<std::int64_t>(windows.size()), views, memory, {}, {}, {}, {}, {}, {}, {}, {}};
-  std::vector<Tensor> latents, maps, directions, origins, images, deltas, arms, objects;
+  WorldBatch batch{static_cast<std::int64_t>(windows.size()), views, memory, {}, {}, {}, {}, {}, {}, {}, {}, {}};
+  std::vector<Tensor> latents, maps, directions, origins, images, deltas, arms, turns, objects;
   for (const Window& window : windows) {
     const Shard& shard = shards.shards()[window.clip->shard];
     const Tensor rows = RowsOf(window);
@@ -57,6 +72,7 @@ WorldBatch MakeWorldBatch(const ShardSet& shards, const std::vector<Window>& win
     images.push_back(PicturesFrom(shard.frames[window.clip->first + window.image]));
     deltas.push_back(shard.deltas.narrow(0, window.clip->first + window.last + 1, chunk));
     arms.push_back(shard.actions.index_select(0, rows));
+    turns.push_back(TurnsOf(shard, window));
     objects.push_back(shard.object_px.index_select(0, rows));
   }
   batch.latents = ByView(latents);
@@ -67,6 +83,7 @@ WorldBatch MakeWorldBatch(const ShardSet& shards, const std::vector<Window>& win
   batch.images = at::cat(images);
   batch.deltas = at::stack(deltas);
   batch.arms = at::stack(arms);
+  batch.turns = at::stack(turns);
   const double per_px = static_cast<double>(batch.latents.size(4)) / static_cast<double>(width);
   batch.object = at::stack(objects).permute({0, 2, 3, 1}).flatten(0, 1) * per_px;
   return batch;

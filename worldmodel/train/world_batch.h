@@ -15,6 +15,7 @@ struct WorldBatch {
   Tensor images;     ///< [BV, 3, H, W] in [-1, 1]: for the image encoder
   Tensor deltas;     ///< [B, K, 14]
   Tensor arms;       ///< [B, T, 16]: rows of nn::FrameActions
+  Tensor turns;      ///< [B, T, nn::kTurnRow]: nn::HandTurns since the oldest memory
   Tensor object;     ///< [BV, 2, T]: x, y of the object in latent pixels; not a number where unknown
 };
 

@@ -103,6 +103,8 @@ nn::UNet::Context WorldTraining::ContextOf(const Tensor& tokens, const WorldBatc
   if (model_.config().unet.frame_actions) context.frames = nn::FrameActions(batch.arms, batch.memory);
   if (model_.config().unet.hand_views > 0)
     context.hands = nn::HandViews(batch.images, batch.direction, batch.origin, batch.arms);
+  if (model_.config().unet.hand_turns)
+    context.turns = nn::TurnViews(batch.images, batch.direction, batch.origin, batch.arms, batch.turns);
   return context;
 }
 
@@ -163,6 +165,7 @@ Tensor WorldTraining::LossOf(const WorldBatch& given, const Drops& drops, const 
                           std::nullopt};
   if (step.context.frames.defined()) step.context.frames = step.context.frames * PerRow(drops.actions, 3);
   if (step.context.hands.defined()) step.context.hands = step.context.hands * PerRow(drops.actions, 4);
+  if (step.context.turns.defined()) step.context.turns = step.context.turns * PerRow(drops.actions, 5);
   if (noisy_memory && options_.memory_noise_kind == MemoryNoise::kPublished) {
     std::vector<float> angles;
     for (std::int64_t i = 0; i < rows * n; ++i) angles.push_back(static_cast<float>(dice.Uniform(-1.57, 1.57)));
