@@ -28,6 +28,15 @@ TEST(FrameActions, SayWhereTheArmIsAndHowFarItCameSinceTheNewestMemory) {
   EXPECT_NEAR(numbers[1][right + 10].item<float>(), 0.0, 1e-6);
 }
 
+TEST(FrameActions, SayOfEachHandByItselfWhatNoMemoryIsNeededFor) {
+  const Tensor rows = Rows({0.1, 0.2, 0.25}, 60), poses = HandPoses(FrameActions(rows, 1));
+  ASSERT_EQ(poses.sizes(), (std::vector<std::int64_t>{1, 3, 2, kHandPoseNumbers}));
+  EXPECT_TRUE(at::equal(poses, HandPoses(FrameActions(rows, 3)))) << "whatever the memory ends with";
+  EXPECT_FLOAT_EQ(poses[0][2][1][0].item<float>(), 1.0F) << "right, .25 m";
+  EXPECT_FLOAT_EQ(poses[0][2][1][9].item<float>(), 0.0F) << "half closed";
+  EXPECT_FLOAT_EQ(poses[0][2][0][9].item<float>(), -1.0F) << "left, open";
+}
+
 TEST(FrameActions, AreTheSameForBothSignsOfAQuaternion) {
   Tensor rows = Rows({0.1, 0.2}, 10), other = rows.clone();
   other.narrow(2, 11, 4).neg_();

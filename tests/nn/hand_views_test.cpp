@@ -150,9 +150,14 @@ TEST(HandViews, ChangeNothingBeforeTheyAreTrainedAndSomethingAfter) {
   EXPECT_FALSE(at::equal(PreparedFrames(1, kDrawn), PreparedFrames(1, kDrawn, true)));
 }
 
-TEST(TurnViews, WithoutHandViewsAreRefused) {
+TEST(TurnViews, WithoutHandViewsOrFrameActionsAreRefused) {
   ModelConfig config = TinyConfig();
   config.unet.hand_turns = true;
+  config.unet.frame_actions = true;
+  EXPECT_THROW(config.Check(), TensorError);
+  config.unet.hand_views = config.views;
+  EXPECT_NO_THROW(config.Check());
+  config.unet.frame_actions = false;
   EXPECT_THROW(config.Check(), TensorError);
 }
 

@@ -36,4 +36,11 @@ Tensor FrameActions(const Tensor& rows, std::int64_t memory) {
   return at::cat(numbers, -1);
 }
 
+Tensor HandPoses(const Tensor& frames) {
+  constexpr std::int64_t kPose = 10, kCounted = 4;  // of a hand's numbers: the first, and those from the memory behind them
+  const Tensor hands = frames.unflatten(2, {2, kFrameActionNumbers / 2});
+  const std::int64_t waves = kPose + kCounted;
+  return at::cat({hands.narrow(3, 0, kPose), hands.narrow(3, waves, hands.size(3) - waves)}, 3);
+}
+
 }  // namespace evac::nn

@@ -20,4 +20,10 @@ Tensor HandAxes(const Tensor& quaternion);
 /// @returns       [B, T, kFrameActionNumbers], of the order of 1
 Tensor FrameActions(const Tensor& rows, std::int64_t memory);
 
+/// What FrameActions say of each hand by itself, without what is counted from the memory.
+/// @param frames  [B, T, kFrameActionNumbers]
+/// @returns       [B, T, 2, kHandPoseNumbers]: left, right
+constexpr std::int64_t kHandPoseNumbers = 22;
+Tensor HandPoses(const Tensor& frames);
+
 }  // namespace evac::nn

@@ -67,8 +67,10 @@ UNet::UNet(const Scope& at, const UNetConfig& config)
                             4 * config.model_channels);
   if (config.hand_turns) {
     turn_eye_.emplace(at / "hand_turn_eye", config.hand_views * kHandPoints * kHandPointNumbers, kSeenOfAHand);
-    turn_embedding_.emplace(at / "hand_turn_embedding", kSeenOfAHand + kKindsOfTurns * (kSeenOfAHand + kTurnFeatures),
+    turn_embedding_.emplace(at / "hand_turn_embedding",
+                            kSeenOfAHand + kKindsOfTurns * (kSeenOfAHand + kTurnFeatures) + kHandPoseNumbers,
                             4 * config.model_channels);
+    turn_out_.emplace(at / "hand_turn_out", 4 * config.model_channels, 4 * config.model_channels);
   }
   MakeInput(at / "input_blocks");
   init_attention_.emplace(
@@ -188,7 +190,8 @@ Tensor UNet::AboutTurns(const Context& context) const {
              {context.hands.size(0), context.hands.size(1), 2, kKindsOfTurns, numbers + kTurnFeatures});
   const Tensor seen = (*turn_eye_)(at::cat({context.hands.unsqueeze(3), context.turns.narrow(4, 0, numbers)}, 3));
   const Tensor told = context.turns.narrow(4, numbers, kTurnFeatures);
-  return (*turn_embedding_)(at::cat({seen.flatten(3), told.flatten(3)}, 3)).sum(2);
+  const Tensor poses = HandPoses(context.frames);
+  return (*turn_out_)(at::silu((*turn_embedding_)(at::cat({at::silu(seen).flatten(3), told.flatten(3), poses}, 3)).sum(2)));
 }
 
 Tensor UNet::InProductType(const Tensor& x) const { return product_ ? x.to(*product_) : x; }

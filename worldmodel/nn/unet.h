@@ -76,6 +76,7 @@ class UNet {
   EmbeddingMlp time_embed_, fps_embedding_;
   std::optional<EmbeddingMlp> frame_embedding_, hand_embedding_, turn_embedding_;
   std::optional<Linear> turn_eye_;  ///< one for all that is shown about a hand: now, where it closed, where it opened
+  std::optional<Linear> turn_out_;
   std::vector<Block> input_blocks_;
   std::optional<TemporalTransformer> init_attention_;
   Block middle_;

@@ -121,6 +121,7 @@ Settings SettingsOf(WorldOptions& options) {
                        {"self_memory_chunks", &w.self_memory_chunks},
                        {"train_action_resampler", &w.train_action_resampler},
                        {"train_image_encoder", &w.train_image_encoder},
+                       {"train_hand_turns", &w.train_hand_turns},
                        {"strip_steps", &options.strip_steps}};
   AddJob(settings, options.job);
   return settings;

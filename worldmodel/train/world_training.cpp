@@ -42,6 +42,9 @@ void Check(const WorldTrainingOptions& o, const nn::ModelConfig& config) {
 }  // namespace
 
 bool IsTrained(const std::string& key, const WorldTrainingOptions& options) {
+  for (const char* part : {"hand_turn_eye.", "hand_turn_embedding."}) {
+    if (key.starts_with(std::string("model.diffusion_model.") + part)) return options.train_hand_turns;
+  }
   if (key.starts_with("model.diffusion_model.") || key.starts_with("image_proj_model.")) return true;
   if (key.starts_with("cond_stage_model.")) return options.train_action_resampler;
   return key.starts_with("embedder.") && options.train_image_encoder;

@@ -50,6 +50,7 @@ struct WorldTrainingOptions {
 
   bool train_action_resampler = false;  ///< the paper's page freezes it, its text trains it
   bool train_image_encoder = false;     ///< there is no pretrained one of a small size
+  bool train_hand_turns = true;         ///< what `hand_turns` make of what is shown; false: trained before, on other recordings
 };
 
 /// Whether training moves a parameter; what nothing reads stays.
