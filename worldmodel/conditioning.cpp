@@ -38,7 +38,8 @@ std::vector<RayMap> Rays(const Arms& arms, std::span<const Camera> cameras, cons
 }
 
 /// What every frame since the oldest memory was told says of those that the network is told of.
-std::vector<float> TurnsOf(const ImaginedScene& scene, const std::vector<std::size_t>& memory, std::span<const Arms> chunk) {
+std::vector<float> TurnsOf(const ImaginedScene& scene, const std::vector<std::size_t>& memory,
+                           std::span<const Arms> chunk) {
   const std::size_t oldest = memory.front(), known = scene.frames.size() - oldest;
   std::vector<float> rows;
   const auto add = [&](const Arms& arms) { std::ranges::copy(ActionRow(arms), std::back_inserter(rows)); };

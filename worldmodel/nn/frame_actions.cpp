@@ -37,7 +37,7 @@ Tensor FrameActions(const Tensor& rows, std::int64_t memory) {
 }
 
 Tensor HandPoses(const Tensor& frames) {
-  constexpr std::int64_t kPose = 10, kCounted = 4;  // of a hand's numbers: the first, and those from the memory behind them
+  constexpr std::int64_t kPose = 10, kCounted = 4;  // a hand's first numbers; those counted from the memory behind them
   const Tensor hands = frames.unflatten(2, {2, kFrameActionNumbers / 2});
   const std::int64_t waves = kPose + kCounted;
   return at::cat({hands.narrow(3, 0, kPose), hands.narrow(3, waves, hands.size(3) - waves)}, 3);

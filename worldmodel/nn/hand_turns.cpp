@@ -39,7 +39,9 @@ std::vector<float> HandTurns(std::span<const float> rows, std::span<const std::s
         float* at = &numbers[((t * kHands + hand) * kTurnKinds + kind) * kTurnNumbers];
         at[0] = 1;
         at[1] = static_cast<float>(frames[t] - *turn);
-        const auto hand_at = [&](std::size_t frame) { return rows.subspan(frame * kRow + hand * kHandNumbers, kHandNumbers); };
+        const auto hand_at = [&](std::size_t frame) {
+          return rows.subspan(frame * kRow + hand * kHandNumbers, kHandNumbers);
+        };
         std::ranges::copy(hand_at(*turn), at + 2);
         std::ranges::copy(hand_at(*turn - 1), at + 2 + kHandNumbers);
       }

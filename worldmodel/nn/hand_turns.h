@@ -9,9 +9,10 @@
 /// every chunk; what was told is known to the end. No tensors here: worlds keep it beside their scenes.
 namespace evac::nn {
 
-constexpr std::size_t kHands = 2, kHandNumbers = 8;     ///< of an arms row (frame_actions.h): left, right
-constexpr std::size_t kTurnKinds = 2;                   ///< closing, opening
-constexpr std::size_t kTurnNumbers = 2 + 2 * kHandNumbers;  ///< 1 if there was one, frames since; the hand then, and a frame before
+constexpr std::size_t kHands = 2, kHandNumbers = 8;  ///< of an arms row (frame_actions.h): left, right
+constexpr std::size_t kTurnKinds = 2;                ///< closing, opening
+/// 1 if there was one, frames since; the hand then, and a frame before.
+constexpr std::size_t kTurnNumbers = 2 + 2 * kHandNumbers;
 constexpr std::size_t kTurnRow = kHands * kTurnKinds * kTurnNumbers;
 
 /// Whether a hand's last number (0 open … 120 closed) is told to be more closed than open.

@@ -191,7 +191,8 @@ Tensor UNet::AboutTurns(const Context& context) const {
   const Tensor seen = (*turn_eye_)(at::cat({context.hands.unsqueeze(3), context.turns.narrow(4, 0, numbers)}, 3));
   const Tensor told = context.turns.narrow(4, numbers, kTurnFeatures);
   const Tensor poses = HandPoses(context.frames);
-  return (*turn_out_)(at::silu((*turn_embedding_)(at::cat({at::silu(seen).flatten(3), told.flatten(3), poses}, 3)).sum(2)));
+  const Tensor known = at::cat({at::silu(seen).flatten(3), told.flatten(3), poses}, 3);
+  return (*turn_out_)(at::silu((*turn_embedding_)(known).sum(2)));
 }
 
 Tensor UNet::InProductType(const Tensor& x) const { return product_ ? x.to(*product_) : x; }

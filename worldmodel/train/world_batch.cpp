@@ -21,8 +21,9 @@ Tensor TurnsOf(const Shard& shard, const Window& window) {
   std::vector<std::size_t> frames;
   for (const std::int64_t frame : window.memory) frames.push_back(static_cast<std::size_t>(frame - oldest));
   for (std::int64_t k = 1; k <= window.chunk; ++k) frames.push_back(static_cast<std::size_t>(window.last + k - oldest));
-  const Tensor rows =
-      shard.actions.narrow(0, window.clip->first + oldest, window.last + window.chunk + 1 - oldest).to(at::kFloat).contiguous();
+  const Tensor rows = shard.actions.narrow(0, window.clip->first + oldest, window.last + window.chunk + 1 - oldest)
+                          .to(at::kFloat)
+                          .contiguous();
   const float* numbers = rows.data_ptr<float>();
   const std::vector<float> turns = nn::HandTurns({numbers, numbers + rows.numel()}, frames);
   return at::tensor(turns).reshape({static_cast<std::int64_t>(frames.size()), static_cast<std::int64_t>(nn::kTurnRow)});
