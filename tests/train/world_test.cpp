@@ -18,6 +18,7 @@
 #include "worldmodel/train/encode_shards.h"
 #include "worldmodel/train/train_world.h"
 #include "worldmodel/train/weight_files.h"
+#include "worldmodel/train/world_training.h"
 
 namespace evac::train {
 namespace {
@@ -280,6 +281,25 @@ TEST(TrainWorld, GoesOnFromAModelThatWasShownLess) {
   EXPECT_NEAR(end("widened", more, 1e-12, start), before, 1e-5 * before);
   start.init = at.folder / "widened" / "weights.safetensors";
   EXPECT_THROW(end("narrow", at.config, 1e-12, start), TensorError) << "nothing is left out";
+}
+
+TEST(TrainWorld, KeepsWhatHandTurnsMakeOfWhatIsShownWhenAsked) {
+  WorldTrainingOptions kept, trained;
+  kept.train_hand_turns = false;
+  for (const char* key : {"hand_turn_eye.weight", "hand_turn_embedding.0.weight", "hand_turn_embedding.2.bias"}) {
+    EXPECT_FALSE(IsTrained(std::string("model.diffusion_model.") + key, kept)) << key;
+    EXPECT_TRUE(IsTrained(std::string("model.diffusion_model.") + key, trained)) << key;
+  }
+  EXPECT_TRUE(IsTrained("model.diffusion_model.hand_turn_out.weight", kept)) << "how much it counts is learned";
+  EXPECT_TRUE(IsTrained("model.diffusion_model.hand_view_embedding.0.weight", kept));
+}
+
+TEST(TrainWorld, RefusesToKeepHandTurnsThatTheModelDoesNotHave) {
+  const Prepared at(1);
+  WorldOptions options = Quick(1);
+  options.world.train_hand_turns = false;
+  EXPECT_THROW(TrainWorld({{at.folder / "shards"}, at.folder / "out", at.config}, options, {at.codec()}, {}),
+               TensorError);
 }
 
 TEST(TrainWorld, RefusesLatentsOfAnotherCodec) {

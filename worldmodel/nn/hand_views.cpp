@@ -10,7 +10,7 @@
 namespace evac::nn {
 namespace {
 
-constexpr std::int64_t kArms = 2, kArmNumbers = 8;  // of a row
+constexpr std::int64_t kArms = kHands, kArmNumbers = kHandNumbers, kKinds = kTurnKinds, kNumbers = kTurnNumbers;
 
 /// [kHandPoints, 3] metres, hand's axes.
 Tensor PointsOfAHand() {
@@ -34,13 +34,16 @@ Tensor PointsOfAHand() {
   return at::tensor(points_m).reshape({kHandPoints, 3});
 }
 
+/// [..., kArmNumbers] → [..., 3, 3]: rows are the hand's x, y and z in the base frame.
+Tensor AxesOf(const Tensor& hand) {
+  const Tensor xy = HandAxes(hand.narrow(-1, 3, 4)), x = xy.narrow(-1, 0, 3), y = xy.narrow(-1, 3, 3);
+  return at::stack({x, y, at::linalg_cross(x, y)}, -2);
+}
+
 /// [B, T, arms, kHandPoints, 3] metres, base frame.
 Tensor PointsAboutHands(const Tensor& arms) {
   const Tensor rows = arms.to(at::kFloat).unflatten(2, {kArms, kArmNumbers});
-  const Tensor xy = HandAxes(rows.narrow(3, 3, 4)), x = xy.narrow(3, 0, 3), y = xy.narrow(3, 3, 3);
-  const Tensor base_from_hand = at::stack({x, y, at::linalg_cross(x, y)}, 4);  // columns
-  return rows.narrow(3, 0, 3).unsqueeze(3) +
-         at::matmul(PointsOfAHand().to(arms.device()), base_from_hand.transpose(3, 4));
+  return rows.narrow(3, 0, 3).unsqueeze(3) + at::matmul(PointsOfAHand().to(arms.device()), AxesOf(rows));
 }
 
 }  // namespace
@@ -69,7 +72,6 @@ Tensor HandViews(const Tensor& image, const Tensor& direction, const Tensor& ori
 Tensor TurnViews(const Tensor& image, const Tensor& direction, const Tensor& origin, const Tensor& arms,
                  const Tensor& turns) {
   CheckShape("turns of the hands", turns, {arms.size(0), arms.size(1), static_cast<std::int64_t>(kTurnRow)});
-  constexpr auto kKinds = static_cast<std::int64_t>(kTurnKinds), kNumbers = static_cast<std::int64_t>(kTurnNumbers);
   const Tensor each = turns.to(at::kFloat).unflatten(2, {kArms, kKinds, kNumbers});  // [B, T, arms, kinds, …]
   const Tensor was = each.narrow(4, 0, 1), then = each.narrow(4, 2, kArmNumbers),
                before = each.narrow(4, 2 + kArmNumbers, kArmNumbers);
@@ -79,13 +81,9 @@ Tensor TurnViews(const Tensor& image, const Tensor& direction, const Tensor& ori
                            .transpose(2, 3);  // [B, T, arms, kinds, any]
   const Tensor now = arms.to(at::kFloat).unflatten(2, {kArms, 1, kArmNumbers}).expand_as(then);
   const auto place = [](const Tensor& hand) { return hand.narrow(4, 0, 3); };
-  const auto axes = [](const Tensor& hand) {  // [..., 3, 3], rows: x, y, z of the hand
-    const Tensor xy = HandAxes(hand.narrow(4, 3, 4)), x = xy.narrow(4, 0, 3), y = xy.narrow(4, 3, 3);
-    return at::stack({x, y, at::linalg_cross(x, y)}, 4);
-  };
   constexpr double kFewFrames = 4, kManyFrames = 16, kPer_m = 10, kMovesPer_m = 30;
-  const Tensor since = each.narrow(4, 1, 1), moved_m = place(now) - place(then), axes_then = axes(then);
-  const Tensor turned = at::matmul(axes_then, axes(now).transpose(4, 5)).narrow(5, 0, 2).flatten(4);
+  const Tensor since = each.narrow(4, 1, 1), moved_m = place(now) - place(then), axes_then = AxesOf(then);
+  const Tensor turned = at::matmul(axes_then, AxesOf(now).transpose(4, 5)).narrow(5, 0, 2).flatten(4);
   const Tensor numbers = at::cat({at::ones_like(was), since / kManyFrames, (since / -kFewFrames).exp(),
                                   at::matmul(axes_then, moved_m.unsqueeze(5)).squeeze(5) * kPer_m, moved_m * kPer_m,
                                   turned, (place(then) - place(before)) * kMovesPer_m},

@@ -31,6 +31,8 @@ void Check(const WorldTrainingOptions& o, const nn::ModelConfig& config) {
                       " + " + std::to_string(config.chunk));
   if (config.unet.hand_views > 0 && !o.windows.first_image)
     throw TensorError("world training: first_image is false, wanted true: unet.hand_views reads the oldest memory");
+  if (!o.train_hand_turns && !config.unet.hand_turns)
+    throw TensorError("world training: train_hand_turns is false, and the model has no unet.hand_turns");
   if (o.self_memory_chunks < 1)
     throw TensorError("world training: self_memory_chunks is " + std::to_string(o.self_memory_chunks) +
                       ", wanted at least 1");
