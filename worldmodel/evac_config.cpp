@@ -121,7 +121,7 @@ void ReadPoseMap(const Config& page, nn::PoseMapConfig& pose_map) {
 
 nn::ModelConfig ReadOurs(const Config& page) {
   page.AllowOnly({"chunk", "memory", "views", "image_height_px", "image_width_px", "fps", "domain", "schedule", "unet",
-                  "vae", "action_resampler", "image_resampler", "image_encoder", "pose_map"});
+                  "vae", "action_resampler", "image_resampler", "image_encoder", "pose_map", "object_forecast"});
   nn::ModelConfig config;
   Read(page, "chunk", config.chunk);
   Read(page, "memory", config.memory);
@@ -130,6 +130,7 @@ nn::ModelConfig ReadOurs(const Config& page) {
   Read(page, "image_width_px", config.image_width_px);
   Read(page, "fps", config.fps);
   Read(page, "domain", config.domain);
+  Read(page, "object_forecast", config.object_forecast);
   if (page.Has("pose_map")) ReadPoseMap(page.Section("pose_map"), config.pose_map);
   if (page.Has("schedule")) ReadOurSchedule(page.Section("schedule"), config.schedule);
   if (page.Has("unet")) ReadOurUNet(page.Section("unet"), config.unet);

@@ -13,6 +13,7 @@
 #include "core/file.h"
 #include "worldmodel/nn/memory.h"
 #include "worldmodel/nn/threads.h"
+#include "worldmodel/train/train_forecast.h"
 #include "worldmodel/train/train_world.h"
 
 namespace evac {
@@ -34,6 +35,18 @@ ExitCode RunCodec(const TrainArguments& arguments) {
   return End(TrainCodec(place, options, arguments.init), arguments.out, "codec.safetensors");
 }
 
+ExitCode RunForecast(const TrainArguments& arguments) {
+  train::ForecastOptions options;
+  ReadTrainingPage(arguments.training, "forecast", arguments.settings, SettingsOf(options));
+  Override(arguments, options.job.trainer);
+  const CatchInterrupts catch_interrupts;
+  TrainingProgress progress(stderr);
+  const train::JobPlace place = PlaceOf(arguments, progress);
+  nn::KeepFreedMemory();
+  const nn::LibraryThreads threads(LibraryThreadsOf(place, options.job));
+  return End(TrainForecast(place, options), arguments.out, "forecast.safetensors");
+}
+
 /// OUT/strips/step_00001200.png
 void WriteStrips(const fs::path& out, std::int64_t step, const train::Strips& strips) {
   const auto rows = static_cast<int>(strips.picture.size(0)), columns = static_cast<int>(strips.picture.size(1));
@@ -52,6 +65,7 @@ ExitCode RunWorld(const TrainArguments& arguments) {
   ReadTrainingPage(arguments.training, "world", arguments.settings, SettingsOf(options));
   Override(arguments, options.job.trainer);
   const train::WorldStart start{arguments.codec, arguments.init, arguments.init_except, arguments.init_widen,
+                                arguments.forecast,
                                 CodecSha256(arguments.codec)};
   const CatchInterrupts catch_interrupts;
   TrainingProgress progress(stderr);
@@ -82,6 +96,20 @@ void AddCodec(CLI::App& group, ExitCode& exit_code) {
   command->callback([arguments, &exit_code] { exit_code = RunCodec(*arguments); });
 }
 
+void AddForecast(CLI::App& group, ExitCode& exit_code) {
+  const auto arguments = std::make_shared<TrainArguments>();
+  CLI::App* command = group.add_subcommand("forecast", "Train what tells the world model where the thing will be.");
+  AddShared(*command, arguments);
+  AddConfig(*command, arguments)->required();
+  command->footer(
+      "Example:\n"
+      "  evac train forecast out/other_shards --config my_model.yaml --training apps/configs/desk_training.yaml \\\n"
+      "                   --out out/forecast\n"
+      "The page of sizes has object_forecast: true. Give it other recordings than `evac train world`, which learns how far\n"
+      "to trust it. Then: evac train world … --forecast out/forecast/forecast.safetensors. More: docs/train.md");
+  command->callback([arguments, &exit_code] { exit_code = RunForecast(*arguments); });
+}
+
 void AddWorld(CLI::App& group, ExitCode& exit_code) {
   const auto arguments = std::make_shared<TrainArguments>();
   CLI::App* command = group.add_subcommand("world", "Train the world model on encoded shards.");
@@ -89,6 +117,8 @@ void AddWorld(CLI::App& group, ExitCode& exit_code) {
   AddConfig(*command, arguments)->required();
   command->add_option("--codec", arguments->codec, "the codec's weights, which encoded the shards")
       ->required()
+      ->check(CLI::ExistingFile);
+  command->add_option("--forecast", arguments->forecast, "of `evac train forecast`, where the sizes have one; stays as it is")
       ->check(CLI::ExistingFile);
   AddInit(*command, *arguments, "a checkpoint to go on from: fine-tuning; every key must fit");
   command
@@ -114,6 +144,7 @@ void AddTrain(CLI::App& app, ExitCode& exit_code) {
   CLI::App* group = app.add_subcommand(kTrainCommand.name, kTrainCommand.what);
   group->require_subcommand(1);
   AddCodec(*group, exit_code);
+  AddForecast(*group, exit_code);
   AddWorld(*group, exit_code);
   AddTrainJudge(*group, exit_code);
   AddTrainPolicy(*group, exit_code);

@@ -16,7 +16,7 @@ namespace evac {
 /// What every `evac train …` is told.
 struct TrainArguments {
   std::vector<std::string> shards;
-  std::string config, training, out, codec, init;
+  std::string config, training, out, codec, forecast, init;
   std::vector<std::string> settings, init_except;
   std::vector<std::int64_t> keep_steps;
   std::optional<double> minutes;

@@ -42,7 +42,7 @@ void ReadTrainingPage(const std::string& path, const std::string& section, const
                       const train::Settings& settings) {
   if (!path.empty()) {
     const Config page = Config::FromFile(path);
-    page.AllowOnly({"codec", "world", "judge", "policy"});
+    page.AllowOnly({"codec", "forecast", "world", "judge", "policy"});
     if (page.Has(section)) ReadAll(page.Section(section), settings);
   }
   Config given = Config::FromText("{}", "--set");

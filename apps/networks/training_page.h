@@ -8,7 +8,7 @@
 
 namespace evac {
 
-/// Reads one section ("codec", "world", "judge", "policy") of a page of training options into them; what is not there stays as the paper
+/// Reads one section ("codec", "forecast", "world", "judge", "policy") of a page of training options into them; what is not there stays as the paper
 /// has it. Then `assignments` ("batch=16").
 /// @param path  empty: no page
 /// @throws InvalidInput naming file and field: unknown, of a wrong type

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <stdexcept>
 
 namespace evac::nn {
@@ -51,6 +52,24 @@ TEST(HandTurns, SayWhereAHandLastClosedAndOpened) {
   EXPECT_FLOAT_EQ(opened.x_m, 0.05F);
   EXPECT_FLOAT_EQ(Turn(turns, 4, kRight, kClosing).x_m, 0.07F) << "the last closing, not the first";
   EXPECT_EQ(Turn(turns, 4, kLeft, kClosing).was, 0) << "the other hand";
+}
+
+TEST(HandTurns, SayHowTheHandCameAndWentOnAsFarAsItIsKnown) {
+  const std::vector<float> rows = Rows({0, 0, 120, 120, 110, 120, 120});
+  const std::vector<std::size_t> frames = {2, 4, 6};
+  const std::vector<float> turns = HandTurns(rows, frames);
+  const auto number = [&](std::size_t t, int moment, std::size_t which) {
+    const auto place = static_cast<std::size_t>(std::ranges::find(kTurnMoments, moment) - kTurnMoments.begin());
+    return turns[t * kTurnRow + kRight * kTurnKinds * kTurnNumbers + 2 + place * kHandNumbers + which];
+  };
+  const auto x_m = [&](std::size_t t, int moment) { return number(t, moment, 0); };
+  EXPECT_FLOAT_EQ(x_m(2, -2), 0);
+  EXPECT_FLOAT_EQ(x_m(2, -4), 0) << "before the first frame it was where it was in that";
+  EXPECT_FLOAT_EQ(x_m(0, 2), 0.02F) << "the frames behind the one that is asked about are not told";
+  EXPECT_FLOAT_EQ(x_m(1, 2), 0.04F);
+  EXPECT_FLOAT_EQ(x_m(1, 4), 0.04F);
+  EXPECT_FLOAT_EQ(x_m(2, 4), 0.06F);
+  EXPECT_FLOAT_EQ(number(2, 2, 7), 110);
 }
 
 TEST(HandTurns, AreNoneOfAHandThatBeginsClosed) {

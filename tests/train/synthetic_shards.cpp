@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <fstream>
 
 #include "worldmodel/train/dice.h"
@@ -68,6 +69,7 @@ void Fill(const SyntheticShards& o, const Tensors& t, Dice& dice) {
       t.actions[row][15] = clip == 1 && o.closes_at > 0 && i >= o.closes_at && !has_opened ? 120 : 0;
       t.contact[row] = i == o.frames / 2 ? 1 : 0;
       Draw(o, t, row, {x, y, ground});
+      if (!o.knows_object) t.object_px[row].fill_(std::nan(""));
     }
   }
 }

@@ -14,6 +14,7 @@ struct SyntheticShards {
   std::int64_t failures = 0;     ///< of the clips of each split; the others are successes
   std::int64_t closes_at = 0;    ///< above 0: the second clip's hand is told to close at this frame, no other is
   std::int64_t opens_at = 0;     ///< above 0: and to open again at this one
+  bool knows_object = true;      ///< whether they say where the square is
   std::int64_t views = 1;
   std::int64_t height_px = 16, width_px = 24;
   std::uint64_t seed = 1;

@@ -190,10 +190,14 @@ Tensor SeenAt(const Tensor& points_m, const Tensor& direction, const Tensor& ori
   return at::cat({found.narrow(3, 0, 2) / depth, depth}, 3);
 }
 
+Tensor RaysThrough(const Tensor& places, const Tensor& direction, std::int64_t at) {
+  const Tensor x_y = places.to(at::kDouble), position = at::cat({x_y, at::ones_like(x_y.narrow(1, 0, 1))}, 1);
+  return at::matmul(RayFromPosition(direction.select(2, at)), position.unsqueeze(2)).squeeze(2);
+}
+
 Tensor PointOnPlane(const Tensor& places, const Tensor& direction, const Tensor& origin, std::int64_t at,
                     double plane_m) {
-  const Tensor position = at::cat({places.to(at::kDouble), at::ones({places.size(0), 1}, at::kDouble)}, 1);
-  const Tensor ray = at::matmul(RayFromPosition(direction.select(2, at)), position.unsqueeze(2)).squeeze(2);
+  const Tensor ray = RaysThrough(places, direction, at);
   const Tensor camera = origin.select(2, at).select(3, 0).select(2, 0).to(at::kDouble);  // [BV, 3]
   const Tensor distance = (plane_m - camera.narrow(1, 2, 1)) / ray.narrow(1, 2, 1);
   return at::where(distance > 0, camera + distance * ray, at::full({1, 1}, std::nan(""), at::kDouble));

@@ -40,6 +40,9 @@ inline constexpr double kOlder = 0.5;
 ///   camera, in rays' lengths: not above 0 for what lies behind it
 Tensor SeenAt(const Tensor& points_m, const Tensor& direction, const Tensor& origin);
 
+/// The rays through places of frame `at`. @param places  [BV, 2]: x and y among them @returns [BV, 3], double, any length
+Tensor RaysThrough(const Tensor& places, const Tensor& direction, std::int64_t at);
+
 /// The point of the plane z = `plane_m` that is seen at a place of frame `at`.
 /// @param places  [BV, 2]: x and y among the places
 /// @returns [BV, 3], double, metres, base frame; not a number where the ray does not meet the plane

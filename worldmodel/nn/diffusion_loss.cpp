@@ -84,6 +84,7 @@ Tensor DenoiserInput(const Tensor& x, const Concat& concat) {
   std::vector<Tensor> parts = {x, concat.image, concat.mask, concat.pose_map, concat.direction, concat.origin};
   if (concat.carried.defined()) parts.insert(parts.end(), {concat.carried, concat.seen});
   if (concat.first.defined()) parts.insert(parts.end(), {concat.first, concat.first_seen});
+  if (concat.object.defined()) parts.push_back(concat.object);
   return at::cat(parts, 1);
 }
 

@@ -18,6 +18,7 @@ struct Concat {
   Tensor carried = {};
   Tensor seen = {};  ///< [BV, 1, T, h, w]: 1 where that frame shows the place; undefined with `carried`
   Tensor first = {}, first_seen = {};  ///< the same of the oldest memory frame; undefined: it is not carried
+  Tensor object = {};  ///< [BV, 1, T, h, w]: where the thing is likely to be; undefined: the network is not shown it
   /// [BV, z, K, h, w]: the chunk in which nothing changes, whatever the mask: the newest memory frame, repeated or
   /// carried.
   Tensor still = {};

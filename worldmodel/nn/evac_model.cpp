@@ -26,7 +26,9 @@ EvacModel::EvacModel(ParameterSource& source, const ModelConfig& config)
       vae_(Scope(source, "first_stage_model"), config.vae),
       action_resampler_(Scope(source, "cond_stage_model"), config.action_resampler),
       image_encoder_(MakeImageEncoder(Scope(source, "embedder.model"), config.image_encoder)),
-      image_resampler_(Scope(source, "image_proj_model"), config.image_resampler) {}
+      image_resampler_(Scope(source, "image_proj_model"), config.image_resampler) {
+  if (config.object_forecast) object_forecast_.emplace(Scope(source, kForecastPrefix), config);
+}
 
 Tensor EvacModel::ImageTokens(const Tensor& images) const {
   return image_resampler_(image_encoder_(PreprocessForEncoder(images, image_encoder_.image_px())));

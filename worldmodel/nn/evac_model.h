@@ -2,6 +2,7 @@
 
 #include "worldmodel/nn/image_encoder.h"
 #include "worldmodel/nn/noise_schedule.h"
+#include "worldmodel/nn/object_forecast.h"
 #include "worldmodel/nn/resampler.h"
 #include "worldmodel/nn/unet.h"
 #include "worldmodel/nn/vae.h"
@@ -21,6 +22,8 @@ class EvacModel {
   const ImageEncoder& image_encoder() const { return image_encoder_; }
   const Resampler& image_resampler() const { return image_resampler_; }
   const Resampler& action_resampler() const { return action_resampler_; }
+  /// Nothing, if the sizes have none.
+  const std::optional<ObjectForecast>& object_forecast() const { return object_forecast_; }
 
   /// @param images  [BV, 3, H, W] in [-1, 1]
   /// @returns       [BV, image tokens, context_dim]
@@ -40,7 +43,10 @@ class EvacModel {
   Resampler action_resampler_;
   ImageEncoder image_encoder_;
   Resampler image_resampler_;
+  std::optional<ObjectForecast> object_forecast_;
 };
+
+inline constexpr const char* kForecastPrefix = "object_forecast";
 
 /// Every key of a checkpoint of these sizes with its shape, in the checkpoint's order; nothing is allocated.
 std::vector<ParameterShape> CheckpointKeys(const ModelConfig& config);

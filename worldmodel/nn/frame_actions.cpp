@@ -1,5 +1,7 @@
 #include "worldmodel/nn/frame_actions.h"
 
+#include <ATen/ops/linalg_cross.h>
+
 #include <numbers>
 
 namespace evac::nn {
@@ -17,6 +19,11 @@ Tensor HandAxes(const Tensor& quaternion) {
   return at::stack({1 - 2 * (y * y + z * z), 2 * (x * y + z * w), 2 * (x * z - y * w),  //
                     2 * (x * y - z * w), 1 - 2 * (x * x + z * z), 2 * (y * z + x * w)},
                    -1);
+}
+
+Tensor HandRotation(const Tensor& hand) {
+  const Tensor xy = HandAxes(hand.narrow(-1, 3, 4)), x = xy.narrow(-1, 0, 3), y = xy.narrow(-1, 3, 3);
+  return at::stack({x, y, at::linalg_cross(x, y)}, -2);
 }
 
 Tensor FrameActions(const Tensor& rows, std::int64_t memory) {

@@ -13,6 +13,10 @@ constexpr std::int64_t kFrameActionNumbers = 52;
 /// @returns           [..., 6]: where the x and the y axis point
 Tensor HandAxes(const Tensor& quaternion);
 
+/// @param hand  [..., 8]: xyz (m), quaternion xyzw, gripper
+/// @returns     [..., 3, 3]: rows are the hand's x, y and z in the base frame
+Tensor HandRotation(const Tensor& hand);
+
 /// Per arm: position, the first two columns of its rotation, closure; position and closure counted from the newest
 /// memory frame; waves of the position of .25 m and .0625 m.
 /// @param rows    [B, T, 16]: left xyz (m), quaternion xyzw, gripper (0 open … 120 closed), then right; base frame

@@ -39,11 +39,13 @@ std::vector<float> HandTurns(std::span<const float> rows, std::span<const std::s
         float* at = &numbers[((t * kHands + hand) * kTurnKinds + kind) * kTurnNumbers];
         at[0] = 1;
         at[1] = static_cast<float>(frames[t] - *turn);
-        const auto hand_at = [&](std::size_t frame) {
-          return rows.subspan(frame * kRow + hand * kHandNumbers, kHandNumbers);
-        };
-        std::ranges::copy(hand_at(*turn), at + 2);
-        std::ranges::copy(hand_at(*turn - 1), at + 2 + kHandNumbers);
+        for (std::size_t moment = 0; moment < kTurnMoments.size(); ++moment) {
+          const auto frame = std::clamp<std::ptrdiff_t>(static_cast<std::ptrdiff_t>(*turn) + kTurnMoments[moment], 0,
+                                                        static_cast<std::ptrdiff_t>(frames[t]));
+          const auto hand_then =
+              rows.subspan(static_cast<std::size_t>(frame) * kRow + hand * kHandNumbers, kHandNumbers);
+          std::ranges::copy(hand_then, at + 2 + moment * kHandNumbers);
+        }
       }
     }
   }

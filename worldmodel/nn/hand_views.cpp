@@ -1,7 +1,6 @@
 #include "worldmodel/nn/hand_views.h"
 
 #include <ATen/ops/grid_sampler_2d.h>
-#include <ATen/ops/linalg_cross.h>
 #include <ATen/ops/where.h>
 
 #include "worldmodel/nn/carried_frame.h"
@@ -34,16 +33,10 @@ Tensor PointsOfAHand() {
   return at::tensor(points_m).reshape({kHandPoints, 3});
 }
 
-/// [..., kArmNumbers] → [..., 3, 3]: rows are the hand's x, y and z in the base frame.
-Tensor AxesOf(const Tensor& hand) {
-  const Tensor xy = HandAxes(hand.narrow(-1, 3, 4)), x = xy.narrow(-1, 0, 3), y = xy.narrow(-1, 3, 3);
-  return at::stack({x, y, at::linalg_cross(x, y)}, -2);
-}
-
 /// [B, T, arms, kHandPoints, 3] metres, base frame.
 Tensor PointsAboutHands(const Tensor& arms) {
   const Tensor rows = arms.to(at::kFloat).unflatten(2, {kArms, kArmNumbers});
-  return rows.narrow(3, 0, 3).unsqueeze(3) + at::matmul(PointsOfAHand().to(arms.device()), AxesOf(rows));
+  return rows.narrow(3, 0, 3).unsqueeze(3) + at::matmul(PointsOfAHand().to(arms.device()), HandRotation(rows));
 }
 
 }  // namespace
@@ -82,8 +75,8 @@ Tensor TurnViews(const Tensor& image, const Tensor& direction, const Tensor& ori
   const Tensor now = arms.to(at::kFloat).unflatten(2, {kArms, 1, kArmNumbers}).expand_as(then);
   const auto place = [](const Tensor& hand) { return hand.narrow(4, 0, 3); };
   constexpr double kFewFrames = 4, kManyFrames = 16, kPer_m = 10, kMovesPer_m = 30;
-  const Tensor since = each.narrow(4, 1, 1), moved_m = place(now) - place(then), axes_then = AxesOf(then);
-  const Tensor turned = at::matmul(axes_then, AxesOf(now).transpose(4, 5)).narrow(5, 0, 2).flatten(4);
+  const Tensor since = each.narrow(4, 1, 1), moved_m = place(now) - place(then), axes_then = HandRotation(then);
+  const Tensor turned = at::matmul(axes_then, HandRotation(now).transpose(4, 5)).narrow(5, 0, 2).flatten(4);
   const Tensor numbers = at::cat({at::ones_like(was), since / kManyFrames, (since / -kFewFrames).exp(),
                                   at::matmul(axes_then, moved_m.unsqueeze(5)).squeeze(5) * kPer_m, moved_m * kPer_m,
                                   turned, (place(then) - place(before)) * kMovesPer_m},

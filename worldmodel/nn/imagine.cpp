@@ -19,6 +19,9 @@ Conditioning Condition(const EvacModel& model, const ChunkRequest& request) {
   concat.direction = request.direction;
   concat.origin = request.origin;
   Remember(model, request.memory, concat);
+  if (model.object_forecast())
+    concat.object = model.object_forecast()->Maps(
+        {request.image, request.direction, request.origin, request.arms, request.turns});
   conditioning.tokens = model.ContextTokens(model.ImageTokens(request.image), model.ActionTokens(request.deltas));
   if (model.config().unet.frame_actions) conditioning.frames = FrameActions(request.arms, conditioning.memory);
   if (model.config().unet.hand_views > 0)
@@ -35,6 +38,7 @@ Conditioning Unconditioned(const EvacModel& model, const ChunkRequest& request, 
   without.concat.mask = at::cat({mask.narrow(2, 0, memory), at::zeros_like(mask.narrow(2, memory, chunk))}, 2);
   Remember(model, request.memory, without.concat);
   const Tensor nothing = at::zeros_like(request.image);
+  if (conditioning.concat.object.defined()) without.concat.object = at::zeros_like(conditioning.concat.object);
   if (conditioning.hands.defined())
     without.hands = HandViews(nothing, request.direction, request.origin, request.arms);
   if (conditioning.turns.defined())

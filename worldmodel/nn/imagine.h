@@ -20,8 +20,9 @@ struct ChunkRequest {
   Tensor direction;  ///< [BV, 3, T, h, w]
   Tensor origin;     ///< [BV, 3, T, h, w]
   Tensor deltas;     ///< [B, any, 14], normalised
-  Tensor arms = {};  ///< [B, T, 16] rows as in frame_actions.h; read if the network has `frame_actions` or `hand_views`
-  Tensor turns = {};  ///< [B, T, kTurnRow]: HandTurns; read if the network has `hand_turns`
+  Tensor arms = {};  ///< [B, T, 16] rows as in frame_actions.h; read if the network has `frame_actions`, `hand_views` or
+                       ///< `object_forecast`
+  Tensor turns = {};  ///< [B, T, kTurnRow]: HandTurns; read if the network has `hand_turns` or `object_forecast`
 };
 
 /// Everything random, drawn by the caller.

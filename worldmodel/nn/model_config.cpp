@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "core/tensor_file.h"
+#include "worldmodel/nn/object_forecast.h"
 
 namespace evac::nn {
 namespace {
@@ -96,11 +97,15 @@ void ModelConfig::Check() const {
   Require(action_resampler.embedding_dim >= 14 && action_resampler.embedding_dim % 2 == 0,
           "action resampler embedding_dim", action_resampler.embedding_dim, "14, or more by an even number");
   const std::int64_t carried = (schedule.carry_plane_m ? 1 : 0) + (schedule.carry_first ? 1 : 0),
-                     inputs = 3 * vae.z_channels + 7 + carried * (vae.z_channels + 1);
+                     inputs = 3 * vae.z_channels + 7 + carried * (vae.z_channels + 1) + (object_forecast ? 1 : 0);
   Require(unet.in_channels == inputs, "unet.in_channels", unet.in_channels,
           "3 latents, a mask and 6 of the rays" +
-              std::string(carried > 0 ? ", of each carried frame a latent and a mask more" : "") + ": " +
+              std::string(carried > 0 ? ", of each carried frame a latent and a mask more" : "") +
+              (object_forecast ? ", one of the object's forecast" : "") + ": " +
               std::to_string(inputs));
+  if (object_forecast)
+    Require(vae.Stride() % ObjectForecast::kCell_px == 0, "the codec's stride", vae.Stride(),
+            "a multiple of " + std::to_string(ObjectForecast::kCell_px) + " with object_forecast");
   if (schedule.carry_plane_m && !schedule.from_last_frame)
     throw TensorError("schedule.carry_plane_m: wanted schedule.from_last_frame: true as well");
   if ((schedule.carry_frames != 1 || schedule.carry_first) && !schedule.carry_plane_m)

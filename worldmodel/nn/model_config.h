@@ -12,7 +12,7 @@ namespace evac::nn {
 struct UNetConfig {
   std::int64_t in_channels = 19;  ///< 4 noisy latent, 4 image latent, 1 mask, 4 pose map latent, 3 ray direction, 3 ray
                                   ///< origin; with schedule.carry_plane_m 4 carried latent, 1 seen;
-                                  ///< with carry_first 4 and 1 more
+                                  ///< with carry_first 4 and 1 more; with object_forecast 1 more
   std::int64_t out_channels = 4;
   std::int64_t model_channels = 320;                            ///< a multiple of 32: the groups of every normalisation
   std::vector<std::int64_t> channel_mult = {1, 2, 4, 4};        ///< one per level, finest first
@@ -132,6 +132,9 @@ struct ModelConfig {
   std::int64_t image_width_px = 512;
   std::int64_t fps = 2;      ///< a constant of the released model
   std::int64_t domain = 11;  ///< AgiBot World's row in the table of robots
+  /// A small network says where the thing will be, and the denoiser is shown that: one channel more, the last
+  /// (object_forecast.h). Not in the paper.
+  bool object_forecast = false;
 
   std::int64_t Frames() const { return memory + chunk; }
   std::int64_t LatentHeight() const { return image_height_px / vae.Stride(); }

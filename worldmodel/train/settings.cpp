@@ -90,6 +90,20 @@ Settings SettingsOf(CodecOptions& options) {
   return settings;
 }
 
+Settings SettingsOf(ForecastOptions& options) {
+  ForecastTrainingOptions& f = options.forecast;
+  Settings settings = {{"batch", &f.batch},
+                       {"frames", &f.frames},
+                       {"late_start", &f.late_start},
+                       {"drop", &f.drop},
+                       {"picture_gain", &f.picture_gain},
+                       {"picture_noise", &f.picture_noise},
+                       {"success_weight", &f.success_weight},
+                       {"finder_weight", &f.finder_weight}};
+  AddJob(settings, options.job);
+  return settings;
+}
+
 Settings SettingsOf(WorldOptions& options) {
   WorldTrainingOptions& w = options.world;
   Settings settings = {{"batch", &w.batch},

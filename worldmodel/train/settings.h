@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "worldmodel/train/codec_training.h"
+#include "worldmodel/train/forecast_training.h"
 #include "worldmodel/train/trainer.h"
 #include "worldmodel/train/world_training.h"
 
@@ -31,6 +32,11 @@ struct CodecOptions {
   CodecTrainingOptions codec;
 };
 
+struct ForecastOptions {
+  JobOptions job;
+  ForecastTrainingOptions forecast;
+};
+
 struct WorldOptions {
   JobOptions job;
   WorldTrainingOptions world;
@@ -46,6 +52,7 @@ struct WorldOptions {
 /// What every training has.
 Settings SettingsOf(TrainerOptions& options);
 Settings SettingsOf(CodecOptions& options);
+Settings SettingsOf(ForecastOptions& options);
 Settings SettingsOf(WorldOptions& options);
 
 /// "batch 16\nlearning_rate 0.001\n…": the same text for the same numbers. Lengths and looks are left out: what

@@ -20,6 +20,10 @@ struct Sources {
 
   std::vector<RoutedWeights::Route> Routes(const WorldStart& start) {
     std::vector<RoutedWeights::Route> routes = {{kCodecPrefix, &codec}};
+    if (!start.forecast.empty()) {
+      forecast = std::make_unique<CheckpointWeights>(start.forecast);
+      routes.push_back({nn::kForecastPrefix, forecast.get()});
+    }
     if (start.init.empty()) {
       routes.push_back({"", &random});
       return routes;
@@ -35,7 +39,7 @@ struct Sources {
 
   nn::RandomWeights random;
   CheckpointWeights codec;
-  std::unique_ptr<nn::ParameterSource> init;
+  std::unique_ptr<nn::ParameterSource> forecast, init;
   RoutedWeights routed;
 };
 

@@ -12,6 +12,7 @@ struct WorldStart {
   /// Of `init`: keys that begin so are drawn anew ("model.diffusion_model.out." for another number of channels).
   std::vector<std::string> init_except = {};
   bool init_widen = false;  ///< `init` is of a model that was shown less (WidenedWeights)
+  std::filesystem::path forecast = {};  ///< of OUT/forecast.safetensors; empty: `init` has one, or none is wanted
   std::string codec_sha256 = {};  ///< what the latents must have been made with; empty: not asked
 };
 

@@ -31,6 +31,8 @@ void Check(const WorldTrainingOptions& o, const nn::ModelConfig& config) {
                       " + " + std::to_string(config.chunk));
   if (config.unet.hand_views > 0 && !o.windows.first_image)
     throw TensorError("world training: first_image is false, wanted true: unet.hand_views reads the oldest memory");
+  if (config.object_forecast && !o.windows.first_image)
+    throw TensorError("world training: first_image is false, wanted true: object_forecast reads the oldest memory");
   if (!o.train_hand_turns && !config.unet.hand_turns)
     throw TensorError("world training: train_hand_turns is false, and the model has no unet.hand_turns");
   if (o.self_memory_chunks < 1)
@@ -113,6 +115,11 @@ nn::UNet::Context WorldTraining::ContextOf(const Tensor& tokens, const WorldBatc
   return context;
 }
 
+Tensor WorldTraining::ObjectMapsOf(const WorldBatch& batch) const {
+  if (!model_.object_forecast()) return {};
+  return model_.object_forecast()->Maps({batch.images, batch.direction, batch.origin, batch.arms, batch.turns});
+}
+
 Tensor WorldTraining::TokensOf(const WorldBatch& batch) const {
   return model_.ContextTokens(model_.ImageTokens(batch.images), model_.ActionTokens(batch.deltas));
 }
@@ -168,6 +175,7 @@ Tensor WorldTraining::LossOf(const WorldBatch& given, const Drops& drops, const 
                           dice.Normal(batch.latents.sizes()),
                           n,
                           std::nullopt};
+  if (model_.object_forecast()) step.concat.object = ObjectMapsOf(given) * PerRow(drops.image, 5);
   if (step.context.frames.defined()) step.context.frames = step.context.frames * PerRow(drops.actions, 3);
   if (step.context.hands.defined()) step.context.hands = step.context.hands * PerRow(drops.actions, 4);
   if (step.context.turns.defined()) step.context.turns = step.context.turns * PerRow(drops.actions, 5);
@@ -197,6 +205,7 @@ Tensor WorldTraining::ImagineOnce(const WorldBatch& batch, Dice& dice) const {
   const Tensor memory = batch.latents.narrow(2, 0, n);
   const Tensor mask = at::ones_like(batch.latents.narrow(1, 0, 1));
   nn::Concat concat{{}, mask, batch.pose_maps, batch.direction, batch.origin};
+  concat.object = ObjectMapsOf(batch);
   nn::Remember(model_, memory, concat);
   const Tensor noise = dice.Normal(batch.latents.sizes());
   const double scale = model_.schedule().Scale(last);

@@ -80,6 +80,8 @@ class WorldTraining {
   std::int64_t DrawStep(Dice& dice) const;
   Tensor Weight(const WorldBatch& batch, const Tensor& still, const Tensor& t) const;
   nn::UNet::Context ContextOf(const Tensor& tokens, const WorldBatch& batch) const;
+  /// Where the thing is likely to be, if the network is shown that; what says so is not trained here.
+  Tensor ObjectMapsOf(const WorldBatch& batch) const;
   Tensor TokensOf(const WorldBatch& batch) const;
   /// Puts what the network imagines of the chunk before each window into the window's memory.
   /// @param share  of the windows; their own memory is put in first, `chunks` - 1 deep

@@ -1,0 +1,129 @@
+#include <ATen/ops/equal.h>
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "tests/nn/support.h"
+#include "tests/support/temp_folder.h"
+#include "tests/train/synthetic_shards.h"
+#include "worldmodel/nn/evac_model.h"
+#include "worldmodel/nn/weights.h"
+#include "worldmodel/train/encode_shards.h"
+#include "worldmodel/train/train_forecast.h"
+#include "worldmodel/train/train_world.h"
+#include "worldmodel/train/weight_files.h"
+
+namespace evac::train {
+namespace {
+
+using testing::HasSubstr;
+using testing::ThrowsMessage;
+
+nn::ModelConfig ForecastConfig(std::int64_t views) {
+  nn::ModelConfig config = nn::TinyConfig();
+  config.vae.channel_mult = {1, 1, 1};
+  config.vae.patch_px = 1;
+  config.vae.scale_factor = 1;
+  config.unet.channel_mult = {1, 1};
+  config.views = views;
+  config.object_forecast = true;
+  config.unet.in_channels += 1;
+  return config;
+}
+
+ForecastOptions Quick(std::int64_t steps) {
+  ForecastOptions options;
+  options.job.trainer.steps = steps;
+  options.job.trainer.learning_rate = 2e-3;
+  options.job.trainer.clip_norm = 1;
+  options.forecast.batch = 8;
+  options.forecast.frames = 3;
+  options.forecast.late_start = 0.9;
+  return options;
+}
+
+double Written(const std::filesystem::path& out, const char* what) {
+  return std::stod(CheckpointWeights(out / "forecast.safetensors").file().metadata().at(what));
+}
+
+TEST(TrainForecast, FindsThingsInPicturesThatItHasNotSeen) {
+  const TempFolder folder;
+  WriteSyntheticShards(folder / "shards", {.clips = 12, .failures = 6, .views = 2});
+  const auto off_px = [&](const char* out, std::int64_t steps) {
+    EXPECT_EQ(TrainForecast({{folder / "shards"}, folder / out, ForecastConfig(2)}, Quick(steps)).why, "done");
+    return Written(folder / out, "finder_px");
+  };
+  const double before = off_px("begun", 1), after = off_px("trained", 120);
+  EXPECT_LT(after, 1.5) << before;
+  EXPECT_GT(before, 2 * after);
+}
+
+TEST(TrainForecast, EndsInTheSameBytesWhenItWasKilled) {
+  const TempFolder folder;
+  WriteSyntheticShards(folder / "shards", {.failures = 3});
+  ForecastOptions options = Quick(6);
+  options.job.trainer.accumulate = 2;
+  options.job.trainer.checkpoint_every_s = 0;
+  const auto weights = [&](const char* out) {
+    nn::MappedTensors tensors(TensorFile::Open(folder / out / "forecast.safetensors"));
+    return tensors.Get("object_forecast.hand.weight").clone();
+  };
+  TrainForecast({{folder / "shards"}, folder / "whole", ForecastConfig(1), 2}, options);
+  int asked = 0;
+  JobPlace killed{{folder / "shards"}, folder / "killed", ForecastConfig(1), 2};
+  killed.interrupted = [&] { return ++asked == 3; };
+  EXPECT_EQ(TrainForecast(killed, options).why, "interrupted");
+  EXPECT_FALSE(std::filesystem::exists(folder / "killed" / "forecast.safetensors"));
+  EXPECT_EQ(TrainForecast(killed, options).why, "done");
+  EXPECT_TRUE(at::equal(weights("whole"), weights("killed")));
+}
+
+TEST(TrainForecast, RefusesShardsThatDoNotSayWhereTheirObjectIs) {
+  const TempFolder folder;
+  WriteSyntheticShards(folder / "shards", {.knows_object = false});
+  EXPECT_THAT([&] { TrainForecast({{folder / "shards"}, folder / "out", ForecastConfig(1)}, Quick(1)); },
+              ThrowsMessage<TensorError>(HasSubstr("say where their objects are")));
+}
+
+TEST(TrainForecast, RefusesSizesThatHaveNone) {
+  const TempFolder folder;
+  WriteSyntheticShards(folder / "shards", {});
+  EXPECT_THAT([&] { TrainForecast({{folder / "shards"}, folder / "out", nn::TinyConfig()}, Quick(1)); },
+              ThrowsMessage<TensorError>(HasSubstr("object_forecast: false, wanted true")));
+}
+
+TEST(TrainWorld, IsShownAForecastThatStaysAsItWasGiven) {
+  const TempFolder folder;
+  const nn::ModelConfig config = ForecastConfig(1);
+  WriteSyntheticShards(folder / "shards", {});
+  CodecOptions codec;
+  codec.job.trainer.steps = 2;
+  codec.codec.batch = 4;
+  TrainCodec({{folder / "shards"}, folder / "codec", config}, codec);
+  WorldStart start{folder / "codec" / "codec.safetensors"};
+  CheckpointWeights codec_weights(start.codec);
+  const nn::Vae vae(nn::Scope(codec_weights, kCodecPrefix), config.vae);
+  for (const auto& shard : ShardPaths(folder / "shards")) EncodeShard(vae, shard, {"codec", "shard"});
+  TrainForecast({{folder / "shards"}, folder / "forecast", config}, Quick(20));
+  start.forecast = folder / "forecast" / "forecast.safetensors";
+  WorldOptions options;
+  options.job.trainer.steps = 3;
+  options.job.holdout_size = 2;
+  options.world.batch = 2;
+  options.world.windows.history = 6;
+  options.world.windows.first_image = true;
+  options.world.self_memory_share = 1;
+  options.world.self_memory_from = 0;
+  EXPECT_EQ(TrainWorld({{folder / "shards"}, folder / "world", config}, options, start, {}).why, "done");
+  nn::MappedTensors given(TensorFile::Open(start.forecast)),
+      kept(TensorFile::Open(folder / "world" / "weights.safetensors"));
+  for (const char* key : {"finder.0.weight", "eye.weight", "hand.bias", "places.weight", "success.bias"}) {
+    const std::string whole = std::string(nn::kForecastPrefix) + "." + key;
+    EXPECT_TRUE(at::equal(given.Get(whole), kept.Get(whole))) << key;
+  }
+  options.world.windows.first_image = false;
+  EXPECT_THAT([&] { TrainWorld({{folder / "shards"}, folder / "other", config}, options, start, {}); },
+              ThrowsMessage<TensorError>(HasSubstr("first_image is false")));
+}
+
+}  // namespace
+}  // namespace evac::train
