@@ -109,6 +109,22 @@ TEST(ObjectForecast, SaysOfEverySceneByItselfHowLikelyThePlacesAre) {
   }
 }
 
+TEST(ObjectForecast, ShowsAllViewsTheLikeliestEndAlone) {
+  const ModelConfig config = ForecastConfig(2);
+  HashWeights weights;
+  const ObjectForecast forecast(Scope(weights, kForecastPrefix), config);
+  const Scenes scenes(config, 3, 4);
+  const ObjectForecast::Answer answer = forecast(scenes.given);
+  const Tensor maps = forecast.Maps(scenes.given).flatten(3);  // [BV, 1, T, h w]
+  for (std::int64_t row = 0; row < maps.size(0); ++row) {
+    for (std::int64_t t = 0; t < maps.size(2); ++t) {
+      const auto end = answer.ends[row / config.views][t].argmax().item<std::int64_t>();
+      const Tensor wanted = answer.places[row][t][end].softmax(0).narrow(0, 0, maps.size(3));
+      EXPECT_TRUE(at::allclose(maps[row][0][t], wanted)) << row << " " << t;
+    }
+  }
+}
+
 TEST(ObjectForecast, HangsOnThePictureTheHandAndWhereItClosed) {
   const ModelConfig config = ForecastConfig(2);
   HashWeights weights;

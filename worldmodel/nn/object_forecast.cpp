@@ -58,7 +58,8 @@ ObjectForecast::ObjectForecast(const Scope& at, const ModelConfig& config)
       eye_(at / "eye", {kEye, SeenOfAHand(config)}),
       hand_(at / "hand", {kWide, KnownOfAHand(config)}),
       both_(at / "both", {kWide, kWide}),
-      places_(at / "places", {config.views * (height_ * width_ + 1), kWide}),
+      ends_(at / "ends", {kEnds, kWide}),
+      places_(at / "places", {config.views * kEnds * (height_ * width_ + 1), kWide}),
       success_(at / "success", {1, kWide}) {}
 
 ObjectForecast::Found ObjectForecast::Find(const Tensor& image) const {
@@ -128,16 +129,19 @@ ObjectForecast::Answer ObjectForecast::operator()(const Scenes& scenes, const Dr
   const Tensor hands = left_out(at::silu(through(hand_, known))).sum(2);
   const Tensor both = left_out(at::silu(through(both_, hands)));
   const Tensor places = through(places_, both)
-                            .reshape({scene_count, frames, views_, height_ * width_ + 1})
+                            .reshape({scene_count, frames, views_, kEnds, height_ * width_ + 1})
                             .transpose(1, 2)
                             .flatten(0, 1);
-  return {found, places, through(success_, both).squeeze(2)};
+  return {found, through(ends_, both), places, through(success_, both).squeeze(2)};
 }
 
 Tensor ObjectForecast::Maps(const Scenes& scenes) const {
   const at::NoGradGuard no_gradients;
-  const Tensor shares = (*this)(scenes).places.softmax(2).narrow(2, 0, height_ * width_);
-  return shares.unflatten(2, {height_, width_}).unsqueeze(1);
+  const Answer answer = (*this)(scenes);
+  const Tensor end = answer.ends.argmax(2).repeat_interleave(views_, 0);  // [BV, T]
+  const Tensor places = answer.places.softmax(3).narrow(3, 0, height_ * width_);
+  const Tensor one = end.reshape({end.size(0), end.size(1), 1, 1}).expand({-1, -1, 1, places.size(3)});
+  return places.gather(2, one).squeeze(2).unflatten(2, {height_, width_}).unsqueeze(1);
 }
 
 Tensor PointSeenAt(const Tensor& places, const Tensor& sure, const Tensor& direction, const Tensor& origin,

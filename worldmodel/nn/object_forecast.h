@@ -33,16 +33,20 @@ class ObjectForecast {
   };
   struct Answer {
     Found found;
-    Tensor places;   ///< [BV, T, h w + 1]: logits of the latent's places, row by row; the last: not to be seen
+    Tensor ends;     ///< [B, T, kEnds]: logits of each way that it may have ended by then: held, say, or left where it lay
+    Tensor places;   ///< [BV, T, kEnds, h w + 1]: logits of the latent's places in each, row by row; the last: not to be
+                     ///< seen
     Tensor success;  ///< [B, T]: logit of the task's being done then; what training learns from beside, and measures
   };
-  static constexpr std::int64_t kCell_px = 4;
+  static constexpr std::int64_t kCell_px = 4, kEnds = 3;
 
   /// What leaves out numbers at random while it is trained.
   using Drop = std::function<Tensor(const Tensor&)>;
   Answer operator()(const Scenes& scenes, const Drop& drop = {}) const;
 
-  /// How likely it is at each place. @returns [BV, 1, T, h, w] in [0, 1], their sum at most 1
+  /// How likely it is at each place, in the likeliest end alone: the views tell of the same one. A denoiser that is shown
+  /// two ends at once, each half as likely, draws neither, or one in each view.
+  /// @returns [BV, 1, T, h, w] in [0, 1], their sum at most 1
   Tensor Maps(const Scenes& scenes) const;
 
  private:
@@ -58,7 +62,7 @@ class ObjectForecast {
   std::int64_t stride_;
   double plane_m_;
   std::vector<Layer> finder_;
-  Layer eye_, hand_, both_, places_, success_;
+  Layer eye_, hand_, both_, ends_, places_, success_;
 };
 
 /// The point that is nearest to what several cameras say, each as much as it is sure, and a little to the plane.

@@ -99,7 +99,9 @@ ForecastBatch ForecastTraining::BatchOf(const std::vector<View>& views) const {
 
 Tensor ForecastTraining::LossOf(const nn::ObjectForecast::Answer& answer, const ForecastBatch& batch) const {
   const std::int64_t w = config_.LatentWidth(), h = config_.LatentHeight();
-  const Tensor places = -(Shares(batch.place, w, h) * answer.places.log_softmax(2)).sum(2).mean();
+  const Tensor of_views = (Shares(batch.place, w, h).unsqueeze(2) * answer.places.log_softmax(3)).sum(3);  // [BV, T, ends]
+  const Tensor of_ends = of_views.unflatten(0, {-1, shards_.views()}).sum(1) + answer.ends.log_softmax(2);
+  const Tensor places = of_ends.logsumexp(2).mean() / -static_cast<double>(shards_.views());
   const Tensor known = (batch.success >= 0).to(at::kFloat);
   const Tensor told = at::binary_cross_entropy_with_logits(answer.success, batch.success.clamp_min(0), {}, {},
                                                            at::Reduction::None);
