@@ -23,28 +23,29 @@ namespace fs = std::filesystem;
 
 using Arguments = std::shared_ptr<TrainArguments>;
 
-ExitCode RunCodec(const TrainArguments& arguments) {
-  train::CodecOptions options;
-  ReadTrainingPage(arguments.training, "codec", arguments.settings, SettingsOf(options));
+/// @param run  (const train::JobPlace&, const Options&) → how it ended
+template <class Options, class Run>
+ExitCode RunTraining(const TrainArguments& arguments, const char* section, const char* file, const Run& run) {
+  Options options;
+  ReadTrainingPage(arguments.training, section, arguments.settings, SettingsOf(options));
   Override(arguments, options.job.trainer);
   const CatchInterrupts catch_interrupts;
   TrainingProgress progress(stderr);
   const train::JobPlace place = PlaceOf(arguments, progress);
   nn::KeepFreedMemory();
   const nn::LibraryThreads threads(LibraryThreadsOf(place, options.job));
-  return End(TrainCodec(place, options, arguments.init), arguments.out, "codec.safetensors");
+  return End(run(place, options), arguments.out, file);
+}
+
+ExitCode RunCodec(const TrainArguments& arguments) {
+  const auto run = [&](const train::JobPlace& place, const train::CodecOptions& options) {
+    return TrainCodec(place, options, arguments.init);
+  };
+  return RunTraining<train::CodecOptions>(arguments, "codec", "codec.safetensors", run);
 }
 
 ExitCode RunForecast(const TrainArguments& arguments) {
-  train::ForecastOptions options;
-  ReadTrainingPage(arguments.training, "forecast", arguments.settings, SettingsOf(options));
-  Override(arguments, options.job.trainer);
-  const CatchInterrupts catch_interrupts;
-  TrainingProgress progress(stderr);
-  const train::JobPlace place = PlaceOf(arguments, progress);
-  nn::KeepFreedMemory();
-  const nn::LibraryThreads threads(LibraryThreadsOf(place, options.job));
-  return End(TrainForecast(place, options), arguments.out, "forecast.safetensors");
+  return RunTraining<train::ForecastOptions>(arguments, "forecast", "forecast.safetensors", train::TrainForecast);
 }
 
 /// OUT/strips/step_00001200.png
@@ -61,19 +62,13 @@ void WriteStrips(const fs::path& out, std::int64_t step, const train::Strips& st
 }
 
 ExitCode RunWorld(const TrainArguments& arguments) {
-  train::WorldOptions options;
-  ReadTrainingPage(arguments.training, "world", arguments.settings, SettingsOf(options));
-  Override(arguments, options.job.trainer);
-  const train::WorldStart start{arguments.codec, arguments.init, arguments.init_except, arguments.init_widen,
-                                arguments.forecast,
-                                CodecSha256(arguments.codec)};
-  const CatchInterrupts catch_interrupts;
-  TrainingProgress progress(stderr);
-  const train::JobPlace place = PlaceOf(arguments, progress);
-  nn::KeepFreedMemory();
-  const nn::LibraryThreads threads(LibraryThreadsOf(place, options.job));
+  const train::WorldStart start{arguments.codec,      arguments.init,     arguments.init_except,
+                                arguments.init_widen, arguments.forecast, CodecSha256(arguments.codec)};
   const auto look = [&](std::int64_t step, const train::Strips& strips) { WriteStrips(arguments.out, step, strips); };
-  return End(TrainWorld(place, options, start, look), arguments.out, "weights.safetensors");
+  const auto run = [&](const train::JobPlace& place, const train::WorldOptions& options) {
+    return TrainWorld(place, options, start, look);
+  };
+  return RunTraining<train::WorldOptions>(arguments, "world", "weights.safetensors", run);
 }
 
 void AddInit(CLI::App& command, TrainArguments& arguments, const char* what) {
