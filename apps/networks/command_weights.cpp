@@ -14,9 +14,11 @@
 #include "core/hash.h"
 #include "core/version.h"
 #include "worldmodel/evac_config.h"
+#include "worldmodel/nn/evac_model.h"
 #include "worldmodel/nn/mean_weights.h"
 #include "worldmodel/nn/weight_keys.h"
 #include "worldmodel/nn/weights.h"
+#include "worldmodel/train/weight_files.h"
 
 namespace evac {
 namespace {
@@ -26,7 +28,7 @@ using Clock = std::chrono::steady_clock;
 using Json = nlohmann::ordered_json;
 
 struct WeightsArguments {
-  std::string in, out, config;
+  std::string in, out, config, forecast;
   std::vector<std::string> several;
   std::string dtype = "f32";
   std::uint64_t seed = 0;
@@ -230,7 +232,17 @@ ExitCode RunConvert(const WeightsArguments& arguments) {
   for (const auto& [key, value] : source.file().metadata()) {
     if (key != "layout") options.metadata.emplace(key, value);
   }
-  Save(arguments, source, std::move(options));
+  if (arguments.forecast.empty()) {
+    Save(arguments, source, std::move(options));
+    return ExitCode::kOk;
+  }
+  if (!ConfigOf(arguments).object_forecast)
+    throw InvalidInput("--forecast {}: the page of sizes has object_forecast: false, wanted true", arguments.forecast);
+  train::CheckpointWeights forecast(arguments.forecast);
+  train::RoutedWeights routed({{nn::kForecastPrefix, &forecast}, {"", &source}});
+  std::erase_if(options.without, [](const std::string& key) { return key.starts_with(nn::kForecastPrefix); });
+  options.metadata["forecast"] = Sha256HexOfFile(arguments.forecast);
+  Save(arguments, routed, std::move(options));
   return ExitCode::kOk;
 }
 
@@ -296,6 +308,8 @@ void AddConvert(CLI::App& group, const Arguments& arguments, ExitCode& exit_code
   command->add_option("IN", arguments->in, ".safetensors, or .pt/.ckpt of torch.save")->required();
   AddOut(*command, arguments);
   command->add_flag("--lean", arguments->lean, "leave out what nothing reads");
+  command->add_option("--forecast", arguments->forecast, "of `evac train forecast`: takes the place of the one in IN")
+      ->check(CLI::ExistingFile);
   command->footer(
       "Examples:\n"
       "  evac weights convert evac.ckpt evac.safetensors\n"

@@ -1,8 +1,11 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <filesystem>
 
+#include "core/file.h"
+#include "core/tensor_file.h"
 #include "tests/support/command.h"
 #include "tests/support/temp_folder.h"
 
@@ -45,6 +48,33 @@ TEST(NetworkProgram, IsTheSameProgramToItsUser) {
     EXPECT_EQ(one.err, other.err) << testing::PrintToString(words);
     EXPECT_FALSE(one.out.empty() && one.err.empty());
   }
+}
+
+TEST(NetworkProgram, ANewForecastTakesThePlaceOfTheOldOneAndAllElseStays) {
+  const TempFolder folder;
+  std::string page = ReadFile(EVAC_SOURCE_DIR "/apps/configs/desk_model.yaml");
+  if (page.find("object_forecast: true") == std::string::npos) {
+    const std::size_t channels = page.find("in_channels: 49");
+    ASSERT_NE(channels, std::string::npos);
+    page = page.replace(channels, 15, "in_channels: 50") + "object_forecast: true\n";
+  }
+  WriteFileAtomically(folder / "page.yaml", page);
+  const auto run = [&](std::vector<std::string> words) {
+    words.insert(words.begin(), {Binary("evac"), "weights"});
+    words.insert(words.end(), {"--config", folder / "page.yaml"});
+    return RunCommand(words).exit_code;
+  };
+  ASSERT_EQ(run({"init", folder / "world.safetensors", "--seed", "1"}), 0);
+  ASSERT_EQ(run({"init", folder / "other.safetensors", "--seed", "2"}), 0);
+  ASSERT_EQ(run({"convert", folder / "world.safetensors", folder / "both.safetensors", "--forecast", folder / "other.safetensors"}), 0);
+  const TensorFile world = TensorFile::Open(folder / "world.safetensors"), other = TensorFile::Open(folder / "other.safetensors"),
+                   both = TensorFile::Open(folder / "both.safetensors");
+  const auto same = [&](const TensorFile& as, const std::string& key) { return std::ranges::equal(both.Get(key).bytes, as.Get(key).bytes); };
+  for (const char* key : {"object_forecast.hand.weight", "object_forecast.finder.0.weight"}) {
+    EXPECT_TRUE(same(other, key)) << key;
+    EXPECT_FALSE(same(world, key)) << key;
+  }
+  EXPECT_TRUE(same(world, "model.diffusion_model.input_blocks.0.0.weight"));
 }
 
 /// Weights of another size once made a page of keys that do not fit, and no word of the page that was wanted.
