@@ -54,10 +54,8 @@ EpisodeTruth TruthOf(const CollectJob& job, const Task& task, const CollectedRun
   EpisodeTruth truth{task.cameras.size(), {}, {}};
   constexpr float kUnknown = std::numeric_limits<float>::quiet_NaN();
   for (const PrivilegedFrame& frame : run.track) {
-    const Eigen::Vector3d middle_m = PoseOf(job.task->object, frame) * job.task->middle_m;
-    const Arms arms = TrueArms(task, frame);
     for (const Camera& camera : task.cameras) {
-      const auto at_px = Project(camera, BaseFromCamera(camera, arms).inverse() * middle_m);
+      const auto at_px = ObjectIn(job, camera, frame);
       truth.object_px.push_back(at_px ? static_cast<float>(at_px->x() * scale) : kUnknown);
       truth.object_px.push_back(at_px ? static_cast<float>(at_px->y() * scale) : kUnknown);
     }
@@ -65,9 +63,33 @@ EpisodeTruth TruthOf(const CollectJob& job, const Task& task, const CollectedRun
   return truth;
 }
 
+}  // namespace
+
 const Task& TaskOf(const CollectJob& job) { return job.behaviour->without_object ? job.task->without : job.task->task; }
 
-}  // namespace
+std::optional<Eigen::Vector2d> ObjectIn(const CollectJob& job, const Camera& camera, const PrivilegedFrame& frame) {
+  const Eigen::Vector3d middle_m = PoseOf(job.task->object, frame) * job.task->middle_m;
+  return Project(camera, BaseFromCamera(camera, TrueArms(TaskOf(job), frame)).inverse() * middle_m);
+}
+
+EpisodeRepeater::EpisodeRepeater(const Recipe& recipe)
+    : world_({.name = "real", .profile = recipe.profile, .threads = 1, .film = false}) {}
+
+std::optional<UnseenRun> EpisodeRepeater::Do(const CollectJob& job, const std::vector<Arms>& told) {
+  const Task& task = TaskOf(job);
+  const ActionChunk all{{told.begin() + 1, told.end()}, false, 0};
+  if (WhatIsWrong(all, task, static_cast<int>(all.targets.size()))) return std::nullopt;
+  UnseenRun run;
+  run.track.push_back(
+      std::move(world_.Reset(0, task, {job.row.initial_state, job.row.state_seed}, job.row.world_seed).privileged));
+  const SceneChunk driven{0, &all};
+  Advanced advanced = std::move(world_.Advance({&driven, 1}).front());
+  auto* steps = std::get_if<std::vector<WorldStep>>(&advanced);
+  if (steps == nullptr) return std::nullopt;
+  for (WorldStep& step : *steps) run.track.push_back(std::move(step.privileged));
+  run.success = Look({task, job.task->object, run.track, told}).fate == Fate::kSuccess;
+  return run;
+}
 
 EpisodeCollector::EpisodeCollector(const Recipe& recipe, std::filesystem::path out)
     : recipe_(recipe), out_(std::move(out)), world_({.name = "real", .profile = recipe.profile, .threads = 1}) {}

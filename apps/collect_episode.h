@@ -18,6 +18,33 @@ struct CollectedRun {
   std::string failure;  ///< the message of one that diverged, else empty
 };
 
+/// What came of it when the arms were told that, with nobody looking.
+struct UnseenRun {
+  PrivilegedTrack track;  ///< [T]
+  bool success = false;   ///< by the oracle
+};
+
+/// Does in the scene of a collected episode what the arms are told, without pictures, for which it takes a fraction of the
+/// time.
+class EpisodeRepeater {
+ public:
+  /// @param recipe  outlives this. @throws Error if the profile is wrong or there is no OpenGL.
+  explicit EpisodeRepeater(const Recipe& recipe);
+
+  /// @param told  [T], T >= 2; row 0, where the arms were, is not executed
+  /// @returns     nothing if no world should do that (WhatIsWrong) or the physics failed
+  std::optional<UnseenRun> Do(const CollectJob& job, const std::vector<Arms>& told);
+
+ private:
+  sim::MujocoWorld world_;
+};
+
+/// The task as the job's episode found it, its object taken away or not.
+const Task& TaskOf(const CollectJob& job);
+
+/// Where the middle of the task's object is in a camera's picture, pixels; nothing if it is behind the camera.
+std::optional<Eigen::Vector2d> ObjectIn(const CollectJob& job, const Camera& camera, const PrivilegedFrame& frame);
+
 /// Runs episodes of a recipe one after the other, in a world of its own.
 class EpisodeCollector {
  public:

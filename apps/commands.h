@@ -34,5 +34,6 @@ void AddJudgeTrain(CLI::App& judge, ExitCode& exit_code);
 void AddEncode(CLI::App& app, ExitCode& exit_code);
 void AddCollect(CLI::App& app, ExitCode& exit_code);
 void AddPack(CLI::App& app, ExitCode& exit_code);
+void AddVary(CLI::App& app, ExitCode& exit_code);
 
 }  // namespace evac

@@ -38,6 +38,7 @@ int main(int argc, char** argv) {
     evac::AddEncode(app, exit_code);
     evac::AddCollect(app, exit_code);
     evac::AddPack(app, exit_code);
+    evac::AddVary(app, exit_code);
     evac::AddRate(app, exit_code);
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {

@@ -60,6 +60,8 @@ inline constexpr NetworkCommand kTrainCommand{"train",
                                               "Train the codec, the world model, the classifier judge, a policy."};
 inline constexpr NetworkCommand kEncodeCommand{"encode",
                                                "Write the latents of shards beside them, as training reads them"};
+inline constexpr NetworkCommand kVaryCommand{"vary",
+                                             "Do what was recorded again, a little otherwise, and keep what came of it."};
 inline constexpr NetworkCommand kPackCommand{"pack",
                                              "Turns recordings into the shards that networks are trained from."};
 inline constexpr NetworkCommand kJudgeTrainCommand{

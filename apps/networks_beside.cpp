@@ -45,6 +45,7 @@ void AddImagine(CLI::App& app, ExitCode&) { AddBeside(app, kImagineCommand); }
 void AddTrain(CLI::App& app, ExitCode&) { AddBeside(app, kTrainCommand); }
 void AddEncode(CLI::App& app, ExitCode&) { AddBeside(app, kEncodeCommand); }
 void AddPack(CLI::App& app, ExitCode&) { AddBeside(app, kPackCommand); }
+void AddVary(CLI::App& app, ExitCode&) { AddBeside(app, kVaryCommand); }
 void AddJudgeTrain(CLI::App& judge, ExitCode&) { AddBeside(judge, kJudgeTrainCommand); }
 
 }  // namespace evac

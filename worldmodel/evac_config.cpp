@@ -57,13 +57,12 @@ void ReadResampler(const Config& page, nn::ResamplerConfig& resampler) {
 void ReadOurUNet(const Config& page, nn::UNetConfig& unet) {
   page.AllowOnly({"in_channels", "out_channels", "model_channels", "channel_mult", "num_res_blocks",
                   "attention_resolutions", "num_head_channels", "transformer_depth", "context_dim",
-                  "init_attention_heads", "domains", "frame_actions", "hand_views", "hand_turns"});
+                  "init_attention_heads", "domains", "frame_actions", "hand_views"});
   ReadUNet(page, unet);
   Read(page, "init_attention_heads", unet.init_attention_heads);
   Read(page, "domains", unet.domains);
   Read(page, "frame_actions", unet.frame_actions);
   Read(page, "hand_views", unet.hand_views);
-  Read(page, "hand_turns", unet.hand_turns);
 }
 
 void ReadOurVae(const Config& page, nn::VaeConfig& vae) {

@@ -33,17 +33,6 @@ struct EncodeArguments {
   bool bf16 = false;
 };
 
-/// Whether a packing has shards of a split.
-bool HasSplit(const std::filesystem::path& folder, train::Split split) {
-  const std::string wanted = split == train::Split::kTrain ? "train" : "holdout";
-  const auto shards = train::ShardPaths(folder);
-  return std::ranges::any_of(shards, [&](const auto& path) {
-    const TensorMetadata metadata = TensorFile::Open(path).metadata();
-    const auto found = metadata.find("split");
-    return found != metadata.end() && found->second == wanted;
-  });
-}
-
 int ThreadsOf(const EncodeArguments& arguments) {
   const auto cores = static_cast<int>(std::thread::hardware_concurrency());
   return arguments.threads > 0 ? arguments.threads : std::max(1, cores);
@@ -112,7 +101,7 @@ ExitCode Imagine(const EncodeArguments& arguments) {
   std::size_t shards = 0;
   std::atomic<std::size_t> imagined = 0;
   for (const train::Split split : {train::Split::kTrain, train::Split::kHoldout}) {
-    if (!HasSplit(from, split)) continue;
+    if (!train::HasSplit(from, split)) continue;
     train::ShardSet set(from, split);
     set.OpenLatents(config.vae.z_channels, config.vae.Stride());
     if (set.codec() != codec)

@@ -98,10 +98,10 @@ void AddForecast(CLI::App& group, ExitCode& exit_code) {
   AddConfig(*command, arguments)->required();
   command->footer(
       "Example:\n"
-      "  evac train forecast out/other_shards --config my_model.yaml --training apps/configs/desk_training.yaml \\\n"
+      "  evac train forecast out/shards --config my_model.yaml --training apps/configs/desk_training.yaml \\\n"
       "                   --out out/forecast\n"
-      "The page of sizes has object_forecast: true. Give it other recordings than `evac train world`, which learns how far\n"
-      "to trust it. Then: evac train world … --forecast out/forecast/forecast.safetensors. More: docs/train.md");
+      "The page of sizes has object_forecast: true. The world model is shown the end that came while it learns,\n"
+      "and the likeliest later: evac train world … --forecast out/forecast/forecast.safetensors. More: docs/train.md");
   command->callback([arguments, &exit_code] { exit_code = RunForecast(*arguments); });
 }
 

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <set>
 
+#include "apps/networks/shard_rows.h"
 #include "core/error.h"
 #include "core/geometry.h"
 #include "policies/learned_input.h"
@@ -13,7 +14,6 @@ namespace {
 
 enum Stream : std::uint32_t { kPick = 21, kChange = 22, kArms = 23 };
 
-constexpr double kClosedGripper = 120;  // AgiBot's raw reading
 constexpr double kGrasps = 0.5;
 constexpr double kNear_m = 0.05;  // an error of position that weighs as much as a hand that does not close
 
@@ -24,14 +24,6 @@ at::Tensor ActionsOf(const std::filesystem::path& shard) {
   return actions.to(at::kFloat).clone();
 }
 
-ArmState ArmOf(const float* numbers) {
-  ArmState arm;
-  arm.base_from_gripper =
-      FromXyzQuat({numbers[0], numbers[1], numbers[2]}, {numbers[3], numbers[4], numbers[5], numbers[6]});
-  arm.closure = numbers[7] / kClosedGripper;
-  return arm;
-}
-
 Eigen::Isometry3d PoseFrom(const at::Tensor& c2w) {
   Eigen::Isometry3d pose = Eigen::Isometry3d::Identity();
   const auto* numbers = c2w.data_ptr<float>();
@@ -39,18 +31,6 @@ Eigen::Isometry3d PoseFrom(const at::Tensor& c2w) {
     for (int column = 0; column < 4; ++column) pose(row, column) = numbers[4 * row + column];
   }
   return pose;
-}
-
-/// One view's camera at one row, without its mount.
-Camera CameraAt(const train::Shard& shard, std::int64_t row, std::int64_t view) {
-  const auto* k = shard.k[row][view].data_ptr<float>();
-  return {.name = "",
-          .width_px = static_cast<int>(shard.frames.size(3)),
-          .height_px = static_cast<int>(shard.frames.size(2)),
-          .fx_px = k[0],
-          .fy_px = k[4],
-          .cx_px = k[2],
-          .cy_px = k[5]};
 }
 
 Mount MountOf(const std::string& camera) {
@@ -121,7 +101,7 @@ PolicyTraining::PolicyTraining(const PackedSet& set, const PolicyOptions& option
 
 Arms PolicyTraining::ArmsAt(const PackedClip& clip, std::int64_t row) const {
   const float* numbers = actions_[clip.shard].data_ptr<float>() + 16 * (clip.first + std::min(row, clip.frames - 1));
-  return arms_.size() == 2 ? Arms{ArmOf(numbers), ArmOf(numbers + 8)} : Arms{ArmOf(numbers + 8)};
+  return ArmsOfRow(numbers, arms_.size());
 }
 
 Moment PolicyTraining::Draw(train::Dice& dice) const {

@@ -125,11 +125,10 @@ TEST(TurnViews, SayHowTheHandMovedSince) {
 }
 
 /// What a UNet that is told of arms, and of `hand_views` views about them, prepares of them.
-Tensor PreparedFrames(std::int64_t hand_views, RandomWeights::LastLayers last_layers, bool hand_turns = false) {
+Tensor PreparedFrames(std::int64_t hand_views, RandomWeights::LastLayers last_layers) {
   ModelConfig config = TinyConfig();
   config.unet.frame_actions = true;
   config.unet.hand_views = hand_views;
-  config.unet.hand_turns = hand_turns;
   RandomWeights random(5, last_layers);
   const UNet unet(Scope(random, "model.diffusion_model"), config.unet);
   UNet::Context context;
@@ -138,7 +137,6 @@ Tensor PreparedFrames(std::int64_t hand_views, RandomWeights::LastLayers last_la
   context.domain = at::zeros({1}, at::kLong);
   context.frames = at::ones({1, kFrames, 52});
   context.hands = at::ones({1, kFrames, 2, kHandPoints * kHandPointNumbers});
-  context.turns = at::ones({1, kFrames, 2, 2, kHandPoints * kHandPointNumbers + kTurnFeatures});
   return unet.Prepare(context).frames;
 }
 
@@ -146,19 +144,6 @@ TEST(HandViews, ChangeNothingBeforeTheyAreTrainedAndSomethingAfter) {
   using enum RandomWeights::LastLayers;
   EXPECT_TRUE(at::equal(PreparedFrames(0, kZero), PreparedFrames(1, kZero)));
   EXPECT_FALSE(at::equal(PreparedFrames(0, kDrawn), PreparedFrames(1, kDrawn)));
-  EXPECT_TRUE(at::equal(PreparedFrames(0, kZero), PreparedFrames(1, kZero, true)));
-  EXPECT_FALSE(at::equal(PreparedFrames(1, kDrawn), PreparedFrames(1, kDrawn, true)));
-}
-
-TEST(TurnViews, WithoutHandViewsOrFrameActionsAreRefused) {
-  ModelConfig config = TinyConfig();
-  config.unet.hand_turns = true;
-  config.unet.frame_actions = true;
-  EXPECT_THROW(config.Check(), TensorError);
-  config.unet.hand_views = config.views;
-  EXPECT_NO_THROW(config.Check());
-  config.unet.frame_actions = false;
-  EXPECT_THROW(config.Check(), TensorError);
 }
 
 TEST(HandViews, OfOtherThanAllViewsAreRefused) {

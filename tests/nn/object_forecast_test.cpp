@@ -118,11 +118,65 @@ TEST(ObjectForecast, ShowsAllViewsTheLikeliestEndAlone) {
   const Tensor maps = forecast.Maps(scenes.given).flatten(3);  // [BV, 1, T, h w]
   for (std::int64_t row = 0; row < maps.size(0); ++row) {
     for (std::int64_t t = 0; t < maps.size(2); ++t) {
-      const auto end = answer.ends[row / config.views][t].argmax().item<std::int64_t>();
+      const auto end = LikeliestEnd(answer, config.views)[row / config.views][t].item<std::int64_t>();
       const Tensor wanted = answer.places[row][t][end].softmax(0).narrow(0, 0, maps.size(3));
       EXPECT_TRUE(at::allclose(maps[row][0][t], wanted)) << row << " " << t;
     }
   }
+}
+
+TEST(ObjectForecast, TakesTheEndWhosePlacesAreTheLikeliest) {
+  constexpr std::int64_t kEnds = ObjectForecast::kEnds, kCells = 5;
+  ObjectForecast::Answer answer;
+  answer.ends = at::tensor({0.4F, 0.3F, 0.3F}).log().reshape({1, 1, kEnds});
+  answer.places = at::zeros({2, 1, kEnds, kCells});
+  const auto lies = [&](std::int64_t view, std::int64_t end, std::int64_t cell) { answer.places[view][0][end][cell].fill_(12); };
+  for (const std::int64_t view : {0, 1}) {
+    lies(view, 0, 0);
+    lies(view, 1, 1);
+    lies(view, 2, 1);
+  }
+  EXPECT_EQ(LikeliestEnd(answer, 2).item<std::int64_t>(), 1) << "two of .3 lay it in the same place";
+  lies(1, 2, 4);
+  answer.places[1][0][2][1].fill_(0);
+  EXPECT_EQ(LikeliestEnd(answer, 2).item<std::int64_t>(), 0) << "in one view alone";
+}
+
+TEST(ObjectForecast, LooksAtNothingThatCameLongAfterAHandLetGo) {
+  const ModelConfig config = ForecastConfig(1);
+  HashWeights weights;
+  const ObjectForecast forecast(Scope(weights, kForecastPrefix), config);
+  Scenes scenes(config, 1, 1);
+  const auto maps = [&](std::int64_t opens_at, std::int64_t strays_from, std::int64_t frame, float later_m) {
+    std::vector<float> rows;
+    for (std::int64_t t = 0; t <= frame; ++t) {
+      const float x_m = t < strays_from ? 0.002F * static_cast<float>(t) : later_m;
+      const float gripper = t >= 5 && t < opens_at ? 120 : 0;
+      for (const float number : {0.0F, 0.0F, 0.0F, 0.0F, 0.0F, 0.0F, 1.0F, 0.0F, x_m, 0.1F, 0.2F, 0.0F, 0.0F, 0.0F, 1.0F, gripper})
+        rows.push_back(number);
+    }
+    const std::vector<std::size_t> asked = {static_cast<std::size_t>(frame)};
+    ObjectForecast::Scenes given = scenes.given;
+    given.arms = at::tensor(std::vector<float>(rows.end() - 16, rows.end())).reshape({1, 1, 16});
+    given.turns = at::tensor(HandTurns(rows, asked)).reshape({1, 1, static_cast<std::int64_t>(kTurnRow)});
+    return forecast.Maps(given);
+  };
+  const Tensor settled = maps(20, 45, 44, 0);
+  EXPECT_TRUE(at::allclose(maps(20, 45, 45, 0.3F), settled));
+  EXPECT_TRUE(at::allclose(maps(20, 45, 140, -0.2F), settled));
+  EXPECT_FALSE(at::allclose(maps(20, 45, 40, 0), settled, 1e-3, 1e-5)) << "until then it does";
+  EXPECT_FALSE(at::allclose(maps(200, 45, 60, 0.3F), maps(200, 45, 60, -0.2F), 1e-3, 1e-5)) << "a hand that holds it carries it";
+}
+
+TEST(ObjectForecast, IsDoneAsLikelyAsItsEndsAreTogether) {
+  const ModelConfig config = ForecastConfig(1);
+  HashWeights weights;
+  const ObjectForecast forecast(Scope(weights, kForecastPrefix), config);
+  ObjectForecast::Answer answer = forecast(Scenes(config, 1, 2).given);
+  answer.success.fill_(-40);
+  EXPECT_NEAR(answer.Done().max().item<double>(), 0, 1e-6);
+  answer.success.select(2, 1).fill_(40);
+  EXPECT_TRUE(at::allclose(answer.Done(), answer.ends.softmax(2).select(2, 1)));
 }
 
 TEST(ObjectForecast, HangsOnThePictureTheHandAndWhereItClosed) {

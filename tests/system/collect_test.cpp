@@ -100,6 +100,39 @@ TEST(CollectCommand, ACollectionIsARecordingTreeThatPacks) {
   EXPECT_EQ(shard.metadata().at("cameras"), "head,hand_right");
 }
 
+TEST(VaryCommand, DoesWhatWasToldAgainInTheSameScenes) {
+  const TempFolder folder;
+  ASSERT_EQ(RunCommand(Words(folder / "all", {"--episodes", "4"})).exit_code, 0);
+  for (const char* shards : {"shards", "others"})
+    ASSERT_EQ(RunCommand({Binary("evac"), "pack", folder / "all", "--out", folder / shards, "--config", kModel, "--cameras",
+                          "head,hand_right", "--holdout", "0"}).exit_code, 0);
+  const auto vary = [&](const std::string& shards, const std::string& jobs, const std::string& recipe) {
+    return RunCommand({Binary("evac"), "vary", folder / shards, folder / "all", "--recipe", recipe, "--count", "2", "--jobs", jobs});
+  };
+  const CommandResult varied = vary("shards", "2", kRecipe);
+  ASSERT_EQ(varied.exit_code, 0) << varied.err;
+  ASSERT_EQ(vary("others", "1", kRecipe).exit_code, 0);
+  const fs::path path = folder / "shards/variants_00000.safetensors";
+  EXPECT_EQ(Sha256HexOfFile(path), Sha256HexOfFile(folder / "others/variants_00000.safetensors"));
+  const TensorFile variants = TensorFile::Open(path);
+  const std::int64_t count = variants.Get("clip").shape[0];
+  EXPECT_GE(count, 4) << "an episode without its object has none, and some leave the workspace";
+  EXPECT_LE(count, 8);
+  EXPECT_EQ(variants.Get("actions").shape, (std::vector<std::int64_t>{25 * count, 16}));
+  EXPECT_EQ(variants.Get("object_px").shape, (std::vector<std::int64_t>{25 * count, 2, 2}));
+  const auto written = fs::last_write_time(path);
+  EXPECT_THAT(vary("shards", "2", kRecipe).out, HasSubstr("0 new variants"));
+  EXPECT_EQ(fs::last_write_time(path), written);
+  fs::remove(path);
+  std::string other = ReadFile(kRecipe);
+  for (std::size_t at; (at = other.find("../../")) != std::string::npos;) other.replace(at, 6, EVAC_SOURCE_DIR "/");
+  WriteFileAtomically(folder / "other.yaml", other.substr(0, other.find("mix:")) + "mix:\n  - {name: only, share: 1, policy: visual_pick}\n");
+  const CommandResult refused = vary("shards", "1", folder / "other.yaml");
+  EXPECT_EQ(refused.exit_code, 2);
+  EXPECT_THAT(refused.err, HasSubstr("wanted the recipe of the collection"));
+  EXPECT_FALSE(fs::exists(path));
+}
+
 /// A mix of one checkpoint, chunks as long as its own.
 std::vector<std::string> Learned(const fs::path& out, const std::string& jobs) {
   const std::string weights = EVAC_SOURCE_DIR "/worldmodel/weights/desk/policy_004000.safetensors";

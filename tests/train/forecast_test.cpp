@@ -57,6 +57,25 @@ TEST(TrainForecast, FindsThingsInPicturesThatItHasNotSeen) {
   EXPECT_GT(before, 2 * after);
 }
 
+TEST(EndThatCame, IsTheOneThatSaysWhereTheThingWasAndTheLikeliestWhereNobodyKnows) {
+  const nn::ModelConfig config = ForecastConfig(2);
+  const std::int64_t w = config.LatentWidth(), cells = w * config.LatentHeight() + 1, ends = nn::ObjectForecast::kEnds;
+  nn::ObjectForecast::Answer answer;
+  answer.ends = at::zeros({2, 1, ends});
+  answer.ends.select(2, 2).fill_(1);  // the likeliest by itself
+  answer.places = at::zeros({4, 1, ends, cells});
+  answer.places.select(2, 0).select(2, 0).fill_(9);      // at the first place in both views
+  answer.places.select(2, 1).select(2, w + 1).fill_(9);  // a row and a column on
+  Tensor place = at::full({4, 1, 2}, std::nan(""), at::kFloat);
+  place.narrow(0, 0, 2).fill_(1);
+  EXPECT_TRUE(at::equal(EndThatCame(answer, place, config).flatten(), at::tensor({1, 2})));
+  place[1].fill_(std::nan(""));  // seen by one of two cameras, as the same end says now
+  answer.places[1][0][1][cells - 1].fill_(20);
+  EXPECT_EQ(EndThatCame(answer, place, config)[0].item<std::int64_t>(), 1);
+  place.narrow(0, 0, 2).fill_(0);
+  EXPECT_EQ(EndThatCame(answer, place, config)[0].item<std::int64_t>(), 0);
+}
+
 TEST(TrainForecast, EndsInTheSameBytesWhenItWasKilled) {
   const TempFolder folder;
   WriteSyntheticShards(folder / "shards", {.failures = 3});
@@ -75,6 +94,67 @@ TEST(TrainForecast, EndsInTheSameBytesWhenItWasKilled) {
   EXPECT_FALSE(std::filesystem::exists(folder / "killed" / "forecast.safetensors"));
   EXPECT_EQ(TrainForecast(killed, options).why, "done");
   EXPECT_TRUE(at::equal(weights("whole"), weights("killed")));
+}
+
+/// A file of variants: of each of the training shard's clips one, told the same, of that outcome.
+void WriteVariants(const std::filesystem::path& shards, std::int8_t outcome, const std::string& recipe, std::int64_t of = 0) {
+  const std::filesystem::path shard = shards / "shard_00000.safetensors";
+  nn::MappedTensors file(TensorFile::Open(shard));
+  const Tensor start = file.Get("clip_start"), clip = at::arange(start.size(0) - 1) + of,
+               outcomes = at::full({clip.size(0)}, outcome, at::kChar), actions = file.Get("actions"),
+               places = file.Get("object_px");
+  const TensorView views[] = {nn::ViewOf("clip", clip), nn::ViewOf("start", start), nn::ViewOf("actions", actions),
+                              nn::ViewOf("object_px", places), nn::ViewOf("outcome", outcomes)};
+  WriteTensorFile(VariantsPath(shard), views, {{"format", "evac-variants"}, {"version", "1"}, {"recipe", recipe}});
+}
+
+std::string RecipeOf(const std::filesystem::path& shards) {
+  return TensorFile::Open(shards / "shard_00000.safetensors").metadata().at("recipe");
+}
+
+TEST(TrainForecast, BelievesInSuccessLessTheMoreOftenFailuresAreDrawn) {
+  const TempFolder folder;
+  WriteSyntheticShards(folder / "shards", {.failures = 3});  // told alike: half of them succeed
+  const auto believed = [&](const char* out, double weight) {
+    ForecastOptions options = Quick(60);
+    options.forecast.failure_weight = weight;
+    TrainForecast({{folder / "shards"}, folder / out, ForecastConfig(1)}, options);
+    nn::MappedTensors tensors(TensorFile::Open(folder / out / "forecast.safetensors"));
+    return tensors.Get("object_forecast.success.bias").to(at::kFloat).mean().item<double>();
+  };
+  EXPECT_LT(believed("failures", 8), believed("alike", 1));
+}
+
+TEST(TrainForecast, LearnsFromVariantsAsOftenAsIsAsked) {
+  const TempFolder folder;
+  WriteSyntheticShards(folder / "shards", {});  // all succeed
+  WriteVariants(folder / "shards", 0, RecipeOf(folder / "shards"));
+  const auto agreement = [&](const char* out, double share) {
+    ForecastOptions options = Quick(40);
+    options.forecast.variant_share = share;
+    EXPECT_EQ(TrainForecast({{folder / "shards"}, folder / out, ForecastConfig(1)}, options).why, "done");
+    return Written(folder / out, "agreement");
+  };
+  EXPECT_EQ(agreement("clips", 0), 1);
+  EXPECT_EQ(agreement("variants", 1), 0) << "told the same, all variants fail";
+}
+
+TEST(Variants, OfOtherShardsOrOfClipsThatAreNotThereAreRefused) {
+  const TempFolder folder;
+  WriteSyntheticShards(folder / "shards", {});
+  const auto opened = [&] {
+    ShardSet set(folder / "shards", Split::kTrain);
+    set.OpenVariants();
+    return set.variants().size();
+  };
+  EXPECT_EQ(opened(), 0u) << "none need be there";
+  const std::string recipe = RecipeOf(folder / "shards");
+  WriteVariants(folder / "shards", 1, recipe);
+  EXPECT_EQ(opened(), 6u);
+  WriteVariants(folder / "shards", 1, "another");
+  EXPECT_THAT(opened, ThrowsMessage<TensorError>(HasSubstr("recipe is 'another'")));
+  WriteVariants(folder / "shards", 1, recipe, 1);
+  EXPECT_THAT(opened, ThrowsMessage<TensorError>(HasSubstr("variant 5 is of clip 6 of 6")));
 }
 
 TEST(TrainForecast, RefusesShardsThatDoNotSayWhereTheirObjectIs) {

@@ -144,7 +144,6 @@ TEST(TrainWorld, TheLossFallsWithEverythingThatThePaperLacks) {
   at.config.unet.in_channels += at.config.vae.z_channels + 1;
   at.config.unet.frame_actions = true;
   at.config.unet.hand_views = 1;
-  at.config.unet.hand_turns = true;
   at.config.action_resampler.embedding_dim = 18;
   const auto [before, after] = LossBeforeAndAfter(at, options);
   EXPECT_LT(after, 0.9 * before);
@@ -281,25 +280,6 @@ TEST(TrainWorld, GoesOnFromAModelThatWasShownLess) {
   EXPECT_NEAR(end("widened", more, 1e-12, start), before, 1e-5 * before);
   start.init = at.folder / "widened" / "weights.safetensors";
   EXPECT_THROW(end("narrow", at.config, 1e-12, start), TensorError) << "nothing is left out";
-}
-
-TEST(TrainWorld, KeepsWhatHandTurnsMakeOfWhatIsShownWhenAsked) {
-  WorldTrainingOptions kept, trained;
-  kept.train_hand_turns = false;
-  for (const char* key : {"hand_turn_eye.weight", "hand_turn_embedding.0.weight", "hand_turn_embedding.2.bias"}) {
-    EXPECT_FALSE(IsTrained(std::string("model.diffusion_model.") + key, kept)) << key;
-    EXPECT_TRUE(IsTrained(std::string("model.diffusion_model.") + key, trained)) << key;
-  }
-  EXPECT_TRUE(IsTrained("model.diffusion_model.hand_turn_out.weight", kept)) << "how much it counts is learned";
-  EXPECT_TRUE(IsTrained("model.diffusion_model.hand_view_embedding.0.weight", kept));
-}
-
-TEST(TrainWorld, RefusesToKeepHandTurnsThatTheModelDoesNotHave) {
-  const Prepared at(1);
-  WorldOptions options = Quick(1);
-  options.world.train_hand_turns = false;
-  EXPECT_THROW(TrainWorld({{at.folder / "shards"}, at.folder / "out", at.config}, options, {at.codec()}, {}),
-               TensorError);
 }
 
 TEST(TrainWorld, RefusesLatentsOfAnotherCodec) {

@@ -14,7 +14,7 @@ constexpr std::size_t kHands = 2, kHandNumbers = 8;  ///< of an arms row (frame_
 constexpr std::size_t kTurnKinds = 2;                ///< closing, opening
 /// Frames, counted from a turn, whose hand is told: then, the one before, how it came there and how it went on. Before
 /// frame 0 it is where it was in that; what lies behind the frame that is asked about is not told, it is as there.
-constexpr std::array<int, 10> kTurnMoments = {0, -1, -4, -2, 1, 2, 3, 4, 6, 8};
+constexpr std::array<int, 11> kTurnMoments = {0, -1, -4, -2, 1, 2, 3, 4, 6, 8, 24};
 /// 1 if there was one, frames since; the hand at each of the moments.
 constexpr std::size_t kTurnNumbers = 2 + kTurnMoments.size() * kHandNumbers;
 constexpr std::size_t kTurnRow = kHands * kTurnKinds * kTurnNumbers;

@@ -24,7 +24,7 @@ Tensor HandViews(const Tensor& image, const Tensor& direction, const Tensor& ori
 /// now, seen from there, in that hand's axes and in the base frame; how it is turned against then; how it moved then.
 constexpr std::int64_t kTurnFeatures = 1 + 2 + 3 + 3 + 6 + 3;
 
-/// The same where each hand last closed, and where it last opened (`unet.hand_turns`).
+/// The same where each hand last closed, and where it last opened (`object_forecast`).
 /// @param turns  [B, T, kTurnRow]: HandTurns
 /// @returns      [B, T, 2, kTurnKinds, V kHandPoints kHandPointNumbers + kTurnFeatures]: zeros where there was no turn
 Tensor TurnViews(const Tensor& image, const Tensor& direction, const Tensor& origin, const Tensor& arms,

@@ -26,8 +26,6 @@ Conditioning Condition(const EvacModel& model, const ChunkRequest& request) {
   if (model.config().unet.frame_actions) conditioning.frames = FrameActions(request.arms, conditioning.memory);
   if (model.config().unet.hand_views > 0)
     conditioning.hands = HandViews(request.image, request.direction, request.origin, request.arms);
-  if (model.config().unet.hand_turns)
-    conditioning.turns = TurnViews(request.image, request.direction, request.origin, request.arms, request.turns);
   return conditioning;
 }
 
@@ -41,8 +39,6 @@ Conditioning Unconditioned(const EvacModel& model, const ChunkRequest& request, 
   if (conditioning.concat.object.defined()) without.concat.object = at::zeros_like(conditioning.concat.object);
   if (conditioning.hands.defined())
     without.hands = HandViews(nothing, request.direction, request.origin, request.arms);
-  if (conditioning.turns.defined())
-    without.turns = TurnViews(nothing, request.direction, request.origin, request.arms, request.turns);
   without.tokens = model.ContextTokens(model.ImageTokens(nothing), model.ActionTokens(request.deltas));
   return without;
 }
@@ -53,8 +49,7 @@ Denoise MakeDenoise(const EvacModel& model, const Conditioning& conditioning) {
   const at::Device device = conditioning.tokens.device();
   PreparedContext context =
       model.unet().Prepare({conditioning.tokens, constant(model.config().fps).to(device),
-                            constant(model.config().domain).to(device), views, conditioning.frames, conditioning.hands,
-                            conditioning.turns});
+                            constant(model.config().domain).to(device), views, conditioning.frames, conditioning.hands});
   return [&model, concat = conditioning.concat, context = std::move(context), views, rows, memory](const Tensor& x_t,
                                                                                                    std::int64_t t) {
     const Tensor steps = at::full({rows}, t, at::kLong).to(x_t.device());

@@ -22,7 +22,7 @@ struct ChunkRequest {
   Tensor deltas;     ///< [B, any, 14], normalised
   Tensor arms = {};  ///< [B, T, 16] rows as in frame_actions.h; read if the network has `frame_actions`, `hand_views` or
                        ///< `object_forecast`
-  Tensor turns = {};  ///< [B, T, kTurnRow]: HandTurns; read if the network has `hand_turns` or `object_forecast`
+  Tensor turns = {};  ///< [B, T, kTurnRow]: HandTurns; read if the network has `object_forecast`
 };
 
 /// Everything random, drawn by the caller.
@@ -38,7 +38,6 @@ struct Conditioning {
   Tensor tokens;       ///< [BV, image tokens + action tokens, context_dim]
   Tensor frames = {};  ///< [B, T, kFrameActionNumbers] or undefined
   Tensor hands = {};   ///< HandViews or undefined
-  Tensor turns = {};   ///< TurnViews or undefined
 };
 
 Conditioning Condition(const EvacModel& model, const ChunkRequest& request);

@@ -117,8 +117,6 @@ void ModelConfig::Check() const {
     throw TensorError("pose_map.lag_frames: found" + Field("", pose_map.lag_frames).substr(2) + ", wanted 0 … 1");
   Require(unet.hand_views == 0 || unet.hand_views == views, "unet.hand_views", unet.hand_views,
           "0, or views = " + std::to_string(views));
-  if (unet.hand_turns && (unet.hand_views == 0 || !unet.frame_actions))
-    throw TensorError("unet.hand_turns: wanted unet.hand_views and unet.frame_actions as well");
   Require(unet.out_channels == vae.z_channels, "unet.out_channels", unet.out_channels, "vae.z_channels");
   Require(domain >= 0 && domain < unet.domains, "domain", domain, "a row of unet.domains");
   const std::int64_t multiple = vae.Stride() << (unet.channel_mult.size() - 1);

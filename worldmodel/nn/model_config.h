@@ -29,8 +29,6 @@ struct UNetConfig {
   bool frame_actions = false;
   /// What the first picture of so many views shows about each hand is added too (hand_views.h). 0: none, as published.
   std::int64_t hand_views = 0;
-  /// And what it shows where each hand last closed and opened (hand_turns.h). Wants both above. Not in the paper.
-  bool hand_turns = false;
 };
 
 /// The latent codec: AutoencoderKL of Stable Diffusion.

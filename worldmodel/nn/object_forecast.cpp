@@ -28,6 +28,25 @@ std::int64_t KnownOfAHand(const ModelConfig& config) {
          config.views * kFoundNumbers;
 }
 
+/// As of each hand that let go longer ago than that it was then: nothing has changed since.
+ObjectForecast::Scenes Settled(const ObjectForecast::Scenes& scenes) {
+  constexpr std::int64_t kOpening = 1, kLast = static_cast<std::int64_t>(kTurnMoments.size()) - 1;
+  constexpr double kSettled = kTurnMoments.back();
+  const Tensor turns = scenes.turns.to(at::kFloat).unflatten(2, {kHandsSeen, kKinds, kNumbers});
+  const Tensor was = turns.select(4, 0) > 0, since = turns.select(4, 1);  // [B, T, hands, kinds]
+  const Tensor opened = was.select(3, kOpening), closed = was.select(3, 0);
+  const Tensor is_open = opened.logical_and(
+      closed.logical_not().logical_or(since.select(3, kOpening) < since.select(3, 0)));
+  const Tensor late = (since.select(3, kOpening) - kSettled).clamp_min(0) * is_open.to(at::kFloat);  // [B, T, hands]
+  const Tensor then = turns.select(3, kOpening).narrow(3, 2 + kLast * kPose, kPose);
+  const Tensor hands = scenes.arms.to(at::kFloat).unflatten(2, {kHandsSeen, kPose});
+  ObjectForecast::Scenes settled = scenes;
+  settled.arms = at::where(late.unsqueeze(3) > 0, then, hands).flatten(2);
+  settled.turns = at::cat({turns.narrow(4, 0, 1), (since - late.unsqueeze(3)).unsqueeze(4) * turns.narrow(4, 0, 1),
+                           turns.narrow(4, 2, kNumbers - 2)}, 4).flatten(2);
+  return settled;
+}
+
 /// [B, T, hands, kKinds kWay kOfAStep]: how each hand came to its turns and went on, in the axes it had there, and how
 /// closed it was against then.
 Tensor WaysAboutTurns(const Tensor& turns) {
@@ -60,7 +79,7 @@ ObjectForecast::ObjectForecast(const Scope& at, const ModelConfig& config)
       both_(at / "both", {kWide, kWide}),
       ends_(at / "ends", {kEnds, kWide}),
       places_(at / "places", {config.views * kEnds * (height_ * width_ + 1), kWide}),
-      success_(at / "success", {1, kWide}) {}
+      success_(at / "success", {kEnds, kWide}) {}
 
 ObjectForecast::Found ObjectForecast::Find(const Tensor& image) const {
   const std::int64_t rows = image.size(0), height = image.size(2), width = image.size(3);
@@ -109,8 +128,10 @@ Tensor ObjectForecast::AboutThing(const Found& found, const Scenes& scenes) cons
   return at::cat({to_thing.flatten(3), said}, 3);
 }
 
-ObjectForecast::Answer ObjectForecast::operator()(const Scenes& scenes, const Drop& drop) const {
-  CheckShape("arms of the frames", scenes.arms, {-1, -1, kHandsSeen * kPose});
+ObjectForecast::Answer ObjectForecast::operator()(const Scenes& given, const Drop& drop) const {
+  CheckShape("arms of the frames", given.arms, {-1, -1, kHandsSeen * kPose});
+  CheckShape("turns of the hands", given.turns, {given.arms.size(0), given.arms.size(1), static_cast<std::int64_t>(kTurnRow)});
+  const Scenes scenes = Settled(given);
   const std::int64_t scene_count = scenes.arms.size(0), frames = scenes.arms.size(1);
   CheckShape("the picture in which the thing is found", scenes.image,
              {scene_count * views_, 3, height_ * stride_, width_ * stride_});
@@ -132,16 +153,29 @@ ObjectForecast::Answer ObjectForecast::operator()(const Scenes& scenes, const Dr
                             .reshape({scene_count, frames, views_, kEnds, height_ * width_ + 1})
                             .transpose(1, 2)
                             .flatten(0, 1);
-  return {found, through(ends_, both), places, through(success_, both).squeeze(2)};
+  return {found, through(ends_, both), places, through(success_, both)};
+}
+
+Tensor ObjectForecast::Answer::Done() const { return (ends.softmax(2) * success.sigmoid()).sum(2); }
+
+Tensor ObjectForecast::MapsOf(const Answer& answer, const Tensor& end) const {
+  const Tensor places = answer.places.softmax(3).narrow(3, 0, height_ * width_);
+  const Tensor of_view = end.repeat_interleave(views_, 0);  // [BV, T]
+  const Tensor one = of_view.reshape({of_view.size(0), of_view.size(1), 1, 1}).expand({-1, -1, 1, places.size(3)});
+  return places.gather(2, one).squeeze(2).unflatten(2, {height_, width_}).unsqueeze(1);
 }
 
 Tensor ObjectForecast::Maps(const Scenes& scenes) const {
   const at::NoGradGuard no_gradients;
   const Answer answer = (*this)(scenes);
-  const Tensor end = answer.ends.argmax(2).repeat_interleave(views_, 0);  // [BV, T]
-  const Tensor places = answer.places.softmax(3).narrow(3, 0, height_ * width_);
-  const Tensor one = end.reshape({end.size(0), end.size(1), 1, 1}).expand({-1, -1, 1, places.size(3)});
-  return places.gather(2, one).squeeze(2).unflatten(2, {height_, width_}).unsqueeze(1);
+  return MapsOf(answer, LikeliestEnd(answer, views_));
+}
+
+Tensor LikeliestEnd(const ObjectForecast::Answer& answer, std::int64_t views) {
+  const Tensor root = (answer.places.log_softmax(3) / 2).exp();                      // [BV, T, ends, cells]
+  const Tensor alike = at::matmul(root, root.transpose(2, 3)).clamp_min(1e-12);      // 1: the same places
+  const Tensor in_all = alike.log().unflatten(0, {-1, views}).sum(1).exp();          // [B, T, ends, ends]
+  return at::matmul(in_all, answer.ends.softmax(2).unsqueeze(3)).squeeze(3).argmax(2);
 }
 
 Tensor PointSeenAt(const Tensor& places, const Tensor& sure, const Tensor& direction, const Tensor& origin,

@@ -31,8 +31,7 @@ void DrawUniform(std::uint64_t stream, double bound, Tensor& tensor) {
 
 bool StartsAtZero(const std::string& key) {
   static const char* const kLayers[] = {".out_layers.3.", ".temopral_conv.conv4.3.", ".proj_out.", "l.fps_embedding.2.",
-                                        "l.hand_view_embedding.2.", "l.hand_turn_out.",
-                                        "diffusion_model.out.2."};
+                                        "l.hand_view_embedding.2.", "diffusion_model.out.2."};
   if (!key.starts_with("model.diffusion_model.")) return false;
   for (const char* layer : kLayers) {
     if (key.find(layer) != std::string::npos) return true;

@@ -11,7 +11,6 @@ namespace evac::nn {
 namespace {
 
 constexpr double kOutEpsilon = 1e-5;
-constexpr std::int64_t kSeenOfAHand = 64, kKindsOfTurns = kTurnKinds;
 
 /// [BV, C, T, h, w] → [BVT, h, w, C]
 Tensor ToRows(const Tensor& x) { return x.permute({0, 2, 3, 4, 1}).reshape({-1, x.size(3), x.size(4), x.size(1)}); }
@@ -65,13 +64,6 @@ UNet::UNet(const Scope& at, const UNetConfig& config)
   if (config.hand_views > 0)
     hand_embedding_.emplace(at / "hand_view_embedding", config.hand_views * kHandPoints * kHandPointNumbers,
                             4 * config.model_channels);
-  if (config.hand_turns) {
-    turn_eye_.emplace(at / "hand_turn_eye", config.hand_views * kHandPoints * kHandPointNumbers, kSeenOfAHand);
-    turn_embedding_.emplace(at / "hand_turn_embedding",
-                            kSeenOfAHand + kKindsOfTurns * (kSeenOfAHand + kTurnFeatures) + kHandPoseNumbers,
-                            4 * config.model_channels);
-    turn_out_.emplace(at / "hand_turn_out", 4 * config.model_channels, 4 * config.model_channels);
-  }
   MakeInput(at / "input_blocks");
   init_attention_.emplace(
       at / "init_attn" / "0",
@@ -179,20 +171,7 @@ PreparedContext UNet::Prepare(const Context& context) const {
     const Tensor about_hands = (*hand_embedding_)(context.hands).sum(2);
     prepared.frames = prepared.frames.defined() ? prepared.frames + about_hands : about_hands;
   }
-  if (turn_embedding_) prepared.frames = prepared.frames + AboutTurns(context);
   return prepared;
-}
-
-Tensor UNet::AboutTurns(const Context& context) const {
-  if (!context.turns.defined()) throw TensorError("the network wants where each hand closed and opened, found nothing");
-  const std::int64_t numbers = config_.hand_views * kHandPoints * kHandPointNumbers;
-  CheckShape("where each hand closed and opened", context.turns,
-             {context.hands.size(0), context.hands.size(1), 2, kKindsOfTurns, numbers + kTurnFeatures});
-  const Tensor seen = (*turn_eye_)(at::cat({context.hands.unsqueeze(3), context.turns.narrow(4, 0, numbers)}, 3));
-  const Tensor told = context.turns.narrow(4, numbers, kTurnFeatures);
-  const Tensor poses = HandPoses(context.frames);
-  const Tensor known = at::cat({at::silu(seen).flatten(3), told.flatten(3), poses}, 3);
-  return (*turn_out_)(at::silu((*turn_embedding_)(known).sum(2)));
 }
 
 Tensor UNet::InProductType(const Tensor& x) const { return product_ ? x.to(*product_) : x; }

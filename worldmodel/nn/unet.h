@@ -32,7 +32,6 @@ class UNet {
     std::int64_t views = 1;
     Tensor frames = {};  ///< [B, T, kFrameActionNumbers]; read if the network has `frame_actions`
     Tensor hands = {};   ///< [B, T, 2, any]: HandViews; read if the network has `hand_views`
-    Tensor turns = {};   ///< [B, T, 2, kTurnKinds, any]: TurnViews; read if the network has `hand_turns`
   };
   PreparedContext Prepare(const Context& context) const;
 
@@ -66,7 +65,6 @@ class UNet {
   void AddTransformers(Block& block, const Scope& at, std::int64_t channels);
   bool HasAttention() const;
   Tensor InProductType(const Tensor& x) const;
-  Tensor AboutTurns(const Context& context) const;
   Tensor Embedding(const Input& input, const PreparedContext& context) const;
   Tensor Run(const Block& block, const std::string& name, const Tensor& x, const Pass& pass) const;
 
@@ -74,9 +72,7 @@ class UNet {
   ProductType product_;   ///< where it is not that of the weights, values between the layers are kept so too
   Tensor domain_embedding_;  ///< [domains, E]
   EmbeddingMlp time_embed_, fps_embedding_;
-  std::optional<EmbeddingMlp> frame_embedding_, hand_embedding_, turn_embedding_;
-  std::optional<Linear> turn_eye_;  ///< one for all that is shown about a hand: now, where it closed, where it opened
-  std::optional<Linear> turn_out_;
+  std::optional<EmbeddingMlp> frame_embedding_, hand_embedding_;
   std::vector<Block> input_blocks_;
   std::optional<TemporalTransformer> init_attention_;
   Block middle_;

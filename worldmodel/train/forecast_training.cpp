@@ -2,6 +2,7 @@
 
 #include <ATen/ops/binary_cross_entropy_with_logits.h>
 #include <ATen/ops/erfinv.h>
+#include <ATen/ops/log_sigmoid.h>
 #include <ATen/ops/where.h>
 
 #include <algorithm>
@@ -45,15 +46,30 @@ Tensor Shares(const Tensor& place, std::int64_t w, std::int64_t h) {
   return at::cat({at::where(within, each, at::zeros_like(each)), within.logical_not().to(at::kFloat)}, -1);
 }
 
+/// [B, T, ends]: logarithms of each end and of the thing's being where it was in it, in all views.
+Tensor OfEnds(const nn::ObjectForecast::Answer& answer, const Tensor& place, const nn::ModelConfig& config) {
+  const Tensor shares = Shares(place, config.LatentWidth(), config.LatentHeight()).unsqueeze(2);
+  const Tensor of_views = (shares * answer.places.log_softmax(3)).sum(3);  // [BV, T, ends]
+  return of_views.unflatten(0, {-1, config.views}).sum(1) + answer.ends.log_softmax(2);
+}
+
 void Check(const ForecastTrainingOptions& o) {
   if (o.batch < 1 || o.frames < 1)
     throw TensorError("forecast training: batch " + std::to_string(o.batch) + ", frames " + std::to_string(o.frames) +
                       ", wanted at least 1 of each");
+  if (!(o.failure_weight >= 1))
+    throw TensorError("forecast training: failure_weight is " + std::to_string(o.failure_weight) + ", wanted at least 1");
   if (!(o.drop >= 0 && o.drop < 1))
     throw TensorError("forecast training: drop is " + std::to_string(o.drop) + ", wanted 0 or more and below 1");
 }
 
 }  // namespace
+
+Tensor EndThatCame(const nn::ObjectForecast::Answer& answer, const Tensor& place, const nn::ModelConfig& config) {
+  const Tensor known = place.isfinite().flatten(1).any(1).unflatten(0, {-1, config.views}).any(1);  // [B]
+  const Tensor of_ends = OfEnds(answer, place, config);
+  return at::where(known.reshape({-1, 1, 1}), of_ends, answer.ends).argmax(2);
+}
 
 ForecastTraining::ForecastTraining(const ShardSet& shards, const nn::ModelConfig& config,
                                    const ForecastTrainingOptions& options)
@@ -64,6 +80,38 @@ ForecastTraining::ForecastTraining(const ShardSet& shards, const nn::ModelConfig
                       ": object_px of no clip is a number, wanted shards that say where their objects are");
 }
 
+ForecastTraining::Track ForecastTraining::TrackOf(const Clip& clip, std::int64_t start) const {
+  const Shard& shard = shards_.shards()[clip.shard];
+  const std::int64_t from = clip.first + start, count = clip.frames - start;
+  return {clip.shard, from, shard.actions.narrow(0, from, count), shard.object_px.narrow(0, from, count), clip.outcome};
+}
+
+ForecastTraining::Track ForecastTraining::TrackOf(const Variant& variant) const {
+  const Shard& shard = shards_.shards()[variant.shard];
+  return {variant.shard, variant.picture, shard.variant_actions.narrow(0, variant.first, variant.frames),
+          shard.variant_object_px.narrow(0, variant.first, variant.frames), variant.outcome};
+}
+
+ForecastTraining::View ForecastTraining::PickView(Dice& dice) const {
+  const auto one_of = [&](const auto& all) -> const auto& {
+    return all[static_cast<std::size_t>(dice.Below(static_cast<std::int64_t>(all.size())))];
+  };
+  const bool varied = !shards_.variants().empty() && dice.Chance(options_.variant_share);
+  View view;
+  do {
+    if (varied) {
+      view.track = TrackOf(one_of(shards_.variants()));
+    } else {
+      const Clip& clip = one_of(shards_.clips());
+      view.track = TrackOf(clip, dice.Chance(options_.late_start) ? dice.Below(clip.frames) : 0);
+    }
+  } while (options_.failure_weight > 1 && view.track.outcome == 1 && !dice.Chance(1 / options_.failure_weight));
+  view.frames = {view.track.frames() - 1};
+  while (static_cast<std::int64_t>(view.frames.size()) < options_.frames)
+    view.frames.push_back(dice.Below(view.track.frames()));
+  return view;
+}
+
 ForecastBatch ForecastTraining::BatchOf(const std::vector<View>& views) const {
   const std::vector<std::int64_t> picture_px = {shards_.height_px(), shards_.width_px()},
                                   latent_px = {config_.LatentHeight(), config_.LatentWidth()};
@@ -71,25 +119,24 @@ ForecastBatch ForecastTraining::BatchOf(const std::vector<View>& views) const {
   std::vector<Tensor> images, directions, origins, arms, turns, places, firsts;
   std::vector<float> success;
   for (const View& view : views) {
-    const Shard& shard = shards_.shards()[view.clip->shard];
-    const std::int64_t start = view.clip->first + view.start, count = view.clip->frames - view.start;
-    const Rays rays = RaysOf(shard.c2w[start], shard.k[start], picture_px, latent_px);
-    images.push_back(PicturesFrom(shard.frames[start]));
+    const Track& track = view.track;
+    const Shard& shard = shards_.shards()[track.shard];
+    const Rays rays = RaysOf(shard.c2w[track.picture], shard.k[track.picture], picture_px, latent_px);
+    images.push_back(PicturesFrom(shard.frames[track.picture]));
     directions.push_back(rays.direction.unsqueeze(2));
     origins.push_back(rays.origin.unsqueeze(2));
-    const Tensor rows = shard.actions.narrow(0, start, count).to(at::kFloat).contiguous();
-    std::vector<std::size_t> asked;
-    for (const std::int64_t frame : view.frames) asked.push_back(static_cast<std::size_t>(frame - view.start));
+    const Tensor rows = track.actions.to(at::kFloat).contiguous();
+    const std::vector<std::size_t> asked(view.frames.begin(), view.frames.end());
     const float* numbers = rows.data_ptr<float>();
     turns.push_back(at::tensor(nn::HandTurns({numbers, numbers + rows.numel()}, asked))
                         .reshape({static_cast<std::int64_t>(asked.size()), static_cast<std::int64_t>(nn::kTurnRow)}));
     const Tensor which = at::tensor(view.frames, at::kLong);
-    arms.push_back(rows.index_select(0, which - view.start));
-    const Tensor object = shard.object_px.narrow(0, view.clip->first, view.clip->frames).to(at::kFloat) * per_px - 0.5;
+    arms.push_back(rows.index_select(0, which));
+    const Tensor object = track.object_px.to(at::kFloat) * per_px - 0.5;
     places.push_back(object.index_select(0, which).transpose(0, 1));  // [V, T, 2]
-    firsts.push_back(object[view.start]);
+    firsts.push_back(object[0]);
     for (const std::int64_t frame : view.frames)
-      success.push_back(frame + 1 == view.clip->frames ? static_cast<float>(view.clip->outcome) : -1.0F);
+      success.push_back(frame + 1 == track.frames() ? static_cast<float>(track.outcome) : -1.0F);
   }
   return {{at::cat(images), at::cat(directions), at::cat(origins), at::stack(arms), at::stack(turns)},
           at::cat(places),
@@ -99,13 +146,13 @@ ForecastBatch ForecastTraining::BatchOf(const std::vector<View>& views) const {
 
 Tensor ForecastTraining::LossOf(const nn::ObjectForecast::Answer& answer, const ForecastBatch& batch) const {
   const std::int64_t w = config_.LatentWidth(), h = config_.LatentHeight();
-  const Tensor of_views = (Shares(batch.place, w, h).unsqueeze(2) * answer.places.log_softmax(3)).sum(3);  // [BV, T, ends]
-  const Tensor of_ends = of_views.unflatten(0, {-1, shards_.views()}).sum(1) + answer.ends.log_softmax(2);
-  const Tensor places = of_ends.logsumexp(2).mean() / -static_cast<double>(shards_.views());
   const Tensor known = (batch.success >= 0).to(at::kFloat);
-  const Tensor told = at::binary_cross_entropy_with_logits(answer.success, batch.success.clamp_min(0), {}, {},
-                                                           at::Reduction::None);
-  const Tensor success = (told * known).sum() / known.sum().clamp_min(1);
+  const Tensor sign = (batch.success * 2 - 1).unsqueeze(2);
+  const Tensor as_told = at::log_sigmoid(answer.success * sign);  // [B, T, ends]: what is known was said, in each end
+  const Tensor of_ends = OfEnds(answer, batch.place, config_) + as_told * known.unsqueeze(2);
+  const Tensor places = of_ends.logsumexp(2).mean() / -static_cast<double>(shards_.views());
+  const Tensor told = (answer.ends.log_softmax(2) + as_told).logsumexp(2);
+  const Tensor success = -(told * known).sum() / known.sum().clamp_min(1);
   // in the first picture: a bell over the finer cells, and where their mean lies
   const std::int64_t finer = config_.vae.Stride() / nn::ObjectForecast::kCell_px;
   const double spread_cells = 3.0 / static_cast<double>(nn::ObjectForecast::kCell_px);
@@ -127,14 +174,7 @@ Tensor ForecastTraining::LossOf(const nn::ObjectForecast::Answer& answer, const 
 Tensor ForecastTraining::Loss(const nn::ObjectForecast& forecast, const StepPlace& place) const {
   Dice clips(place, kClips), pictures(place, kPictures), left_out(place, kLeftOut);
   std::vector<View> views;
-  const auto count = static_cast<std::int64_t>(shards_.clips().size());
-  while (static_cast<std::int64_t>(views.size()) < options_.batch) {
-    const Clip& clip = shards_.clips()[static_cast<std::size_t>(clips.Below(count))];
-    View view{&clip, clips.Chance(options_.late_start) ? clips.Below(clip.frames) : 0, {clip.frames - 1}};
-    while (static_cast<std::int64_t>(view.frames.size()) < options_.frames)
-      view.frames.push_back(view.start + clips.Below(clip.frames - view.start));
-    views.push_back(std::move(view));
-  }
+  while (static_cast<std::int64_t>(views.size()) < options_.batch) views.push_back(PickView(clips));
   ForecastBatch batch = BatchOf(views);
   Tensor& image = batch.scenes.image;
   const Tensor gain = 1 + options_.picture_gain * pictures.Normal({options_.batch, 1, 1, 1});
@@ -152,7 +192,7 @@ ForecastQuality ForecastTraining::Measure(const nn::ObjectForecast& forecast) co
   for (std::size_t from = 0; from < clips.size(); from += kAtOnce) {
     std::vector<View> views;
     for (std::size_t i = from; i < std::min(clips.size(), from + kAtOnce); ++i) {
-      View view{&clips[i], 0, {}};
+      View view{TrackOf(clips[i], 0), {}};
       for (std::int64_t k = 1; k <= options_.frames; ++k)
         view.frames.push_back((clips[i].frames - 1) * k / options_.frames);
       views.push_back(std::move(view));
@@ -162,7 +202,7 @@ ForecastQuality ForecastTraining::Measure(const nn::ObjectForecast& forecast) co
     const auto here = static_cast<std::int64_t>(views.size());
     quality.loss += LossOf(answer, batch).item<double>() * static_cast<double>(here);
     measured += here;
-    const Tensor known = batch.success >= 0, is_right = (answer.success > 0).eq(batch.success > 0.5).logical_and(known);
+    const Tensor known = batch.success >= 0, is_right = (answer.Done() > 0.5).eq(batch.success > 0.5).logical_and(known);
     quality.told += known.sum().item<std::int64_t>();
     right += is_right.sum().item<std::int64_t>();
     const Tensor off = (answer.found.place - batch.first).square().sum(1).sqrt() * static_cast<double>(config_.vae.Stride());

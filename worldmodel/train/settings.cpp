@@ -94,6 +94,8 @@ Settings SettingsOf(ForecastOptions& options) {
   ForecastTrainingOptions& f = options.forecast;
   Settings settings = {{"batch", &f.batch},
                        {"frames", &f.frames},
+                       {"variant_share", &f.variant_share},
+                       {"failure_weight", &f.failure_weight},
                        {"late_start", &f.late_start},
                        {"drop", &f.drop},
                        {"picture_gain", &f.picture_gain},
@@ -135,7 +137,7 @@ Settings SettingsOf(WorldOptions& options) {
                        {"self_memory_chunks", &w.self_memory_chunks},
                        {"train_action_resampler", &w.train_action_resampler},
                        {"train_image_encoder", &w.train_image_encoder},
-                       {"train_hand_turns", &w.train_hand_turns},
+                       {"show_end_that_came", &w.show_end_that_came},
                        {"strip_steps", &options.strip_steps}};
   AddJob(settings, options.job);
   return settings;

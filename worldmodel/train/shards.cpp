@@ -55,6 +55,14 @@ Shard Read(const std::filesystem::path& path, const nn::MappedTensors& file) {
   return shard;
 }
 
+const char* NameOf(Split split) { return split == Split::kTrain ? "train" : "holdout"; }
+
+std::filesystem::path Beside(const std::filesystem::path& shard, const std::string& prefix) {
+  std::string name = shard.filename().string();
+  if (name.starts_with("shard_")) name = prefix + name.substr(6);
+  return shard.parent_path() / name;
+}
+
 /// @param tasks  of this shard's numbers, what they are in the set
 std::vector<Clip> ClipsOf(const Shard& shard, std::size_t index, const std::vector<std::int32_t>& tasks) {
   std::vector<Clip> clips;
@@ -76,10 +84,14 @@ std::vector<Clip> ClipsOf(const Shard& shard, std::size_t index, const std::vect
 
 }  // namespace
 
-std::filesystem::path LatentsPath(const std::filesystem::path& shard) {
-  std::string name = shard.filename().string();
-  if (name.starts_with("shard_")) name = "latents_" + name.substr(6);
-  return shard.parent_path() / name;
+std::filesystem::path LatentsPath(const std::filesystem::path& shard) { return Beside(shard, "latents_"); }
+
+std::filesystem::path VariantsPath(const std::filesystem::path& shard) { return Beside(shard, "variants_"); }
+
+bool HasSplit(const std::filesystem::path& folder, Split split) {
+  const std::vector<std::filesystem::path> shards = ShardPaths(folder);
+  return std::any_of(shards.begin(), shards.end(),
+                     [&](const std::filesystem::path& path) { return Text(TensorFile::Open(path), "split") == NameOf(split); });
 }
 
 std::vector<std::filesystem::path> ShardPaths(const std::filesystem::path& folder) {
@@ -113,7 +125,7 @@ ShardSet::ShardSet(const ShardFolders& folders, Split split) {
   }
   for (const std::string& task : tasks_) append(tasks, ",", task);
   if (shards_.empty())
-    throw TensorError(names + " has no shard with split " + (split == Split::kTrain ? "train" : "holdout"));
+    throw TensorError(names + " has no shard with split " + NameOf(split));
   metadata_["recipe"] = recipes;
   metadata_["tasks"] = tasks;
 }
@@ -122,7 +134,7 @@ void ShardSet::Add(const std::filesystem::path& path, Split split) {
   const nn::MappedTensors file(TensorFile::Open(path));
   RequireText(file.file(), "format", "evac-shard");
   RequireText(file.file(), "version", "1");
-  if (Text(file.file(), "split") != (split == Split::kTrain ? "train" : "holdout")) return;
+  if (Text(file.file(), "split") != NameOf(split)) return;
   Shard shard = Read(path, file);
   if (!shards_.empty()) nn::CheckShape(path.string() + ": frames", shard.frames, {-1, views(), height_px(), width_px(), 3});
   if (shards_.empty()) metadata_ = file.file().metadata();
@@ -164,6 +176,35 @@ void ShardSet::OpenLatents(std::int64_t z, std::int64_t stride) {
     shard.map_latents = Checked(file, "map_latents", at::kHalf, shape);
     if (codec_.empty()) codec_ = Text(file.file(), "codec");
     RequireText(file.file(), "codec", codec_);
+  }
+}
+
+void ShardSet::OpenVariants() {
+  variants_.clear();
+  for (std::size_t index = 0; index < shards_.size(); ++index) {
+    Shard& shard = shards_[index];
+    const std::filesystem::path path = VariantsPath(shard.path);
+    if (!std::filesystem::exists(path)) continue;
+    const nn::MappedTensors file(TensorFile::Open(path));
+    RequireText(file.file(), "format", "evac-variants");
+    RequireText(file.file(), "version", "1");
+    RequireText(file.file(), "recipe", Text(TensorFile::Open(shard.path), "recipe"));
+    const Tensor clip = Checked(file, "clip", at::kLong, {-1});
+    const std::int64_t count = clip.size(0), clips = shard.clip_start.size(0) - 1;
+    const Tensor start = Checked(file, "start", at::kLong, {count + 1}), outcome = Checked(file, "outcome", at::kChar, {count});
+    shard.variant_actions = Checked(file, "actions", at::kFloat, {-1, 16});
+    const std::int64_t rows = shard.variant_actions.size(0);
+    shard.variant_object_px = Checked(file, "object_px", at::kFloat, {rows, views(), 2});
+    const auto* starts = start.data_ptr<std::int64_t>();
+    for (std::int64_t i = 0; i < count; ++i) {
+      const std::int64_t of = clip.data_ptr<std::int64_t>()[i];
+      if (of < 0 || of >= clips || starts[i] < 0 || starts[i + 1] <= starts[i] || starts[i + 1] > rows)
+        throw TensorError(path.string() + ": variant " + std::to_string(i) + " is of clip " + std::to_string(of) + " of " +
+                          std::to_string(clips) + " and has rows " + std::to_string(starts[i]) + " to " +
+                          std::to_string(starts[i + 1]) + " of " + std::to_string(rows));
+      variants_.push_back({index, shard.clip_start.data_ptr<std::int64_t>()[of], starts[i], starts[i + 1] - starts[i],
+                           outcome.data_ptr<std::int8_t>()[i]});
+    }
   }
 }
 

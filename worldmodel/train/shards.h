@@ -20,6 +20,14 @@ struct Clip {
   std::int8_t outcome = -1;  ///< 1 success, 0 failure, -1 unknown
 };
 
+/// The same scene again, told something else (`evac vary`): seen by nobody but in the clip's first picture.
+struct Variant {
+  std::size_t shard = 0;
+  std::int64_t picture = 0;            ///< the row of the shard whose picture it begins with
+  std::int64_t first = 0, frames = 0;  ///< rows of the shard's variants
+  std::int8_t outcome = -1;
+};
+
 /// The tensors of one file, F frames of V views.
 struct Shard {
   std::filesystem::path path;
@@ -32,6 +40,7 @@ struct Shard {
   Tensor k;                   ///< [F, V, 3, 3] pixels of the stored picture
   Tensor object_px;           ///< [F, V, 2], not a number where unknown
   Tensor contact;             ///< [F] bytes
+  Tensor variant_actions, variant_object_px;  ///< [R, 16], [R, V, 2]; undefined before OpenVariants, and where there are none
   Tensor latents, map_latents;  ///< [F, V, z, h, w] half, scaled; undefined before OpenLatents
 };
 
@@ -52,6 +61,11 @@ class ShardSet {
   /// @throws TensorError if a shard has no latents yet, they are of another size, or of different codecs
   void OpenLatents(std::int64_t z, std::int64_t stride);
 
+  /// Reads the variants of those shards that have some.
+  /// @throws TensorError if they are of another packing, misshapen, or of clips that are not there
+  void OpenVariants();
+
+  const std::vector<Variant>& variants() const { return variants_; }
   const std::vector<Shard>& shards() const { return shards_; }
   const std::vector<Clip>& clips() const { return clips_; }
   /// Of all its shards: period_s, cameras, arms, pose_map, delta_frames, statistics; and those of the folders with
@@ -70,6 +84,7 @@ class ShardSet {
 
   std::vector<Shard> shards_;
   std::vector<Clip> clips_;
+  std::vector<Variant> variants_;
   std::vector<std::string> tasks_;
   TensorMetadata metadata_;
   std::string codec_;
@@ -77,6 +92,10 @@ class ShardSet {
 
 /// The file of the latents that belong to a shard.
 std::filesystem::path LatentsPath(const std::filesystem::path& shard);
+/// The file of its variants.
+std::filesystem::path VariantsPath(const std::filesystem::path& shard);
+/// Whether a packing has shards of a split. @throws TensorError if it is not done.
+bool HasSplit(const std::filesystem::path& folder, Split split);
 /// Every shard of a folder, in order. @throws TensorError if the packing is not done.
 std::vector<std::filesystem::path> ShardPaths(const std::filesystem::path& folder);
 

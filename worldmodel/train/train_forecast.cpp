@@ -34,7 +34,9 @@ TrainerSummary TrainForecast(const JobPlace& place, const ForecastOptions& given
   ForecastOptions options = given;
   if (!place.config.object_forecast)
     throw TensorError("the page of sizes has object_forecast: false, wanted true");
-  const ShardSet shards(place.shards, Split::kTrain), holdout(place.shards, Split::kHoldout);
+  ShardSet shards(place.shards, Split::kTrain);
+  shards.OpenVariants();
+  const ShardSet holdout(place.shards, Split::kHoldout);
   nn::CheckShape("the shards' pictures", shards.shards().front().frames,
                  {-1, place.config.views, place.config.image_height_px, place.config.image_width_px, 3});
   nn::RandomWeights random(options.job.trainer.seed);
@@ -44,7 +46,10 @@ TrainerSummary TrainForecast(const JobPlace& place, const ForecastOptions& given
   const TrainableWeights& weights = workers.front().weights;
   const ForecastTraining measuring(holdout, place.config, options.forecast);
   options.job.trainer.identity =
-      IdentityOf(SettingsOf(options)) + shards.metadata().at("recipe") + " workers " + std::to_string(workers.size());
+      IdentityOf(SettingsOf(options)) + shards.metadata().at("recipe") + " workers " + std::to_string(workers.size()) +
+      (shards.variants().empty() ? "" : " variants " + std::to_string(shards.variants().size()));
+  if (place.say && !shards.variants().empty())
+    place.say(std::to_string(shards.variants().size()) + " variants beside " + std::to_string(shards.clips().size()) + " clips");
   Trainer trainer(weights.all(), options.job.trainer, place.out);
   for (std::size_t i = 1; i < workers.size(); ++i)
     trainer.AddReplica(

@@ -6,6 +6,7 @@
 #include "worldmodel/nn/frame_actions.h"
 #include "worldmodel/nn/hand_views.h"
 #include "worldmodel/nn/weight_keys.h"
+#include "worldmodel/train/forecast_training.h"
 #include "worldmodel/train/reach.h"
 
 namespace evac::train {
@@ -33,8 +34,6 @@ void Check(const WorldTrainingOptions& o, const nn::ModelConfig& config) {
     throw TensorError("world training: first_image is false, wanted true: unet.hand_views reads the oldest memory");
   if (config.object_forecast && !o.windows.first_image)
     throw TensorError("world training: first_image is false, wanted true: object_forecast reads the oldest memory");
-  if (!o.train_hand_turns && !config.unet.hand_turns)
-    throw TensorError("world training: train_hand_turns is false, and the model has no unet.hand_turns");
   if (o.self_memory_chunks < 1)
     throw TensorError("world training: self_memory_chunks is " + std::to_string(o.self_memory_chunks) +
                       ", wanted at least 1");
@@ -46,9 +45,6 @@ void Check(const WorldTrainingOptions& o, const nn::ModelConfig& config) {
 }  // namespace
 
 bool IsTrained(const std::string& key, const WorldTrainingOptions& options) {
-  for (const char* part : {"hand_turn_eye.", "hand_turn_embedding."}) {
-    if (key.starts_with(std::string("model.diffusion_model.") + part)) return options.train_hand_turns;
-  }
   if (key.starts_with("model.diffusion_model.") || key.starts_with("image_proj_model.")) return true;
   if (key.starts_with("cond_stage_model.")) return options.train_action_resampler;
   return key.starts_with("embedder.") && options.train_image_encoder;
@@ -110,14 +106,17 @@ nn::UNet::Context WorldTraining::ContextOf(const Tensor& tokens, const WorldBatc
   if (model_.config().unet.frame_actions) context.frames = nn::FrameActions(batch.arms, batch.memory);
   if (model_.config().unet.hand_views > 0)
     context.hands = nn::HandViews(batch.images, batch.direction, batch.origin, batch.arms);
-  if (model_.config().unet.hand_turns)
-    context.turns = nn::TurnViews(batch.images, batch.direction, batch.origin, batch.arms, batch.turns);
   return context;
 }
 
 Tensor WorldTraining::ObjectMapsOf(const WorldBatch& batch) const {
   if (!model_.object_forecast()) return {};
-  return model_.object_forecast()->Maps({batch.images, batch.direction, batch.origin, batch.arms, batch.turns});
+  const at::NoGradGuard no_gradients;
+  const nn::ObjectForecast& forecast = *model_.object_forecast();
+  const nn::ObjectForecast::Scenes scenes{batch.images, batch.direction, batch.origin, batch.arms, batch.turns};
+  if (!options_.show_end_that_came) return forecast.Maps(scenes);
+  const nn::ObjectForecast::Answer answer = forecast(scenes);
+  return forecast.MapsOf(answer, EndThatCame(answer, batch.object.transpose(1, 2) - 0.5, model_.config()));
 }
 
 Tensor WorldTraining::TokensOf(const WorldBatch& batch) const {
@@ -178,7 +177,6 @@ Tensor WorldTraining::LossOf(const WorldBatch& given, const Drops& drops, const 
   if (model_.object_forecast()) step.concat.object = ObjectMapsOf(given) * PerRow(drops.image, 5);
   if (step.context.frames.defined()) step.context.frames = step.context.frames * PerRow(drops.actions, 3);
   if (step.context.hands.defined()) step.context.hands = step.context.hands * PerRow(drops.actions, 4);
-  if (step.context.turns.defined()) step.context.turns = step.context.turns * PerRow(drops.actions, 5);
   if (noisy_memory && options_.memory_noise_kind == MemoryNoise::kPublished) {
     std::vector<float> angles;
     for (std::int64_t i = 0; i < rows * n; ++i) angles.push_back(static_cast<float>(dice.Uniform(-1.57, 1.57)));

@@ -50,7 +50,8 @@ struct WorldTrainingOptions {
 
   bool train_action_resampler = false;  ///< the paper's page freezes it, its text trains it
   bool train_image_encoder = false;     ///< there is no pretrained one of a small size
-  bool train_hand_turns = true;         ///< what `hand_turns` make of what is shown; false: trained before, on other recordings
+  bool show_end_that_came = true;  ///< with `object_forecast`: the map of the end that came, so that the network draws what it
+                                   ///< is told; false: of the likeliest, as it is asked later
 };
 
 /// Whether training moves a parameter; what nothing reads stays.

@@ -1,0 +1,21 @@
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+
+namespace evac {
+
+struct VaryArguments {
+  std::filesystem::path shards, collection, recipe;
+  int count = 4;  ///< variants of each clip
+  std::uint64_t seed = 1;
+  int jobs = 0;  ///< clips at the same time; 0: one per core. Changes no byte
+};
+
+/// Does what each clip's arms were told again and again in its scene, each time a little differently (variation.h), and
+/// writes what came of it beside the shard: variants_00000.safetensors (docs/formats/shards.md). Nothing is drawn.
+/// Files that are there, made of the same, are not made again.
+/// @throws InvalidInput if the shards are not of this collection, or the collection not of this recipe
+void VaryShards(const VaryArguments& arguments);
+
+}  // namespace evac
