@@ -51,7 +51,9 @@ class VariedCollection {
 
   /// @throws InvalidInput if the recipe would not have made that episode
   CollectJob JobOf(std::int64_t recording) const {
-    const std::string& name = names_.at(static_cast<std::size_t>(recording));
+    if (recording < 0 || recording >= std::ssize(names_))
+      throw InvalidInput("shards.json names {} recordings, a clip is of recording {}: wanted one of them", names_.size(), recording);
+    const std::string& name = names_[static_cast<std::size_t>(recording)];
     const std::size_t slash = name.find('/');
     if (slash == std::string::npos) throw InvalidInput("recording '{}' is none of a collection's", name);
     const fs::path path = RowPath({collection_, name.substr(0, slash), name.substr(slash + 1)});
