@@ -1,5 +1,8 @@
+#include <ATen/ops/zeros_like.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+
+#include <cmath>
 
 #include "tests/nn/support.h"
 #include "worldmodel/nn/attention.h"
@@ -113,6 +116,60 @@ TEST_F(Network, GuidanceLeavesActionsMapsAndRaysAndTakesTheImageAway) {
   EXPECT_EQ(without.concat.mask.narrow(2, 2, 3).abs().sum().item<double>(), 0);
   EXPECT_TRUE(without.concat.image.narrow(2, 0, 2).equal(request.memory));
   EXPECT_EQ(with.concat.pose_map.narrow(2, 0, 2).abs().sum().item<double>(), 0);
+}
+
+ModelConfig CountsFromTheLastFrame(double unchanged_below) {
+  ModelConfig config = TinyConfig();
+  config.schedule.from_last_frame = true;
+  config.schedule.unchanged_below = unchanged_below;
+  return config;
+}
+
+TEST(Unchanged, IsWhatIsNearerThanTheLimitAndInPartWhatIsNearerThanTwice) {
+  const NoiseSchedule schedule(CountsFromTheLastFrame(0.2).schedule);
+  const Tensor still = Noise({1, 2, 1, 1, 4}, 1);
+  Tensor change = at::zeros_like(still);  // of four places: two numbers each
+  const float far[] = {0.19F, 0.3F, 0.41F, 3.0F};
+  for (int place = 0; place < 4; ++place) {
+    change[0][0][0][0][place] = far[place];
+    change[0][1][0][0][place] = -far[place];  // the root mean square is `far`
+  }
+  const Tensor left = LeaveUnchanged(schedule, still + change, still) - still;
+  EXPECT_EQ(left[0][0][0][0][0].item<float>(), 0);
+  EXPECT_EQ(left[0][1][0][0][0].item<float>(), 0);
+  EXPECT_NEAR(left[0][0][0][0][1].item<float>(), 0.15, 1e-5) << "half way between once and twice";
+  for (const int place : {2, 3}) {
+    EXPECT_NEAR(left[0][0][0][0][place].item<float>(), far[place], 1e-5);
+    EXPECT_NEAR(left[0][1][0][0][place].item<float>(), -far[place], 1e-5);
+  }
+  const NoiseSchedule off(CountsFromTheLastFrame(0).schedule);
+  EXPECT_TRUE(LeaveUnchanged(off, still + change, still).equal(still + change));
+}
+
+TEST(Unchanged, IsALimitAboveNothingAndOfWhatIsCountedFromTheLastFrame) {
+  EXPECT_NO_THROW(CountsFromTheLastFrame(0.2).Check());
+  EXPECT_THROW(CountsFromTheLastFrame(-0.1).Check(), TensorError);
+  EXPECT_THROW(CountsFromTheLastFrame(std::nan("")).Check(), TensorError);
+  ModelConfig config = CountsFromTheLastFrame(0.2);
+  config.schedule.from_last_frame = false;
+  EXPECT_THROW(config.Check(), TensorError);
+}
+
+TEST_F(Network, WhatChangesByLittleDoesNotAddUp) {
+  const ChunkRequest request = Request(1);
+  ImagineOptions options;
+  options.steps = 2;
+  const auto imagined = [&](double unchanged_below) {
+    HashWeights weights;
+    const EvacModel model(weights, CountsFromTheLastFrame(unchanged_below));
+    const DrawNoise step = [] { return Noise({1, 4, 5, 8, 12}, 8); };
+    return ImagineChunk(model, request, {Noise({1, 4, 3, 8, 12}, 7), step}, options);
+  };
+  const Tensor still = request.memory.narrow(2, 1, 1).expand({-1, -1, 3, -1, -1});
+  const Tensor free = imagined(0), held = imagined(10);
+  EXPECT_GT(LargestDifference(free.narrow(2, 2, 3), still), 1e-3);
+  EXPECT_TRUE(held.narrow(2, 2, 3).equal(still)) << "as far as this network's answers reach";
+  EXPECT_TRUE(held.narrow(2, 0, 2).equal(request.memory));
 }
 
 TEST_F(Network, AChunkStartsWithItsMemoryUntouched) {

@@ -80,6 +80,13 @@ Tensor FromLastFrame(const NoiseSchedule& schedule, const Tensor& v, const Conca
              });
 }
 
+Tensor LeaveUnchanged(const NoiseSchedule& schedule, const Tensor& imagined, const Tensor& still) {
+  const double below = schedule.unchanged_below();
+  if (!(below > 0)) return imagined;
+  const Tensor change = imagined - still, far = change.square().mean(1, true).sqrt();
+  return still + change * (far / below - 1).clamp(0, 1);
+}
+
 Tensor DenoiserInput(const Tensor& x, const Concat& concat) {
   std::vector<Tensor> parts = {x, concat.image, concat.mask, concat.pose_map, concat.direction, concat.origin};
   if (concat.carried.defined()) parts.insert(parts.end(), {concat.carried, concat.seen});

@@ -38,6 +38,11 @@ Tensor DenoiserInput(const Tensor& x, const Concat& concat);
 /// @returns  [BV, z, T, h, w]
 Tensor FromLastFrame(const NoiseSchedule& schedule, const Tensor& v, const Concat& concat, const Tensor& t);
 
+/// What a sampler answers, less what `unchanged_below` takes for no change.
+/// @param imagined  [BV, z, K, h, w]: clean latents of the chunk
+/// @param still     likewise: Concat::still
+Tensor LeaveUnchanged(const NoiseSchedule& schedule, const Tensor& imagined, const Tensor& still);
+
 /// Noise on the memory in training, so that the network bears with its own mistakes later.
 struct TeacherForcing {
   Tensor angle;              ///< [BV, N] in [-1.57, 1.57]: below 0 no noise

@@ -71,10 +71,13 @@ Tensor ImagineChunk(const EvacModel& model, const ChunkRequest& request, const C
   const StepObserver observer = [&](std::int64_t, const Tensor&, const Tensor&) {
     if (options.on_step) options.on_step();
   };
-  if (options.solver == Solver::kDpmSolver)
-    return SampleDpmSolver(model.schedule(), options.steps, start, denoise, &observer);
   const DdimOptions ddim{options.steps, options.eta, options.residual_noise};
-  return SampleDdim(model.schedule(), ddim, start, denoise, noise.step, &observer);
+  const Tensor all = options.solver == Solver::kDpmSolver
+                         ? SampleDpmSolver(model.schedule(), options.steps, start, denoise, &observer)
+                         : SampleDdim(model.schedule(), ddim, start, denoise, noise.step, &observer);
+  const std::int64_t memory = conditioning.memory, chunk = all.size(2) - memory;
+  const Tensor imagined = LeaveUnchanged(model.schedule(), all.narrow(2, memory, chunk), conditioning.concat.still);
+  return at::cat({all.narrow(2, 0, memory), imagined}, 2);
 }
 
 }  // namespace evac::nn

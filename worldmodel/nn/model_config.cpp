@@ -113,6 +113,11 @@ void ModelConfig::Check() const {
                       ": wanted schedule.carry_plane_m as well");
   Require(schedule.carry_frames >= 1 && schedule.carry_frames <= memory, "schedule.carry_frames", schedule.carry_frames,
           "1 … memory = " + std::to_string(memory));
+  if (!(schedule.unchanged_below >= 0 && schedule.unchanged_below <= 10))
+    throw TensorError("schedule.unchanged_below: found" + Field("", schedule.unchanged_below).substr(2) +
+                      ", wanted 0 … 10");
+  if (schedule.unchanged_below > 0 && !schedule.from_last_frame)
+    throw TensorError("schedule.unchanged_below: wanted schedule.from_last_frame: true as well");
   if (!(pose_map.lag_frames >= 0 && pose_map.lag_frames <= 1))
     throw TensorError("pose_map.lag_frames: found" + Field("", pose_map.lag_frames).substr(2) + ", wanted 0 … 1");
   Require(unet.hand_views == 0 || unet.hand_views == views, "unet.hand_views", unet.hand_views,

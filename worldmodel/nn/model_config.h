@@ -92,6 +92,10 @@ struct ScheduleConfig {
   /// The oldest memory frame is carried too and shown beside: z + 1 channels more. In a rollout that is the first picture,
   /// which nobody imagined: what was seen then need not be passed on from one imagined picture to the next.
   bool carry_first = false;
+  /// With from_last_frame: imagined latents nearer than this to "nothing changes" (root mean square over their z numbers,
+  /// which the codec scales to a deviation of about 1) are taken for it, between once and twice as far in part: what each
+  /// chunk changes by a little adds up, and what lies still would fade. 0: nothing is. Not in the paper.
+  double unchanged_below = 0;
 };
 
 /// How pose maps are drawn (spec 2).

@@ -66,7 +66,8 @@ NoiseSchedule::NoiseSchedule(const ScheduleConfig& config)
       from_last_frame_(config.from_last_frame),
       carry_plane_m_(config.carry_plane_m),
       carry_frames_(config.carry_frames),
-      carry_first_(config.carry_first) {
+      carry_first_(config.carry_first),
+      unchanged_below_(config.unchanged_below) {
   if (config.zero_terminal_snr) betas_ = WithZeroTerminal(betas_);
   exact_alphas_cumprod_ = CumulativeProduct(betas_);
   alphas_cumprod_ = Rounded(exact_alphas_cumprod_);

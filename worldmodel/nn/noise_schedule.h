@@ -22,6 +22,7 @@ class NoiseSchedule {
   std::optional<double> carry_plane_m() const { return carry_plane_m_; }
   std::int64_t carry_frames() const { return carry_frames_; }
   bool carry_first() const { return carry_first_; }
+  double unchanged_below() const { return unchanged_below_; }
 
   /// A buffer that a checkpoint carries: the key and its float values.
   struct Buffer {
@@ -44,6 +45,7 @@ class NoiseSchedule {
   std::optional<double> carry_plane_m_;
   std::int64_t carry_frames_;
   bool carry_first_;
+  double unchanged_below_;
 };
 
 /// v-prediction (Salimans and Ho 2022): three ways to say the same of x_t = √ā x0 + √(1 - ā) ε.

@@ -212,7 +212,8 @@ Tensor WorldTraining::ImagineOnce(const WorldBatch& batch, Dice& dice) const {
   const nn::UNet::Input input{nn::DenoiserInput(x, concat), t, batch.views, n};
   const Tensor answer = model_.unet()(input, model_.unet().Prepare(ContextOf(TokensOf(batch), batch)));
   const Tensor v = nn::FromLastFrame(model_.schedule(), answer, concat, t);
-  return nn::CleanFrom(x, v, model_.schedule().AlphaBar(last)).narrow(2, n, chunk) / scale;
+  const Tensor imagined = nn::CleanFrom(x, v, model_.schedule().AlphaBar(last)).narrow(2, n, chunk) / scale;
+  return nn::LeaveUnchanged(model_.schedule(), imagined, concat.still);
 }
 
 void WorldTraining::RememberOwn(const std::vector<Window>& windows, double share, std::int64_t chunks,
