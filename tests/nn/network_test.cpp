@@ -148,7 +148,8 @@ TEST(Unchanged, IsWhatIsNearerThanTheLimitAndInPartWhatIsNearerThanTwice) {
 
 TEST(Unchanged, IsALimitAboveNothingAndOfWhatIsCountedFromTheLastFrame) {
   EXPECT_NO_THROW(CountsFromTheLastFrame(0.2).Check());
-  EXPECT_THROW(CountsFromTheLastFrame(-0.1).Check(), TensorError);
+  EXPECT_THAT([] { CountsFromTheLastFrame(-0.1).Check(); },
+              testing::ThrowsMessage<TensorError>(testing::HasSubstr("found -0.1, wanted 0")));
   EXPECT_THROW(CountsFromTheLastFrame(std::nan("")).Check(), TensorError);
   ModelConfig config = CountsFromTheLastFrame(0.2);
   config.schedule.from_last_frame = false;

@@ -62,11 +62,13 @@ void CheckEncoder(const ImageEncoderConfig& clip) {
   Require(clip.image_px % clip.patch_px == 0, "clip.image", clip.image_px, "a multiple of clip.patch");
 }
 
-std::string Field(const char* name, double value) {
-  char text[64];
-  std::snprintf(text, sizeof text, " %s=%.6g", name, value);
+std::string Number(double value) {
+  char text[32];
+  std::snprintf(text, sizeof text, "%.6g", value);
   return text;
 }
+
+std::string Field(const char* name, double value) { return std::string(" ") + name + "=" + Number(value); }
 
 }  // namespace
 
@@ -114,12 +116,11 @@ void ModelConfig::Check() const {
   Require(schedule.carry_frames >= 1 && schedule.carry_frames <= memory, "schedule.carry_frames", schedule.carry_frames,
           "1 … memory = " + std::to_string(memory));
   if (!(schedule.unchanged_below >= 0 && schedule.unchanged_below <= 10))
-    throw TensorError("schedule.unchanged_below: found" + Field("", schedule.unchanged_below).substr(2) +
-                      ", wanted 0 … 10");
+    throw TensorError("schedule.unchanged_below: found " + Number(schedule.unchanged_below) + ", wanted 0 … 10");
   if (schedule.unchanged_below > 0 && !schedule.from_last_frame)
     throw TensorError("schedule.unchanged_below: wanted schedule.from_last_frame: true as well");
   if (!(pose_map.lag_frames >= 0 && pose_map.lag_frames <= 1))
-    throw TensorError("pose_map.lag_frames: found" + Field("", pose_map.lag_frames).substr(2) + ", wanted 0 … 1");
+    throw TensorError("pose_map.lag_frames: found " + Number(pose_map.lag_frames) + ", wanted 0 … 1");
   Require(unet.hand_views == 0 || unet.hand_views == views, "unet.hand_views", unet.hand_views,
           "0, or views = " + std::to_string(views));
   Require(unet.out_channels == vae.z_channels, "unet.out_channels", unet.out_channels, "vae.z_channels");
