@@ -156,6 +156,39 @@ TEST(Unchanged, IsALimitAboveNothingAndOfWhatIsCountedFromTheLastFrame) {
   EXPECT_THROW(config.Check(), TensorError);
 }
 
+/// Of two ends, `share` of the time 1 and else 0, in all channels of a place: which answer errs least.
+double LeastErring(double share, double squared_below) {
+  double best = 0, least = INFINITY;
+  for (int i = 0; i <= 100; ++i) {
+    const double answer = i / 100.0;
+    const auto error = [&](double end) {
+      return ErrorsOfPlaces(at::full({1, 3, 1, 1, 1}, answer), at::full({1, 3, 1, 1, 1}, end), squared_below)
+          .item<double>();
+    };
+    const double mean = share * error(1) + (1 - share) * error(0);
+    if (mean < least) least = mean, best = answer;
+  }
+  return best;
+}
+
+TEST(ErrorsOfPlaces, SquaredAskForTheMeanOfTwoEndsAndBySizeForTheLikelier) {
+  EXPECT_NEAR(LeastErring(0.6, 0), 0.6, 1e-9);
+  EXPECT_GT(LeastErring(0.6, 0.1), 0.85);
+  EXPECT_LT(LeastErring(0.4, 0.1), 0.15);
+  EXPECT_NEAR(LeastErring(0.6, 100), 0.6, 0.02) << "far below the limit errors are squared";
+}
+
+TEST(ErrorsOfPlaces, AreOfAllChannelsTogether) {
+  const Tensor wanted = Noise({2, 4, 3, 2, 2}, 1), found = Noise({2, 4, 3, 2, 2}, 2);
+  const Tensor squared = (found - wanted).square().mean(1, true);
+  EXPECT_LT(LargestDifference(ErrorsOfPlaces(found, wanted, 0), squared), 1e-6);
+  const Tensor errors = ErrorsOfPlaces(found, wanted, 0.5);
+  EXPECT_EQ(errors.sizes(), squared.sizes());
+  EXPECT_TRUE((errors < squared).all().item<bool>());
+  EXPECT_LT(LargestDifference(errors, (squared + 0.25).sqrt() - 0.5), 1e-6);
+  EXPECT_EQ(ErrorsOfPlaces(wanted, wanted, 0.5).abs().max().item<double>(), 0);
+}
+
 TEST_F(Network, WhatChangesByLittleDoesNotAddUp) {
   const ChunkRequest request = Request(1);
   ImagineOptions options;

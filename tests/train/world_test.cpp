@@ -132,6 +132,7 @@ TEST(TrainWorld, TheLossFallsWithEverythingThatThePaperLacks) {
   options.step_weight = "clean";
   options.world.windows.closing_share = 0.5;
   options.world.reach_weight = 4;
+  options.world.squared_below = 0.2;
   options.world.object_weight = 4;
   options.world.change_weight = 2;
   options.world.self_memory_share = 0.5;

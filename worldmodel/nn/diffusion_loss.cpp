@@ -95,6 +95,12 @@ Tensor DenoiserInput(const Tensor& x, const Concat& concat) {
   return at::cat(parts, 1);
 }
 
+Tensor ErrorsOfPlaces(const Tensor& found, const Tensor& wanted, double squared_below) {
+  const Tensor squared = (found - wanted).square().mean(1, true);
+  if (!(squared_below > 0)) return squared;
+  return ((squared + squared_below * squared_below).sqrt() - squared_below) * (2 * squared_below);
+}
+
 Tensor DiffusionLoss(const EvacModel& model, const DiffusionBatch& batch) {
   const UNet& unet = model.unet();
   const NoiseSchedule& schedule = model.schedule();
@@ -112,8 +118,8 @@ Tensor DiffusionLoss(const EvacModel& model, const DiffusionBatch& batch) {
   const UNet::Input input{DenoiserInput(seen, concat), t, batch.context.views, batch.memory};
   const Tensor v = FromLastFrame(schedule, unet(input, unet.Prepare(batch.context)), concat, t);
   const Tensor found = v.narrow(2, batch.memory, chunk), wanted = target.narrow(2, batch.memory, chunk);
-  if (!batch.weight.defined()) return at::mse_loss(found, wanted);
-  return ((found - wanted).square() * batch.weight).mean();
+  const Tensor errors = ErrorsOfPlaces(found, wanted, batch.squared_below);
+  return (batch.weight.defined() ? errors * batch.weight : errors).mean();
 }
 
 }  // namespace evac::nn

@@ -58,10 +58,19 @@ struct DiffusionBatch {
   Tensor noise;             ///< [BV, z, T, h, w]
   std::int64_t memory = 0;  ///< N
   std::optional<TeacherForcing> teacher_forcing;
-  Tensor weight = {};  ///< of the squared errors, to be broadcast to [BV, z, K, h, w]; undefined: 1
+  Tensor weight = {};        ///< of the errors, to be broadcast to [BV, 1, K, h, w]; undefined: 1
+  double squared_below = 0;  ///< as in ErrorsOfPlaces
 };
 
-/// Mean squared error of v over the frames to imagine, weighted. @returns a number, differentiable.
+/// How much each place errs: the mean e² of its channels' squared errors, or, with `squared_below` c > 0, 2 c (√(e² + c²) - c):
+/// e² where e is far below c, 2 c e far above (pseudo-Huber, of a place's channels together). What makes the former least is
+/// the mean of all that may come, a thing half there; what makes the latter least is near the likelier of two ends.
+/// @param found   [BV, z, K, h, w]
+/// @param wanted  likewise
+/// @returns       [BV, 1, K, h, w], differentiable
+Tensor ErrorsOfPlaces(const Tensor& found, const Tensor& wanted, double squared_below);
+
+/// Mean error of v over the frames to imagine, weighted. @returns a number, differentiable.
 Tensor DiffusionLoss(const EvacModel& model, const DiffusionBatch& batch);
 
 }  // namespace evac::nn

@@ -127,6 +127,7 @@ Settings SettingsOf(WorldOptions& options) {
                        {"ratio_to", &w.ratio_to},
                        {"step_weight", &options.step_weight},
                        {"step_weight_cap", &w.step_weight_cap},
+                       {"squared_below", &w.squared_below},
                        {"reach_weight", &w.reach_weight},
                        {"object_weight", &w.object_weight},
                        {"object_radius", &w.object_radius},

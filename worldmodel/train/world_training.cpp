@@ -37,6 +37,8 @@ void Check(const WorldTrainingOptions& o, const nn::ModelConfig& config) {
   if (o.self_memory_chunks < 1)
     throw TensorError("world training: self_memory_chunks is " + std::to_string(o.self_memory_chunks) +
                       ", wanted at least 1");
+  if (!(o.squared_below >= 0))
+    throw TensorError("world training: squared_below is " + std::to_string(o.squared_below) + ", wanted 0 or more");
   if (o.log_uniform && !(o.ratio_from > 0 && o.ratio_to > o.ratio_from))
     throw TensorError("world training: noise / signal from " + std::to_string(o.ratio_from) + " to " +
                       std::to_string(o.ratio_to) + ", wanted 0 < from < to");
@@ -194,6 +196,7 @@ Tensor WorldTraining::LossOf(const WorldBatch& given, const Drops& drops, const 
   }
   nn::Remember(model_, step.latents.narrow(2, 0, n), step.concat);
   step.weight = Weight(batch, step.concat.still, t);
+  step.squared_below = options_.squared_below;
   return nn::DiffusionLoss(model_, step);
 }
 

@@ -36,6 +36,7 @@ struct WorldTrainingOptions {
 
   StepWeight step_weight = StepWeight::kVelocity;
   double step_weight_cap = 3;
+  double squared_below = 0;  ///< of an error of v at a place: nn::ErrorsOfPlaces; 0: the paper's squares
   double reach_weight = 0;   ///< more of latents where the object may be: WithinReach (reach.h)
   double object_weight = 0;  ///< more of latents at the object: a bell of `object_radius` latent pixels
   double object_radius = 1;
