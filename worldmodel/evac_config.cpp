@@ -96,7 +96,8 @@ void ReadOurEncoder(const Config& page, nn::ImageEncoderConfig& encoder) {
 void ReadOurSchedule(const Config& page, nn::ScheduleConfig& schedule) {
   page.AllowOnly(
       {"steps", "linear_start", "linear_end", "zero_terminal_snr", "dynamic_rescale", "base_scale", "turning_step",
-       "from_last_frame", "carry_plane_m", "carry_frames", "carry_first", "unchanged_below"});
+       "from_last_frame", "carry_plane_m", "carry_frames", "carry_unless_changed", "carry_first",
+       "unchanged_below"});
   Read(page, "steps", schedule.steps);
   Read(page, "linear_start", schedule.linear_start);
   Read(page, "linear_end", schedule.linear_end);
@@ -106,6 +107,7 @@ void ReadOurSchedule(const Config& page, nn::ScheduleConfig& schedule) {
   Read(page, "turning_step", schedule.turning_step);
   Read(page, "from_last_frame", schedule.from_last_frame);
   Read(page, "carry_frames", schedule.carry_frames);
+  Read(page, "carry_unless_changed", schedule.carry_unless_changed);
   Read(page, "carry_first", schedule.carry_first);
   Read(page, "unchanged_below", schedule.unchanged_below);
   if (page.Has("carry_plane_m")) schedule.carry_plane_m = page.Get<double>("carry_plane_m");

@@ -225,6 +225,104 @@ TEST(CarriedFrame, AnOlderFrameAddsNothingToWhatTheNewestShows) {
   }
 }
 
+/// A scene of a head's and a wrist's view: two frames to carry from and one to carry to. The wrist's older frame shows, of
+/// its last, the columns kWidth - 2 and kWidth - 1, which its newest does not; the head is where the wrist is last.
+struct HeadAndWrist {
+  explicit HeadAndWrist(double unless_changed) {
+    config.views = 2;
+    config.vae.scale_factor = 0.5;
+    config.schedule.from_last_frame = true;
+    config.schedule.carry_plane_m = 0;
+    config.schedule.carry_frames = 2;
+    config.schedule.carry_unless_changed = unless_changed;
+    config.unet.in_channels += config.vae.z_channels + 1;
+    config.Check();
+    latents = (Noise({1, config.vae.z_channels, 1, kHeight, kWidth}, 7) * 0.3).expand({2, -1, 2, -1, -1});
+  }
+
+  /// The head sees this place change by this much from the older frame to the newest.
+  void Change(std::int64_t y, std::int64_t x, double by) {
+    latents = latents.clone();
+    latents.select(0, 0).select(1, 1).select(1, y).select(1, x).add_(by);
+  }
+
+  /// What the wrist's last place sees.
+  CarriedFrame Carry(const Tensor& noiseless = {}) const {
+    const EvacModel model(weights, config);
+    const Rays of_head({older_head, head, head}), of_wrist({{.x_m = 0.4}, {}, {.x_m = 0.2}});
+    const CarriedFrame both =
+        CarryLatentsAlongPlane(model, latents, at::cat({of_head.direction, of_wrist.direction}),
+                               at::cat({of_head.origin, of_wrist.origin}), 0, 2, 0, noiseless);
+    return {both.frames.narrow(0, 1, 1), both.seen.narrow(0, 1, 1), {}};
+  }
+
+  mutable HashWeights weights;
+  ModelConfig config = TinyConfig();
+  Camera head{.x_m = 0.2}, older_head = head;
+  Tensor latents;
+};
+
+TEST(CarriedFrame, WhatAnotherViewSawTakenIsNotShownWhereItWas) {
+  HeadAndWrist given(0.4);
+  const CarriedFrame before = given.Carry();
+  const Tensor seen_before = before.seen[0][0][0];
+  ASSERT_TRUE((seen_before.narrow(1, kWidth - 2, 2) == kOlder).all().item<bool>());
+  given.Change(1, kWidth - 1, 1);
+  const CarriedFrame after = given.Carry();
+  Tensor wanted = seen_before.clone();
+  wanted.narrow(0, 0, 3).narrow(1, kWidth - 2, 2).zero_();  // there and next to it
+  EXPECT_TRUE(after.seen[0][0][0].equal(wanted)) << after.seen[0][0][0];
+  EXPECT_FALSE(at::allclose(after.frames, before.frames, 1e-2, 1e-2));
+}
+
+TEST(CarriedFrame, WhatStaysIsShownByOlderFrames) {
+  const HeadAndWrist unchanged(0.4);
+  const CarriedFrame wanted = unchanged.Carry();
+  HeadAndWrist little(0.4), not_asked(0), in_view_of_newest(0.4), head_moved(0.4), noise(0.4);
+  little.Change(1, kWidth - 1, 0.39);
+  not_asked.Change(1, kWidth - 1, 1);
+  in_view_of_newest.Change(1, 2, 1);
+  head_moved.Change(1, kWidth - 1, 1);
+  head_moved.older_head.y_m = 0.1;
+  noise.Change(1, kWidth - 1, 1);
+  for (const HeadAndWrist* given : {&little, &not_asked, &in_view_of_newest, &head_moved})
+    EXPECT_TRUE(given->Carry().seen.equal(wanted.seen));
+  EXPECT_TRUE(noise.Carry(unchanged.latents).seen.equal(wanted.seen));
+  EXPECT_TRUE(little.Carry().frames.equal(wanted.frames));
+}
+
+TEST(CarriedFrame, EachSceneIsAskedOfItsOwnOtherView) {
+  HeadAndWrist changed(0.4);
+  const HeadAndWrist unchanged(0.4);
+  changed.Change(1, kWidth - 1, 1);
+  const Rays of_head({changed.head, changed.head, changed.head}), of_wrist({{.x_m = 0.4}, {}, {.x_m = 0.2}});
+  const Tensor direction = at::cat({of_head.direction, of_wrist.direction}),
+               origin = at::cat({of_head.origin, of_wrist.origin});
+  const EvacModel model(changed.weights, changed.config);
+  const CarriedFrame scenes =
+      CarryLatentsAlongPlane(model, at::cat({unchanged.latents, changed.latents, unchanged.latents}),
+                             direction.repeat({3, 1, 1, 1, 1}), origin.repeat({3, 1, 1, 1, 1}), 0, 2, 0);
+  EXPECT_TRUE(scenes.seen[1].equal(unchanged.Carry().seen[0]));
+  EXPECT_TRUE(scenes.seen[3].equal(changed.Carry().seen[0]));
+  EXPECT_TRUE(scenes.seen[5].equal(unchanged.Carry().seen[0]));
+  EXPECT_THROW(CarryLatentsAlongPlane(model, unchanged.latents.narrow(0, 1, 1), of_wrist.direction, of_wrist.origin, 0,
+                                      2, 0),
+               TensorError)
+      << "a wrist without its head";
+}
+
+TEST(CarriedFrame, AskingAnotherViewWantsAnotherViewAndOlderFrames) {
+  const auto refused = [](auto change) {
+    ModelConfig config = HeadAndWrist(0.4).config;
+    change(config);
+    EXPECT_THROW(config.Check(), TensorError);
+  };
+  refused([](ModelConfig& config) { config.views = 1; });
+  refused([](ModelConfig& config) { config.schedule.carry_frames = 1; });
+  refused([](ModelConfig& config) { config.schedule.carry_unless_changed = -0.1; });
+  refused([](ModelConfig& config) { config.schedule.carry_unless_changed = std::nan(""); });
+}
+
 TEST(CarriedFrame, NoMoreAreCarriedThanAreRemembered) {
   ModelConfig config = TinyConfig();
   config.schedule.carry_frames = 2;

@@ -2,6 +2,7 @@
 
 #include <ATen/ops/grid_sampler_2d.h>
 #include <ATen/ops/linalg_inv.h>
+#include <ATen/ops/max_pool2d.h>
 #include <ATen/ops/where.h>
 
 #include <cmath>
@@ -120,6 +121,51 @@ void FillIn(CarriedFrame& of, const CarriedFrame& older, const Tensor& rows) {
   of.shown.index_copy_(0, rows, shown.logical_or(older.shown));
 }
 
+/// Memory frames and where they and later ones are seen from: parameters of CarryLatentsAlongPlane.
+struct Memories {
+  const Tensor &latents, &direction, &origin;
+  std::int64_t at, first;
+};
+
+/// What another view of the same scene saw change from memory frame `frame` to the newest, as later cameras of `rows`
+/// would see it: nothing where the other camera itself moved meanwhile.
+/// @param beside  as long as `rows`: the other view of each
+/// @returns       [R, 1, K, h, w], of bools
+Tensor ChangedBeside(const Memories& memories, std::int64_t frame, const Tensor& rows, const Tensor& beside,
+                     double limit, double plane_m) {
+  const std::int64_t last = memories.latents.size(2) - 1, newest = memories.at + last;
+  const Tensor change = (memories.latents.select(2, last) - memories.latents.select(2, frame)).index_select(0, beside);
+  const Tensor changed = (change.to(at::kFloat).square().mean(1, true).sqrt() > limit).to(at::kFloat);
+  const Tensor and_around = at::max_pool2d(changed, {3, 3}, {1, 1}, {1, 1}).contiguous();
+  const auto sequence = [&](const Tensor& of) {  // the other camera, then this one later
+    const Tensor later = of.index_select(0, rows).narrow(2, memories.first, of.size(2) - memories.first);
+    return at::cat({of.index_select(0, beside).narrow(2, newest, 1), later}, 2);
+  };
+  const CarriedFrame carried =
+      CarryAlongPlane(and_around, sequence(memories.direction), sequence(memories.origin), 0, 1, plane_m);
+  const Tensor still =
+      StandsStill(memories.direction, memories.origin, newest, memories.at + frame, last - frame).index_select(0, beside);
+  return (carried.frames > 0.5).logical_and(carried.seen > 0).logical_and(still.reshape({-1, 1, 1, 1, 1}));
+}
+
+/// Less what any other view of its scene saw change meanwhile.
+CarriedFrame WhereUnchanged(const CarriedFrame& older, const EvacModel& model, const Memories& memories,
+                            std::int64_t frame, const Tensor& rows, double plane_m) {
+  const std::int64_t views = model.config().views, finer = older.shown.size(3) / older.seen.size(3);
+  if (memories.latents.size(0) % views != 0)
+    throw TensorError("carry_unless_changed: found " + std::to_string(memories.latents.size(0)) +
+                      " rows of latents, wanted a multiple of views = " + std::to_string(views));
+  Tensor changed = at::zeros_like(older.seen, at::kBool);
+  for (std::int64_t away = 1; away < views; ++away) {
+    const Tensor view = rows.remainder(views), beside = rows - view + (view + away).remainder(views);
+    changed.logical_or_(
+        ChangedBeside(memories, frame, rows, beside, model.schedule().carry_unless_changed(), plane_m));
+  }
+  const Tensor stayed = changed.logical_not();
+  return {older.frames, older.seen * stayed.to(older.seen.scalar_type()),
+          older.shown.logical_and(stayed.repeat_interleave(finer, 3).repeat_interleave(finer, 4))};
+}
+
 }  // namespace
 
 CarriedFrame CarryAlongPlane(const Tensor& frame, const Tensor& direction, const Tensor& origin, std::int64_t at,
@@ -150,7 +196,8 @@ CarriedFrame CarryAlongPlane(const Tensor& frame, const Tensor& direction, const
 }
 
 CarriedFrame CarryLatentsAlongPlane(const EvacModel& model, const Tensor& latents, const Tensor& direction,
-                                    const Tensor& origin, std::int64_t at, std::int64_t first, double plane_m) {
+                                    const Tensor& origin, std::int64_t at, std::int64_t first, double plane_m,
+                                    const Tensor& noiseless) {
   const std::int64_t rows = latents.size(0), frames = latents.size(2), h = latents.size(3), w = latents.size(4),
                      later = direction.size(2) - first, newest = at + frames - 1;
   const Tensor last = latents.select(2, frames - 1);
@@ -166,11 +213,16 @@ CarriedFrame CarryLatentsAlongPlane(const EvacModel& model, const Tensor& latent
     return CarryAlongPlane(picture, moving_direction.index_select(0, of), moving_origin.index_select(0, of), at + frame,
                            first, plane_m);
   };
+  const Memories memories{noiseless.defined() ? noiseless : latents, direction, origin, at, first};
+  const bool goes_by_change = model.schedule().carry_unless_changed() > 0;
   CarriedFrame pictures = carry(frames - 1, at::arange(moving.numel(), moving.options()));
   for (std::int64_t frame = frames - 2; frame >= 0; --frame) {
     const Tensor elsewhere = StandsStill(moving_direction, moving_origin, at + frame, at + frame + 1, 1).logical_not();
     const Tensor adds = Indices(elsewhere.logical_and(pictures.shown.flatten(1).all(1).logical_not()));
-    if (adds.numel() > 0) FillIn(pictures, carry(frame, adds), adds);
+    if (adds.numel() == 0) continue;
+    const CarriedFrame older = carry(frame, adds);
+    FillIn(pictures, goes_by_change ? WhereUnchanged(older, model, memories, frame, moving.index_select(0, adds), plane_m) : older,
+           adds);
   }
   const Tensor encoded = EncodeImages(model, pictures.frames.transpose(1, 2).flatten(0, 1), Tensor());
   carried.frames.index_copy_(0, moving,

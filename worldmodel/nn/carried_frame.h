@@ -26,11 +26,14 @@ CarriedFrame CarryAlongPlane(const Tensor& frame, const Tensor& direction, const
 /// The same for latents, by way of their pictures: a latent is a square of pixels, and what moved by half of one is
 /// another latent, not the mean of two. Decoded, carried, encoded; what a camera that stands still shows stays what it
 /// is. Of several frames, the newest last, each pixel is of the newest that shows it; where only older ones show a
-/// place, `seen` is kOlder. `shown` is not defined.
-/// @param latents  [BV, z, M, h, w]
-/// @param at       index in T of the rays of the first of them; the others follow
+/// place, `seen` is kOlder; with the schedule's `carry_unless_changed`, no older frame shows a place where another view of
+/// the same scene saw a change since. `shown` is not defined.
+/// @param latents    [BV, z, M, h, w]
+/// @param at         index in T of the rays of the first of them; the others follow
+/// @param noiseless  likewise: what changes are looked for in, if noise was added to `latents`; undefined: `latents`
 CarriedFrame CarryLatentsAlongPlane(const EvacModel& model, const Tensor& latents, const Tensor& direction,
-                                    const Tensor& origin, std::int64_t at, std::int64_t first, double plane_m);
+                                    const Tensor& origin, std::int64_t at, std::int64_t first, double plane_m,
+                                    const Tensor& noiseless = {});
 inline constexpr double kOlder = 0.5;
 
 /// Where points are seen.

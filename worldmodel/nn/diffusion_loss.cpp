@@ -46,7 +46,7 @@ Tensor WithNoisyMemory(const NoiseSchedule& schedule, const Tensor& latents, con
 
 }  // namespace
 
-void Remember(const EvacModel& model, const Tensor& memory, Concat& concat) {
+void Remember(const EvacModel& model, const Tensor& memory, Concat& concat, const Tensor& noiseless) {
   const at::NoGradGuard no_gradients;
   const std::int64_t n = memory.size(2), chunk = concat.mask.size(2) - n;
   const Tensor newest = memory.select(2, n - 1);
@@ -56,7 +56,8 @@ void Remember(const EvacModel& model, const Tensor& memory, Concat& concat) {
   const std::int64_t carried = model.schedule().carry_frames();
   const auto carry = [&](std::int64_t from, std::int64_t count) {
     return CarryLatentsAlongPlane(model, memory.narrow(2, from, count), concat.direction, concat.origin, from, n,
-                                  *model.schedule().carry_plane_m());
+                                  *model.schedule().carry_plane_m(),
+                                  noiseless.defined() ? noiseless.narrow(2, from, count) : noiseless);
   };
   const auto behind_memory = [&](const Tensor& before, const Tensor& later) {
     return at::cat({before, later}, 2) * concat.mask;
@@ -108,7 +109,9 @@ Tensor DiffusionLoss(const EvacModel& model, const DiffusionBatch& batch) {
   const Tensor latents =
       batch.teacher_forcing ? WithNoisyMemory(schedule, batch.latents, *batch.teacher_forcing) : batch.latents;
   Concat concat = batch.concat;
-  if (batch.teacher_forcing || !concat.image.defined()) Remember(model, latents.narrow(2, 0, batch.memory), concat);
+  const auto memory = [&](const Tensor& of) { return of.narrow(2, 0, batch.memory); };
+  if (batch.teacher_forcing || !concat.image.defined())
+    Remember(model, memory(latents), concat, memory(batch.latents));
   const Tensor t = batch.t.repeat_interleave(batch.context.views, 0);  // [BV]
   const Levels levels = LevelsAt(schedule, t, 5);
   const Tensor x = latents * PerRow(t, 5, [&](std::int64_t step) { return schedule.Scale(step); });

@@ -26,7 +26,9 @@ struct Concat {
 
 /// Fills in `image`, `still`, and what is carried if the schedule says so, from the memory [BV, z, N, h, w] and the
 /// rest; without gradients.
-void Remember(const EvacModel& model, const Tensor& memory, Concat& concat);
+/// @param noiseless  likewise [BV, z, N, h, w]: the memory before noise was added to it, which is no change of the scene;
+///                   undefined: none was
+void Remember(const EvacModel& model, const Tensor& memory, Concat& concat, const Tensor& noiseless = {});
 
 /// [BV, in_channels, T, h, w] in the order the network was trained with.
 Tensor DenoiserInput(const Tensor& x, const Concat& concat);

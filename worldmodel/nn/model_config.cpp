@@ -115,6 +115,11 @@ void ModelConfig::Check() const {
                       ": wanted schedule.carry_plane_m as well");
   Require(schedule.carry_frames >= 1 && schedule.carry_frames <= memory, "schedule.carry_frames", schedule.carry_frames,
           "1 … memory = " + std::to_string(memory));
+  if (!(schedule.carry_unless_changed >= 0 && schedule.carry_unless_changed <= 10))
+    throw TensorError("schedule.carry_unless_changed: found " + Number(schedule.carry_unless_changed) +
+                      ", wanted 0 … 10");
+  if (schedule.carry_unless_changed > 0 && (schedule.carry_frames < 2 || views < 2))
+    throw TensorError("schedule.carry_unless_changed: wanted schedule.carry_frames and views of 2 or more as well");
   if (!(schedule.unchanged_below >= 0 && schedule.unchanged_below <= 10))
     throw TensorError("schedule.unchanged_below: found " + Number(schedule.unchanged_below) + ", wanted 0 … 10");
   if (schedule.unchanged_below > 0 && !schedule.from_last_frame)

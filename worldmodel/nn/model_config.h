@@ -89,6 +89,10 @@ struct ScheduleConfig {
   /// How many memory frames are carried, 1 … ModelConfig::memory: what the newest does not show is looked for in the one
   /// before it, and so on. Of such places `seen` is one half.
   std::int64_t carry_frames = 1;
+  /// With carry_frames above 1 and views: of an older frame, a place is carried only where no other view of the same scene
+  /// whose camera stood still since saw its latents, or those next to them, change by more than this (root mean square
+  /// over their z numbers): a thing that was taken is not shown where it was. 0: no view is asked. Not in the paper.
+  double carry_unless_changed = 0;
   /// The oldest memory frame is carried too and shown beside: z + 1 channels more. In a rollout that is the first picture,
   /// which nobody imagined: what was seen then need not be passed on from one imagined picture to the next.
   bool carry_first = false;

@@ -66,6 +66,7 @@ NoiseSchedule::NoiseSchedule(const ScheduleConfig& config)
       from_last_frame_(config.from_last_frame),
       carry_plane_m_(config.carry_plane_m),
       carry_frames_(config.carry_frames),
+      carry_unless_changed_(config.carry_unless_changed),
       carry_first_(config.carry_first),
       unchanged_below_(config.unchanged_below) {
   if (config.zero_terminal_snr) betas_ = WithZeroTerminal(betas_);

@@ -21,6 +21,7 @@ class NoiseSchedule {
   bool from_last_frame() const { return from_last_frame_; }
   std::optional<double> carry_plane_m() const { return carry_plane_m_; }
   std::int64_t carry_frames() const { return carry_frames_; }
+  double carry_unless_changed() const { return carry_unless_changed_; }
   bool carry_first() const { return carry_first_; }
   double unchanged_below() const { return unchanged_below_; }
 
@@ -44,6 +45,7 @@ class NoiseSchedule {
   bool from_last_frame_;
   std::optional<double> carry_plane_m_;
   std::int64_t carry_frames_;
+  double carry_unless_changed_;
   bool carry_first_;
   double unchanged_below_;
 };

@@ -194,7 +194,7 @@ Tensor WorldTraining::LossOf(const WorldBatch& given, const Drops& drops, const 
     Tensor memory = step.latents.narrow(2, 0, n);
     memory.add_(dice.Normal(memory.sizes()) * PerRow(deviations, 5));
   }
-  nn::Remember(model_, step.latents.narrow(2, 0, n), step.concat);
+  nn::Remember(model_, step.latents.narrow(2, 0, n), step.concat, batch.latents.narrow(2, 0, n));
   step.weight = Weight(batch, step.concat.still, t);
   step.squared_below = options_.squared_below;
   return nn::DiffusionLoss(model_, step);
