@@ -125,6 +125,7 @@ void FillIn(CarriedFrame& of, const CarriedFrame& older, const Tensor& rows) {
 struct Memories {
   const Tensor &latents, &direction, &origin;
   std::int64_t at, first;
+  double plane_m;
 };
 
 /// What another view of the same scene saw change from memory frame `frame` to the newest, as later cameras of `rows`
@@ -132,7 +133,7 @@ struct Memories {
 /// @param beside  as long as `rows`: the other view of each
 /// @returns       [R, 1, K, h, w], of bools
 Tensor ChangedBeside(const Memories& memories, std::int64_t frame, const Tensor& rows, const Tensor& beside,
-                     double limit, double plane_m) {
+                     double limit) {
   const std::int64_t last = memories.latents.size(2) - 1, newest = memories.at + last;
   const Tensor change = (memories.latents.select(2, last) - memories.latents.select(2, frame)).index_select(0, beside);
   const Tensor changed = (change.to(at::kFloat).square().mean(1, true).sqrt() > limit).to(at::kFloat);
@@ -142,15 +143,15 @@ Tensor ChangedBeside(const Memories& memories, std::int64_t frame, const Tensor&
     return at::cat({of.index_select(0, beside).narrow(2, newest, 1), later}, 2);
   };
   const CarriedFrame carried =
-      CarryAlongPlane(and_around, sequence(memories.direction), sequence(memories.origin), 0, 1, plane_m);
-  const Tensor still =
-      StandsStill(memories.direction, memories.origin, newest, memories.at + frame, last - frame).index_select(0, beside);
-  return (carried.frames > 0.5).logical_and(carried.seen > 0).logical_and(still.reshape({-1, 1, 1, 1, 1}));
+      CarryAlongPlane(and_around, sequence(memories.direction), sequence(memories.origin), 0, 1, memories.plane_m);
+  const Tensor still = StandsStill(memories.direction, memories.origin, newest, memories.at + frame, last - frame);
+  const Tensor counts = still.index_select(0, beside).reshape({-1, 1, 1, 1, 1});
+  return (carried.frames > 0.5).logical_and(carried.seen > 0).logical_and(counts);
 }
 
 /// Less what any other view of its scene saw change meanwhile.
 CarriedFrame WhereUnchanged(const CarriedFrame& older, const EvacModel& model, const Memories& memories,
-                            std::int64_t frame, const Tensor& rows, double plane_m) {
+                            std::int64_t frame, const Tensor& rows) {
   const std::int64_t views = model.config().views, finer = older.shown.size(3) / older.seen.size(3);
   if (memories.latents.size(0) % views != 0)
     throw TensorError("carry_unless_changed: found " + std::to_string(memories.latents.size(0)) +
@@ -158,8 +159,7 @@ CarriedFrame WhereUnchanged(const CarriedFrame& older, const EvacModel& model, c
   Tensor changed = at::zeros_like(older.seen, at::kBool);
   for (std::int64_t away = 1; away < views; ++away) {
     const Tensor view = rows.remainder(views), beside = rows - view + (view + away).remainder(views);
-    changed.logical_or_(
-        ChangedBeside(memories, frame, rows, beside, model.schedule().carry_unless_changed(), plane_m));
+    changed.logical_or_(ChangedBeside(memories, frame, rows, beside, model.schedule().carry_unless_changed()));
   }
   const Tensor stayed = changed.logical_not();
   return {older.frames, older.seen * stayed.to(older.seen.scalar_type()),
@@ -213,16 +213,16 @@ CarriedFrame CarryLatentsAlongPlane(const EvacModel& model, const Tensor& latent
     return CarryAlongPlane(picture, moving_direction.index_select(0, of), moving_origin.index_select(0, of), at + frame,
                            first, plane_m);
   };
-  const Memories memories{noiseless.defined() ? noiseless : latents, direction, origin, at, first};
+  const Memories memories{noiseless.defined() ? noiseless : latents, direction, origin, at, first, plane_m};
   const bool goes_by_change = model.schedule().carry_unless_changed() > 0;
   CarriedFrame pictures = carry(frames - 1, at::arange(moving.numel(), moving.options()));
   for (std::int64_t frame = frames - 2; frame >= 0; --frame) {
     const Tensor elsewhere = StandsStill(moving_direction, moving_origin, at + frame, at + frame + 1, 1).logical_not();
     const Tensor adds = Indices(elsewhere.logical_and(pictures.shown.flatten(1).all(1).logical_not()));
     if (adds.numel() == 0) continue;
-    const CarriedFrame older = carry(frame, adds);
-    FillIn(pictures, goes_by_change ? WhereUnchanged(older, model, memories, frame, moving.index_select(0, adds), plane_m) : older,
-           adds);
+    CarriedFrame older = carry(frame, adds);
+    if (goes_by_change) older = WhereUnchanged(older, model, memories, frame, moving.index_select(0, adds));
+    FillIn(pictures, older, adds);
   }
   const Tensor encoded = EncodeImages(model, pictures.frames.transpose(1, 2).flatten(0, 1), Tensor());
   carried.frames.index_copy_(0, moving,
