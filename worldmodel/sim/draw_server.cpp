@@ -9,6 +9,7 @@
 #include <csignal>
 #include <cstdio>
 #include <memory>
+#include <string_view>
 #include <vector>
 
 #include "core/error.h"
@@ -74,6 +75,33 @@ struct Canvas {
   mjrContext context;
 };
 
+/// Where MuJoCo may draw a shadow map that nobody looks at: a context of an empty scene, whose map is as small as can be.
+class UnseenShadows {
+ public:
+  UnseenShadows() {
+    static constexpr std::string_view kEmpty =
+        "<mujoco><visual><global offwidth='1' offheight='1'/><quality shadowsize='1' offsamples='0'/></visual></mujoco>";
+    const auto files = std::make_unique<mjVFS>();
+    mj_defaultVFS(files.get());
+    mj_makeEmptyFileVFS(files.get(), "empty.xml", static_cast<int>(kEmpty.size()));
+    std::copy(kEmpty.begin(), kEmpty.end(), static_cast<char*>(files->filedata[0]));
+    char message[500] = "";
+    const ModelPtr empty(mj_loadXML("empty.xml", files.get(), message, sizeof message));
+    mj_deleteVFS(files.get());
+    if (!empty) throw InternalError("cannot render: no empty scene: {}", message);
+    mjr_defaultContext(&context_);
+    mjr_makeContext(empty.get(), &context_, mjFONTSCALE_50);
+  }
+  ~UnseenShadows() { mjr_freeContext(&context_); }
+  UnseenShadows(const UnseenShadows&) = delete;
+  UnseenShadows& operator=(const UnseenShadows&) = delete;
+
+  const mjrContext& context() const { return context_; }
+
+ private:
+  mjrContext context_;
+};
+
 class DrawServer {
  public:
   explicit DrawServer(DrawingBoard& board) : board_(board) { OpenOpenGl(); }
@@ -92,12 +120,30 @@ class DrawServer {
     std::copy_n(board_.lights, scene.nlight, scene.lights);
     scene.camera[0] = scene.camera[1] = board_.camera;
     const mjrRect viewport = {0, 0, board_.width_px, board_.height_px};
-    mjr_setBuffer(mjFB_OFFSCREEN, &canvas.context);
-    mjr_render(viewport, &scene, &canvas.context);
-    mjr_readPixels(board_.rgb, nullptr, viewport, &canvas.context);  // waits until it is drawn
+    mjrContext context = ShadowsOf(canvas);
+    mjr_setBuffer(mjFB_OFFSCREEN, &context);
+    mjr_render(viewport, &scene, &context);
+    mjr_readPixels(board_.rgb, nullptr, viewport, &context);  // waits until it is drawn
   }
 
  private:
+  /// A canvas's context, which casts the shadows of what is drawn, or has those of the picture before: MuJoCo always casts
+  /// them, which takes longer than the rest, but where to and where they are looked up may be two places.
+  mjrContext ShadowsOf(const Canvas& canvas) {
+    mjrContext context = canvas.context;
+    if (!board_.keeps_shadows) {
+      cast_ = &canvas;
+    } else if (context.shadowSize > 0) {
+      if (cast_ == nullptr || cast_->base != canvas.base)
+        throw InternalError("cannot render: shadows are to be kept, and none of this scene were cast");
+      if (!unseen_) unseen_ = std::make_unique<UnseenShadows>();
+      context.shadowTex = cast_->context.shadowTex;
+      context.shadowFBO = unseen_->context().shadowFBO;
+      context.shadowSize = unseen_->context().shadowSize;
+    }
+    return context;
+  }
+
   Canvas& CanvasForOrder() {
     const auto fits = [&](const auto& canvas) {
       return canvas->base == board_.base && canvas->width_px == board_.width_px &&
@@ -112,6 +158,8 @@ class DrawServer {
   DrawingBoard& board_;
   std::vector<ModelPtr> models_;
   std::vector<std::unique_ptr<Canvas>> canvases_;
+  const Canvas* cast_ = nullptr;  ///< where the newest shadows were cast
+  std::unique_ptr<UnseenShadows> unseen_;
 };
 
 /// Does `work` and says how it went. @returns whether anyone heard it.

@@ -16,6 +16,8 @@ struct DrawingBoard {
   // the order, written by the renderer
   int base = 0;  ///< which of the models sent so far, from 0
   int width_px = 0, height_px = 0;
+  /// Shadows fall as in the picture before, of the same model and state: all shapes were there, here those in sight are.
+  bool keeps_shadows = false;
   int geom_count = 0, light_count = 0;
   mjvGLCamera camera;
   mjvLight lights[mjMAXLIGHT];

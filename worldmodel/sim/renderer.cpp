@@ -30,6 +30,35 @@ mjvGLCamera ViewOf(const Camera& camera, const Eigen::Isometry3d& base_from_came
   return view;
 }
 
+/// Whether any of a shape may be in the picture, by a ball about it. Shapes without one (planes) always may.
+bool MayBeSeen(const mjvGeom& geom, const mjvGLCamera& camera, float width_by_height) {
+  if (geom.modelrbound <= 0) return true;
+  using Vector = Eigen::Vector3f;
+  const auto vector = [](const float* of) { return Vector(of[0], of[1], of[2]); };
+  const Vector forward = vector(camera.forward), up = vector(camera.up), right = forward.cross(up);
+  const Vector from_camera = vector(geom.pos) - vector(camera.pos);
+  const float depth = from_camera.dot(forward), radius = 1.001F * geom.modelrbound + 1e-4F;
+  const auto is_beside = [&](float sideways, float slope) {  // beyond the picture's edge, whose rays have that slope
+    return std::abs(sideways) - slope * depth > radius * std::sqrt(1 + slope * slope);
+  };
+  const float slope = camera.frustum_top / camera.frustum_near;
+  return depth > camera.frustum_near - radius && depth < camera.frustum_far + radius &&
+         !is_beside(from_camera.dot(up), slope) && !is_beside(from_camera.dot(right), slope * width_by_height);
+}
+
+/// All shapes; where shadows are cast already, those that may be seen. A mirror may show any.
+void PutShapes(const mjvScene& scene, DrawingBoard& board) {
+  const auto is_mirror = [](const mjvGeom& geom) { return geom.reflectance > 0; };
+  const bool all = !board.keeps_shadows || std::any_of(scene.geoms, scene.geoms + scene.ngeom, is_mirror);
+  const float width_by_height = static_cast<float>(board.width_px) / static_cast<float>(board.height_px);
+  const mjvGeom* end = std::copy_if(scene.geoms, scene.geoms + scene.ngeom, board.geoms, [&](const mjvGeom& geom) {
+    return all || MayBeSeen(geom, board.camera, width_by_height);
+  });
+  board.geom_count = static_cast<int>(end - board.geoms);
+  board.light_count = scene.nlight;
+  std::copy_n(scene.lights, scene.nlight, board.lights);
+}
+
 }  // namespace
 
 /// What is to be seen of one base model's scenes, one scene at a time.
@@ -77,45 +106,43 @@ std::optional<std::string> Renderer::TeachTheRest() {
   return std::nullopt;
 }
 
-template <typename Order>
-void Renderer::DrawSurely(const Order& order) {
+std::optional<std::string> Renderer::TryToDraw(int base, const mjvScene& scene, const std::vector<SceneView>& views,
+                                               std::vector<cv::Mat>& pictures) {
+  pictures.clear();
+  if (auto how_it_died = TeachTheRest()) return how_it_died;
+  for (const auto& [camera, base_from_camera] : views) {
+    DrawingBoard& board = process_->board();
+    board.base = base;
+    board.width_px = kSupersampling * camera.width_px;
+    board.height_px = kSupersampling * camera.height_px;
+    board.camera = ViewOf(camera, base_from_camera);
+    board.keeps_shadows = !pictures.empty();
+    PutShapes(scene, board);
+    if (auto how_it_died = process_->Draw()) return how_it_died;
+    const cv::Mat bottom_up(board.height_px, board.width_px, CV_8UC3, board.rgb);
+    cv::Mat& picture = pictures.emplace_back();
+    cv::resize(bottom_up, picture, {camera.width_px, camera.height_px}, 0, 0, cv::INTER_AREA);
+    cv::flip(picture, picture, 0);
+  }
+  return std::nullopt;
+}
+
+std::vector<cv::Mat> Renderer::Draw(const mjModel& base, const mjModel& model, mjData& data,
+                                    const std::vector<SceneView>& views) {
+  Shapes& shapes = ShapesOf(base);
+  shapes.Update(model, data);
+  const auto number = std::find_if(shapes_.begin(), shapes_.end(), [&](const auto& one) { return one->base == &base; }) -
+                      shapes_.begin();
+  std::vector<cv::Mat> pictures;
   for (bool is_last_try = false;; is_last_try = true) {
-    auto how_it_died = TeachTheRest();
-    if (!how_it_died) {
-      order(process_->board());
-      how_it_died = process_->Draw();
-    }
-    if (!how_it_died) return;
+    const auto how_it_died = TryToDraw(static_cast<int>(number), shapes.scene, views, pictures);
+    if (!how_it_died) return pictures;
     if (is_last_try)
       throw InternalError("cannot render: the drawing process {}, twice at the same picture", *how_it_died);
     std::fprintf(stderr, "evac: warning: a drawing process %s; another one goes on\n", how_it_died->c_str());
     process_ = std::make_unique<DrawProcess>();
     taught_ = 0;
   }
-}
-
-cv::Mat Renderer::Draw(const mjModel& base, const mjModel& model, mjData& data, const Camera& camera,
-                       const Eigen::Isometry3d& base_from_camera) {
-  Shapes& shapes = ShapesOf(base);
-  shapes.Update(model, data);
-  DrawSurely([&](DrawingBoard& board) {
-    board.base = static_cast<int>(
-        std::find_if(shapes_.begin(), shapes_.end(), [&](const auto& one) { return one->base == &base; }) -
-        shapes_.begin());
-    board.width_px = kSupersampling * camera.width_px;
-    board.height_px = kSupersampling * camera.height_px;
-    board.camera = ViewOf(camera, base_from_camera);
-    board.geom_count = shapes.scene.ngeom;
-    board.light_count = shapes.scene.nlight;
-    std::copy_n(shapes.scene.geoms, board.geom_count, board.geoms);
-    std::copy_n(shapes.scene.lights, board.light_count, board.lights);
-  });
-  const cv::Mat bottom_up(kSupersampling * camera.height_px, kSupersampling * camera.width_px, CV_8UC3,
-                          process_->board().rgb);
-  cv::Mat image;
-  cv::resize(bottom_up, image, {camera.width_px, camera.height_px}, 0, 0, cv::INTER_AREA);
-  cv::flip(image, image, 0);
-  return image;
 }
 
 void RefuseUndrawable(const Camera& camera) {

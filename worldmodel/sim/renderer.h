@@ -12,6 +12,12 @@
 
 namespace evac::sim {
 
+/// Where a picture is taken from. `camera`: size and intrinsics, see RefuseUndrawable.
+struct SceneView {
+  const Camera& camera;
+  Eigen::Isometry3d base_from_camera;
+};
+
 /// Draws scenes without a display, in a process of its own (draw_server.h): one OpenGL context by EGL (surfaceless,
 /// else EGL's default display; Mesa's software rasteriser where there is no GPU). The same model and data give the same
 /// bytes on the same machine. Several renderers draw at the same time; one is for one thread at a time.
@@ -25,12 +31,12 @@ class Renderer {
 
   /// @param base    whose textures and meshes `model` has: `model` itself or what it was copied from. It must outlive
   ///                the renderer, which sends it to the drawing process once.
-  /// @param camera  size and intrinsics, see RefuseUndrawable.
-  /// @returns [height_px, width_px] CV_8UC3 RGB, continuous.
+  /// @param views   of one state, drawn together: shadows are cast once, and each further picture takes half as long
+  /// @returns per view [height_px, width_px] CV_8UC3 RGB, continuous; the same bytes as if it were drawn alone.
   /// @throws InvalidInput if the scene has more shapes than kMaxGeoms, or skins; InternalError if the drawing process
   ///         dies at this picture twice: the first time another one is started and stderr told.
-  cv::Mat Draw(const mjModel& base, const mjModel& model, mjData& data, const Camera& camera,
-               const Eigen::Isometry3d& base_from_camera);
+  std::vector<cv::Mat> Draw(const mjModel& base, const mjModel& model, mjData& data,
+                            const std::vector<SceneView>& views);
 
   /// Of the process that draws; another one after a crash.
   pid_t DrawingPid() const { return process_->pid(); }
@@ -38,9 +44,9 @@ class Renderer {
  private:
   struct Shapes;
   Shapes& ShapesOf(const mjModel& base);
-  /// Has drawn what `order` writes on the board, which it may have to do twice.
-  template <typename Order>
-  void DrawSurely(const Order& order);
+  /// @returns pictures, or how the process died.
+  std::optional<std::string> TryToDraw(int base, const mjvScene& scene, const std::vector<SceneView>& views,
+                                       std::vector<cv::Mat>& pictures);
   std::optional<std::string> TeachTheRest();
 
   std::unique_ptr<DrawProcess> process_;

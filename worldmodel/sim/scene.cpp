@@ -83,19 +83,24 @@ WorldStep Scene::Observe(Renderer* renderer) {
   step.privileged = ReadPrivileged(*model_, *data_);
   const Arms arms = TrueArms();
   const std::uint64_t frame_seed = SeedFor(noise_seed_, frame_++);
-  for (std::size_t i = 0; renderer && i < setup_.task.cameras.size(); ++i) {
-    const Camera& camera = setup_.task.cameras[i];
-    const Eigen::Isometry3d base_from_camera = BaseFromCamera(camera, arms) * errors_.camera_from_true_camera[i];
-    step.observation.images.push_back(renderer->Draw(*setup_.base, *model_, *data_, camera, base_from_camera));
-    AddNoise(step.observation.images.back(), setup_.profile->sensors.image_noise,
-             SeedFor(frame_seed, "image " + camera.name));
-  }
+  if (renderer) step.observation.images = Pictures(*renderer, arms, frame_seed);
   for (std::size_t i = 0; i < controls_.size(); ++i) {
     ArmState& arm = step.observation.arms.emplace_back(controls_[i].Measured(*data_));
     const bool is_left = setup_.task.arms[i] == "left";
     AddNoise(arm, setup_.profile->sensors, SeedFor(frame_seed, is_left ? "left arm" : "arm"));
   }
   return step;
+}
+
+std::vector<cv::Mat> Scene::Pictures(Renderer& renderer, const Arms& arms, std::uint64_t frame_seed) {
+  const std::vector<Camera>& cameras = setup_.task.cameras;
+  std::vector<SceneView> views;
+  for (std::size_t i = 0; i < cameras.size(); ++i)
+    views.push_back({cameras[i], BaseFromCamera(cameras[i], arms) * errors_.camera_from_true_camera[i]});
+  std::vector<cv::Mat> pictures = renderer.Draw(*setup_.base, *model_, *data_, views);
+  for (std::size_t i = 0; i < cameras.size(); ++i)
+    AddNoise(pictures[i], setup_.profile->sensors.image_noise, SeedFor(frame_seed, "image " + cameras[i].name));
+  return pictures;
 }
 
 Arms Scene::TrueArms() const {

@@ -45,6 +45,8 @@ class Scene {
   void StartArms();
   void StepPhysics();
   Arms TrueArms() const;
+  /// What each camera of the task sees, with the sensors' noise.
+  std::vector<cv::Mat> Pictures(Renderer& renderer, const Arms& arms, std::uint64_t frame_seed);
 
   Setup setup_;
   HiddenErrors errors_;

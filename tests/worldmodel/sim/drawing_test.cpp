@@ -23,7 +23,7 @@ struct View {
   }
   cv::Mat Drawn(Renderer& renderer, int width_px = 96, int height_px = 64) {
     const Camera camera = Resized(task.cameras[0], width_px, height_px);
-    return renderer.Draw(*model, *model, *data, camera, camera.mount_from_camera);
+    return renderer.Draw(*model, *model, *data, {{camera, camera.mount_from_camera}}).at(0);
   }
 
   Task task;
@@ -68,6 +68,47 @@ TEST(Renderer, DrawsTheSameBesideOthers) {
   }
   for (std::thread& thread : threads) thread.join();
   EXPECT_EQ(same, 30);
+}
+
+/// A camera at `place` that looks straight down.
+Eigen::Isometry3d Above(const Eigen::Vector3d& place) {
+  Eigen::Isometry3d base_from_camera = Eigen::Isometry3d::Identity();
+  base_from_camera.linear() = Eigen::Vector3d(1, -1, -1).asDiagonal();
+  base_from_camera.translation() = place;
+  return base_from_camera;
+}
+
+TEST(Renderer, PicturesDrawnTogetherAreThoseDrawnAlone) {
+  Renderer together, alone;
+  for (const char* id : {"take_bottle", "take_toast", "take_ham", "take_lettuce"}) {
+    View view(id);
+    const Camera head = Resized(view.task.cameras[0], 96, 64), small = Resized(view.task.cameras[1], 48, 32);
+    std::vector<SceneView> views = {{head, head.mount_from_camera}};
+    for (const double x : {0.1, 0.45, 0.7}) {
+      for (const double y : {-0.3, 0.0, 0.2}) {
+        views.push_back({head, Above({x, y, 0.25})});
+        views.push_back({small, Above({x, y, 0.5})});
+      }
+    }
+    const std::vector<cv::Mat> pictures = together.Draw(*view.model, *view.model, *view.data, views);
+    ASSERT_EQ(pictures.size(), views.size());
+    for (std::size_t i = 0; i < views.size(); ++i) {
+      const cv::Mat expected = alone.Draw(*view.model, *view.model, *view.data, {views[i]}).at(0);
+      EXPECT_TRUE(AreEqual(pictures[i], expected)) << id << ", view " << i;
+      EXPECT_TRUE(i == 0 || !AreEqual(pictures[i], pictures[i - 1])) << id << ", view " << i;
+    }
+  }
+}
+
+TEST(Renderer, ShadowsOfWhatIsOutOfSightAreInSight) {
+  View view("take_bottle");
+  Renderer renderer;
+  const Camera camera = Resized(view.task.cameras[1], 96, 64);
+  const std::vector<SceneView> views = {{camera, Above({0.45, 0, 0.5})}, {camera, Above({0.0, 0.25, 0.12})}};
+  const cv::Mat with = renderer.Draw(*view.model, *view.model, *view.data, views).at(1);
+  std::fill_n(view.model->light_castshadow, view.model->nlight, mjtByte{0});
+  const cv::Mat without = renderer.Draw(*view.model, *view.model, *view.data, views).at(1);
+  EXPECT_FALSE(AreEqual(with, without)) << "beside the arm, away from the light";
 }
 
 TEST(Renderer, ItsProcessEndsWithIt) {
