@@ -83,7 +83,8 @@ class UnseenShadows {
         "<mujoco><visual><global offwidth='1' offheight='1'/><quality shadowsize='1' offsamples='0'/></visual></mujoco>";
     const auto files = std::make_unique<mjVFS>();
     mj_defaultVFS(files.get());
-    mj_makeEmptyFileVFS(files.get(), "empty.xml", static_cast<int>(kEmpty.size()));
+    if (mj_makeEmptyFileVFS(files.get(), "empty.xml", static_cast<int>(kEmpty.size())) != 0)
+      throw InternalError("cannot render: no memory for an empty scene");
     std::copy(kEmpty.begin(), kEmpty.end(), static_cast<char*>(files->filedata[0]));
     char message[500] = "";
     const ModelPtr empty(mj_loadXML("empty.xml", files.get(), message, sizeof message));
