@@ -31,7 +31,7 @@ class Renderer {
 
   /// @param base    whose textures and meshes `model` has: `model` itself or what it was copied from. It must outlive
   ///                the renderer, which sends it to the drawing process once.
-  /// @param views   of one state, drawn together: shadows are cast once, and each further picture takes half as long
+  /// @param views   of one state, drawn together: shadows are cast once, by the first
   /// @returns per view [height_px, width_px] CV_8UC3 RGB, continuous; the same bytes as if it were drawn alone.
   /// @throws InvalidInput if the scene has more shapes than kMaxGeoms, or skins; InternalError if the drawing process
   ///         dies at this picture twice: the first time another one is started and stderr told.
