@@ -61,14 +61,15 @@ void Fill(const SyntheticShards& o, const Tensors& t, Dice& dice) {
     for (std::int64_t i = 0; i < o.frames; ++i) {
       const std::int64_t row = clip * o.frames + i;
       const double before_x = x, before_y = y;
-      if (i > 0) x = std::clamp(x + dice.Uniform(-3, 3), 4.0, static_cast<double>(o.width_px) - 4);
-      if (i > 0) y = std::clamp(y + dice.Uniform(-3, 3), 4.0, static_cast<double>(o.height_px) - 4);
+      if (i > 0) x = std::clamp(x + dice.Uniform(-o.step_px, o.step_px), 4.0, static_cast<double>(o.width_px) - 4);
+      if (i > 0) y = std::clamp(y + dice.Uniform(-o.step_px, o.step_px), 4.0, static_cast<double>(o.height_px) - 4);
       t.deltas[row][7] = (x - before_x) / 2;
       t.deltas[row][8] = (y - before_y) / 2;
       const bool has_opened = o.opens_at > 0 && i >= o.opens_at;
       t.actions[row][15] = clip == 1 && o.closes_at > 0 && i >= o.closes_at && !has_opened ? 120 : 0;
       t.contact[row] = i == o.frames / 2 ? 1 : 0;
       Draw(o, t, row, {x, y, ground});
+      if (o.views > 1) t.c2w[row][1][0][3] = static_cast<double>(i % 2) * o.wrist_swing_m;
       if (!o.knows_object) t.object_px[row].fill_(std::nan(""));
     }
   }

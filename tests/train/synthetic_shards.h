@@ -16,6 +16,8 @@ struct SyntheticShards {
   std::int64_t opens_at = 0;     ///< above 0: and to open again at this one
   bool knows_object = true;      ///< whether they say where the square is
   std::int64_t views = 1;
+  double step_px = 3;        ///< how far the square goes at most from frame to frame, along each side
+  double wrist_swing_m = 0;  ///< how far along x the second view's camera is in every other frame
   std::int64_t height_px = 16, width_px = 24;
   std::uint64_t seed = 1;
   const char* statistics = "synthetic";

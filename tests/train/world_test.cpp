@@ -35,8 +35,10 @@ nn::ModelConfig SmallConfig(std::int64_t views) {
 
 /// Shards, a codec and its latents: where the training of a world model begins.
 struct Prepared {
-  explicit Prepared(std::int64_t views, std::int64_t frames = 9) : config(SmallConfig(views)) {
-    WriteSyntheticShards(folder / "shards", {.frames = frames, .views = views});
+  explicit Prepared(std::int64_t views, std::int64_t frames = 9)
+      : Prepared(SyntheticShards{.frames = frames, .views = views}) {}
+  explicit Prepared(const SyntheticShards& shards) : config(SmallConfig(shards.views)) {
+    WriteSyntheticShards(folder / "shards", shards);
     CodecOptions options;
     options.job.trainer.steps = 2;
     options.job.trainer.learning_rate = 1e-3;
@@ -218,6 +220,36 @@ TEST(TrainWorld, MemoryIsImaginedSoManyChunksDeep) {
   EXPECT_EQ(loss(2, 1), loss(7, 1)) << "before the first chunk nothing was imagined";
   EXPECT_EQ(loss(2, 0), loss(1, 0));
   EXPECT_THROW(loss(0, 1), TensorError);
+}
+
+TEST(TrainWorld, NoiseOnMemoryIsNoChangeOfTheScene) {
+  const auto loss = [](const Prepared& at, const char* noise, double unless_changed) {
+    ShardSet shards(at.folder / "shards", Split::kTrain);
+    shards.OpenLatents(at.config.vae.z_channels, at.config.vae.Stride());
+    nn::ModelConfig config = at.config;
+    config.schedule.from_last_frame = true;
+    config.schedule.carry_plane_m = 0;
+    config.schedule.carry_frames = config.memory;
+    config.schedule.carry_unless_changed = unless_changed;
+    config.unet.in_channels += config.vae.z_channels + 1;
+    config.Check();
+    nn::RandomWeights random(3);
+    TrainableWeights weights(random);
+    const nn::EvacModel model(weights, config);
+    WorldOptions options = Quick(1);
+    options.memory_noise_kind = noise;
+    options.world.memory_noise_share = 1;
+    options.Resolve();
+    options.world.windows.chunk = config.chunk;
+    options.world.windows.memory = config.memory;
+    return WorldTraining(model, shards, options.world).Loss({5, 0, 0, 1}).item<double>();
+  };
+  const Prepared still(SyntheticShards{.views = 2, .step_px = 0, .wrist_swing_m = 0.5}),
+      moving(SyntheticShards{.views = 2, .wrist_swing_m = 0.5});
+  for (const char* noise : {"published", "uniform"}) {
+    EXPECT_EQ(loss(still, noise, 1e-3), loss(still, noise, 0)) << noise;
+    EXPECT_NE(loss(moving, noise, 1e-3), loss(moving, noise, 0)) << noise << ": or nothing is tested";
+  }
 }
 
 std::string Bytes(const std::filesystem::path& path) {
