@@ -144,7 +144,8 @@ TEST_F(TrainJudgeTest, AJudgeThatIsGivenMoreLooksBeginsAsItWas) {
     return Logits(learners.net(), set, set.clips, {});
   };
   WidenJudge(first, ClassifierShape{set.tasks, set.cameras, 16, 24, 3}, 3, wide);
-  EXPECT_THAT(logits(3, wide), testing::Pointwise(testing::DoubleNear(1e-5), logits(1, first)));
+  // Logits reach 50, where neighbouring floats are 4e-6 apart, and processors sum in different orders.
+  EXPECT_THAT(logits(3, wide), testing::Pointwise(testing::DoubleNear(1e-4), logits(1, first)));
 
   JudgeTrainingOptions more = Quick(4);
   more.looks = 3;
