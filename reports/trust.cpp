@@ -201,8 +201,11 @@ Defined<std::int64_t> MorePairs(const TaskTrust& task, const TrustOptions& optio
   if (distance < 0.005) return Undefined{"the bias seen is at the margin"};
   const double flips = static_cast<double>(pairs.discordant()) * effective / n;
   const double variance = (flips + 1) / (effective + 1) - bias * bias;
-  const double wanted = std::ceil(z * z * variance / (distance * distance) * n / effective);
-  return std::max<std::int64_t>(1, static_cast<std::int64_t>(wanted) - pairs.n());
+  const auto wanted = static_cast<std::int64_t>(std::ceil(z * z * variance / (distance * distance) * n / effective));
+  if (wanted > kMostPairsAskedFor) {
+    return Undefined{fmt::format("the bias seen is so near the margin that {} pairs would not do", kMostPairsAskedFor)};
+  }
+  return std::max<std::int64_t>(1, wanted - pairs.n());
 }
 
 void Decide(const TrustOptions& options, TaskTrust& task) {

@@ -41,6 +41,8 @@ const char* Name(Trust trust);
 
 /// Below this many policies a correlation over them says nothing.
 inline constexpr std::size_t kMinTrustPolicies = 4;
+/// Where more than these would be needed, the bias lies beside the margin by chance of what was seen: no advice.
+inline constexpr std::int64_t kMostPairsAskedFor = 10000;
 
 /// One policy on one task.
 struct PredictedRate {

@@ -42,6 +42,14 @@ TEST(TrustIn, AFaithfulModelIsTrustedOnceThereAreEnoughPairs) {
   EXPECT_TRUE(few.more);
 }
 
+TEST(TrustIn, ABiasBesideTheMarginAsksForNoMorePairsThanAnyoneHas) {
+  const TaskTrust task = TrustOf(Input(Times(5, "s") + Times(23, "f"), Times(5, "f") + "ss" + Times(21, "f")))[0];
+  EXPECT_NEAR(*task.bias.value, -3. / 28, 1e-12);  // the margin is .1: 20 000 pairs
+  EXPECT_EQ(task.trust, Trust::kUnknown);
+  ASSERT_FALSE(task.more);
+  EXPECT_THAT(task.more.reason(), HasSubstr("so near the margin that 10000 pairs would not do"));
+}
+
 TEST(TrustIn, AModelThatAlwaysSucceedsIsNot) {
   const TaskTrust task = TrustOf(Input(Times(15, "sf"), Times(30, "s")))[0];
   EXPECT_EQ(task.trust, Trust::kNo);
