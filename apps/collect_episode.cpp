@@ -51,7 +51,8 @@ Arms TrueArms(const Task& task, const PrivilegedFrame& frame) {
 }
 
 EpisodeTruth TruthOf(const CollectJob& job, const Task& task, const CollectedRun& run, int scale) {
-  EpisodeTruth truth{task.cameras.size(), {}, {}};
+  EpisodeTruth truth;
+  for (const Camera& camera : task.cameras) truth.cameras.push_back(camera.name);
   constexpr float kUnknown = std::numeric_limits<float>::quiet_NaN();
   for (const PrivilegedFrame& frame : run.track) {
     for (const Camera& camera : task.cameras) {

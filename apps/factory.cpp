@@ -97,7 +97,7 @@ void Declare(const Suite& suite, Store& store) {
   for (const SuiteWorld& world : suite.worlds) {
     std::string profile_hash = world.profile.empty() ? "" : Config::FromFile(world.profile).ContentHash();
     if (world.evac) {
-      CheckNetwork(*world.evac);
+      CheckNetwork(world, suite.tasks);
       profile_hash = world.evac->hash;
     }
     store.AddWorld({.name = world.name, .type = world.type, .is_real = world.is_real, .profile_hash = profile_hash});

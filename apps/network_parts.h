@@ -28,8 +28,10 @@ void NeedNetworksFor(const Suite& suite);
 /// @throws InvalidInput if page and weights are not of one network, or either is broken.
 std::unique_ptr<World> MakeEvacWorld(const SuiteWorld& world, const Suite& suite, const Store* store);
 
-/// The same without loading it: what is wrong with page and weights is known before the first episode of any world.
-void CheckNetwork(const SuiteEvac& evac);
+/// The same without loading it: what is wrong with page and weights is known before the first episode of any world, and
+/// whether weights that say what they were trained for (worldmodel/trained_for.h) are asked for something else: another
+/// period, other cameras than `tasks` have, other statistics, other pose maps.
+void CheckNetwork(const SuiteWorld& world, const std::vector<Task>& tasks);
 
 /// The classifier judge of a run. @throws InvalidInput if the weights are none of its, or do not know the run's tasks.
 std::unique_ptr<Judge> MakeClassifier(const std::filesystem::path& weights, const Store& store);

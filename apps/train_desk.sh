@@ -4,13 +4,17 @@
 #   apps/train_desk.sh EVAC OUT [LAST [CONFIGS]]
 # EVAC: the program. LAST: the step to end after (default: balance). CONFIGS: a folder of other pages. The desk's own
 # fidelity page is asked about four development states a cell; its forty reported ones would take as long as the training.
+# Its policy is kept after some steps too; other pages may have fewer.
 # OUT/time.csv gets a line for each start of a step: step, seconds, peak memory of its largest process in KiB, how it
 # ended. A step that was killed together with this script has none.
 set -euo pipefail
 evac=$1 out=$2 last=${3:-balance} configs=${4:-$(dirname "${BASH_SOURCE[0]}")/configs}
 model=$configs/desk_model.yaml training=$configs/desk_training.yaml codec=$out/codec/codec.safetensors
-states=()
-if [ $# -lt 4 ]; then states=(--set initial_states.seed=8101 --set initial_states.count=4); fi
+states=() kept=()
+if [ $# -lt 4 ]; then
+  states=(--set initial_states.seed=8101 --set initial_states.count=4)
+  kept=(--keep-steps 250,500,1000,2000)
+fi
 case $last in
   collect | pack | codec | encode | judge | policy | world | fidelity | balance) ;;
   *) echo "train_desk: the last step is '$last', wanted collect, pack, codec, encode, judge, policy, world, fidelity or balance" >&2; exit 2 ;;
@@ -35,7 +39,7 @@ step pack pack "$out/recordings" --config "$model" --out "$out/shards"
 learn codec
 step encode encode "$out/shards" --config "$model" --codec "$codec"
 learn judge --codec "$codec"
-learn policy --codec "$codec" --keep-steps 250,500,1000,2000
+learn policy --codec "$codec" "${kept[@]}"
 learn world --codec "$codec"
 step fidelity fidelity "$configs/fidelity.yaml" --set "worlds.2.weights=$out/world/weights.safetensors" \
   --set "worlds.2.statistics=$out/shards/statistics.yaml" \

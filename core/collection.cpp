@@ -1,8 +1,10 @@
 #include "core/collection.h"
 
+#include <algorithm>
 #include <cstring>
 #include <nlohmann/json.hpp>
 #include <span>
+#include <sstream>
 
 #include "core/error.h"
 #include "core/file.h"
@@ -53,6 +55,46 @@ std::vector<T> Numbers(const TensorFile& file, const TensorDeclaration& wanted) 
   return numbers;
 }
 
+std::vector<std::string> SplitAtCommas(const std::string& text) {
+  std::vector<std::string> names;
+  std::istringstream parts(text);
+  for (std::string name; std::getline(parts, name, ',');) names.push_back(name);
+  return names;
+}
+
+/// The order of cameras in every task page that ships.
+bool IsInOrderOfPages(const std::vector<std::string>& cameras) {
+  std::vector<std::string> ordered = {"head", "hand_left", "hand_right"};
+  std::erase_if(ordered, [&](const std::string& name) { return std::ranges::find(cameras, name) == cameras.end(); });
+  return ordered == cameras;
+}
+
+/// The names of the file's views, in their order.
+std::vector<std::string> CamerasOf(const TensorFile& file, const std::vector<std::string>& wanted) {
+  const auto named = file.metadata().find("cameras");
+  if (named != file.metadata().end()) return SplitAtCommas(named->second);
+  const std::vector<std::int64_t>& shape = file.Get("object_px").shape;
+  const std::int64_t views = shape.size() == 3 ? shape[1] : 0;
+  if (views == std::ssize(wanted) && IsInOrderOfPages(wanted)) return wanted;
+  throw InvalidInput(
+      "{}: does not say which cameras its {} views are of, as files of an earlier `evac collect`; wanted {}: collect "
+      "anew",
+      file.name(), views, fmt::join(wanted, ","));
+}
+
+/// Where each of the wanted cameras stands among the file's. @throws InvalidInput if one does not.
+std::vector<std::size_t> ColumnsOf(const std::vector<std::string>& wanted, const std::vector<std::string>& found,
+                                   const std::string& file) {
+  std::vector<std::size_t> columns;
+  for (const std::string& name : wanted) {
+    const auto at = std::ranges::find(found, name);
+    if (at == found.end())
+      throw InvalidInput("{}: cameras are {}, wanted {} among them", file, fmt::join(found, ","), name);
+    columns.push_back(static_cast<std::size_t>(at - found.begin()));
+  }
+  return columns;
+}
+
 }  // namespace
 
 std::string CollectedJson(const CollectedEpisode& episode) {
@@ -98,7 +140,12 @@ CollectedEpisode ParseCollected(const std::string& json, const std::string& wher
   episode.frames = page.at("frames");
   episode.contact_frames = page.at("contact_frames");
   episode.video_scale = page.at("video_scale");
-  if (episode.video_scale < 1 || episode.frames < 1) throw InvalidInput("{}: video_scale or frames below 1", where);
+  if (episode.video_scale < 1)
+    throw InvalidInput("{}: video_scale is {}, wanted 1 or more", where, episode.video_scale);
+  const bool diverged = episode.stop == Name(StopReason::kDiverged);
+  if (diverged ? episode.frames != 0 : episode.frames < 1)
+    throw InvalidInput("{}: frames is {}, wanted {} of an episode whose stop is {}", where, episode.frames,
+                       diverged ? "0" : "1 or more", episode.stop);
   return episode;
 } catch (const Json::exception& error) {
   throw InvalidInput("{}: no row of a collection: {}", where, error.what());
@@ -127,17 +174,30 @@ fs::path TruthPath(const TreePlace& place) {
 
 void WriteTruth(const fs::path& path, const EpisodeTruth& truth) {
   MakeFolders(path.parent_path());
-  const auto frames = static_cast<std::int64_t>(truth.contact.size()), views = static_cast<std::int64_t>(truth.views);
+  const auto frames = static_cast<std::int64_t>(truth.contact.size()), views = std::ssize(truth.cameras);
   const TensorView tensors[] = {View("object_px", TensorType::kF32, {frames, views, 2}, truth.object_px.data()),
                                 View("contact", TensorType::kU8, {frames}, truth.contact.data())};
-  WriteTensorFile(path, tensors, {{"format", "evac-truth"}, {"version", "1"}});
+  WriteTensorFile(path, tensors, {{"format", "evac-truth"},
+                                  {"version", "1"},
+                                  {"cameras", fmt::format("{}", fmt::join(truth.cameras, ","))}});
 }
 
-EpisodeTruth ReadTruth(const fs::path& path, std::size_t frames, std::size_t views) try {
+EpisodeTruth ReadTruth(const fs::path& path, std::size_t frames, const std::vector<Camera>& cameras) try {
   const TensorFile file = TensorFile::Open(path);
-  const auto t = static_cast<std::int64_t>(frames), v = static_cast<std::int64_t>(views);
-  return {views, Numbers<float>(file, {"object_px", TensorType::kF32, {t, v, 2}}),
-          Numbers<std::uint8_t>(file, {"contact", TensorType::kU8, {t}})};
+  EpisodeTruth truth;
+  for (const Camera& camera : cameras) truth.cameras.push_back(camera.name);
+  const std::vector<std::string> found = CamerasOf(file, truth.cameras);
+  const std::vector<std::size_t> columns = ColumnsOf(truth.cameras, found, file.name());
+  const auto t = static_cast<std::int64_t>(frames);
+  truth.contact = Numbers<std::uint8_t>(file, {"contact", TensorType::kU8, {t}});
+  EpisodeTruth whole{found, Numbers<float>(file, {"object_px", TensorType::kF32, {t, std::ssize(found), 2}}), {}};
+  for (std::size_t frame = 0; frame < frames; ++frame) {
+    for (const std::size_t column : columns) {
+      const float* at_px = whole.At(frame, column);
+      truth.object_px.insert(truth.object_px.end(), {at_px[0], at_px[1]});
+    }
+  }
+  return truth;
 } catch (const TensorError& error) {
   throw InvalidInput("{}", error.what());
 }

@@ -22,17 +22,18 @@ struct CollectedEpisode {
   std::map<std::string, double> parameters; ///< of the policy, as drawn for this episode
   std::string without;                      ///< the body that was taken away, or empty
   bool success = false;                     ///< by the oracle
-  std::string fate;                         ///< judges/attempt.h
-  std::string reason;                       ///< the oracle's sentence
-  std::string stop;                         ///< still or max_chunks
-  int frames = 0;
+  std::string fate;                         ///< judges/attempt.h, or diverged
+  std::string reason;                       ///< the oracle's sentence, or how the physics failed
+  std::string stop;                         ///< still, max_chunks or diverged
+  int frames = 0;          ///< 0 if it diverged, and only then: there is no recording
   int contact_frames = 0;  ///< of those, near a touch, a grasp or a release
   int video_scale = 1;     ///< video pixels per pixel of the picture
 };
 
 /// One line of JSON, fields in a fixed order.
 std::string CollectedJson(const CollectedEpisode& episode);
-/// @param where  names the file in messages. @throws InvalidInput naming a missing or wrong field.
+/// @param where  names the file in messages. @throws InvalidInput naming a missing or wrong field, or frames that do not
+/// go with the stop.
 CollectedEpisode ParseCollected(const std::string& json, const std::string& where);
 /// A line of manifest.csv, and its heading.
 std::string CollectedCsvHeading();
@@ -40,12 +41,14 @@ std::string CollectedCsvLine(const CollectedEpisode& episode);
 
 /// What only physics knows, frame by frame.
 struct EpisodeTruth {
-  std::size_t views = 0;
+  std::vector<std::string> cameras;   ///< V names, one per view
   std::vector<float> object_px;       ///< [T, V, 2]: x, y of the object's middle in pixels of the video; NaN behind it
   std::vector<std::uint8_t> contact;  ///< [T]: 1 near a touch, a grasp, a release, a hand that closes low
 
-  float* At(std::size_t frame, std::size_t view) { return &object_px[(frame * views + view) * 2]; }
-  const float* At(std::size_t frame, std::size_t view) const { return &object_px[(frame * views + view) * 2]; }
+  float* At(std::size_t frame, std::size_t view) { return &object_px[(frame * cameras.size() + view) * 2]; }
+  const float* At(std::size_t frame, std::size_t view) const {
+    return &object_px[(frame * cameras.size() + view) * 2];
+  }
 };
 
 /// ROOT/rows/<task>/<episode>.json, written last: the episode is whole. ROOT/truth/<task>/<episode>.safetensors.
@@ -53,8 +56,11 @@ std::filesystem::path RowPath(const TreePlace& place);
 std::filesystem::path TruthPath(const TreePlace& place);
 
 void WriteTruth(const std::filesystem::path& path, const EpisodeTruth& truth);
-/// @throws InvalidInput if it is not of `frames` frames and `views` views.
-EpisodeTruth ReadTruth(const std::filesystem::path& path, std::size_t frames, std::size_t views);
+/// What is known of those cameras, in that order, whatever the file's.
+/// A file that names none, of an earlier version, is of the task page's: it is taken to be of `cameras` if they are as
+/// many, in the order head, hand_left, hand_right.
+/// @throws InvalidInput if it is not of `frames` frames, or has nothing of one of the cameras.
+EpisodeTruth ReadTruth(const std::filesystem::path& path, std::size_t frames, const std::vector<Camera>& cameras);
 
 /// The row of the recording in `folder`, if that is an episode of a collection.
 std::optional<CollectedEpisode> RowOf(const std::filesystem::path& folder);

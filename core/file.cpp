@@ -25,6 +25,9 @@ void Sync(const fs::path& path, int flags) {
 
 void SyncFolder(const fs::path& folder) { Sync(folder.empty() ? fs::path(".") : folder, O_RDONLY | O_DIRECTORY); }
 
+/// What a file is called until it is whole.
+fs::path PartOf(const fs::path& path) { return path.string() + ".tmp"; }
+
 }  // namespace
 
 std::string ReadFile(const fs::path& path) {
@@ -53,7 +56,7 @@ void MakeFolders(const fs::path& folder) {
 }
 
 void WriteFileAtomically(const fs::path& path, std::string_view bytes) {
-  const fs::path part = path.string() + ".tmp";
+  const fs::path part = PartOf(path);
   try {
     std::ofstream file(part, std::ios::binary | std::ios::trunc);
     file.write(bytes.data(), static_cast<std::streamsize>(bytes.size()));
@@ -62,6 +65,22 @@ void WriteFileAtomically(const fs::path& path, std::string_view bytes) {
     SyncAndRename(part, path);
   } catch (const Error&) {
     std::error_code ignored;
+    fs::remove(part, ignored);
+    throw;
+  }
+}
+
+void LinkOrCopy(const fs::path& from, const fs::path& to) {
+  std::error_code error, ignored;
+  fs::create_hard_link(from, to, error);
+  if (!error) return;
+  const fs::path part = PartOf(to);
+  fs::remove(part, ignored);  // of a process that was killed here
+  try {
+    if (!fs::copy_file(from, part, error))
+      throw InternalError("{}: cannot be copied from {}: {}", to.string(), from.string(), error.message());
+    SyncAndRename(part, to);
+  } catch (const Error&) {
     fs::remove(part, ignored);
     throw;
   }

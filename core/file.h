@@ -13,6 +13,10 @@ std::string ReadFile(const std::filesystem::path& path);
 /// @throws Error naming the file and the system's reason.
 void WriteFileAtomically(const std::filesystem::path& path, std::string_view bytes);
 
+/// The same file under another name, at which nothing is: a hard link, or where the disk has none a copy that is there
+/// whole or not at all. @throws Error naming the file and the system's reason.
+void LinkOrCopy(const std::filesystem::path& from, const std::filesystem::path& to);
+
 /// Syncs a finished file to disk, renames it to its final name and syncs that folder.
 void SyncAndRename(const std::filesystem::path& from, const std::filesystem::path& to);
 

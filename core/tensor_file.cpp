@@ -1,6 +1,7 @@
 #include "core/tensor_file.h"
 
 #include <fcntl.h>
+#include <signal.h>
 #include <sys/mman.h>
 #include <sys/stat.h>
 #include <unistd.h>
@@ -8,6 +9,7 @@
 #include <algorithm>
 #include <bit>
 #include <cerrno>
+#include <charconv>
 #include <cstring>
 #include <utility>
 
@@ -48,10 +50,34 @@ std::size_t ClaimedBytes(const HeaderEntry& entry, const std::string& file) {
   }
 }
 
+fs::path FolderOf(const fs::path& path) { return path.parent_path().empty() ? fs::path(".") : path.parent_path(); }
+
 void SyncFolderOf(const fs::path& path) {
-  const fs::path folder = path.parent_path().empty() ? fs::path(".") : path.parent_path();
+  const fs::path folder = FolderOf(path);
   const Descriptor file(::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));
   if (file.get() < 0 || ::fsync(file.get()) != 0) throw SystemError(folder, "sync");
+}
+
+/// What a file is called until it is whole; the number of the process follows.
+std::string PartialName(const fs::path& path) { return path.filename().string() + ".partial-"; }
+
+/// Whether that is the number of a process, and there is no such process.
+bool IsOfADeadProcess(std::string_view number) {
+  pid_t process = 0;
+  const auto [end, error] = std::from_chars(number.data(), number.data() + number.size(), process);
+  const bool is_number = error == std::errc() && end == number.data() + number.size() && process > 0;
+  return is_number && ::kill(process, 0) != 0 && errno == ESRCH;
+}
+
+/// Those who were killed while they wrote `path` left what they had.
+void RemovePartsOfTheDead(const fs::path& path) {
+  const std::string begin = PartialName(path);
+  std::error_code error, ignored;
+  for (fs::directory_iterator file(FolderOf(path), error), end; !error && file != end; file.increment(error)) {
+    const std::string name = file->path().filename().string();
+    if (name.starts_with(begin) && IsOfADeadProcess(std::string_view(name).substr(begin.size())))
+      fs::remove(file->path(), ignored);
+  }
 }
 
 }  // namespace
@@ -162,7 +188,8 @@ void TensorFile::LetGo(const TensorView& tensor) const {
 
 TensorFileWriter::TensorFileWriter(const fs::path& path, std::span<const TensorDeclaration> tensors,
                                    const TensorMetadata& metadata)
-    : path_(path), partial_(path.string() + ".partial-" + std::to_string(::getpid())) {
+    : path_(path), partial_(path.parent_path() / (PartialName(path) + std::to_string(::getpid()))) {
+  RemovePartsOfTheDead(path);
   const std::string header = TensorHeaderText(tensors, metadata);
   if (header.size() > kMaxHeaderBytes) throw TensorError(path.string() + ": a header beyond 100 MB");
   file_ = ::open(partial_.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0644);

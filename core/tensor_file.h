@@ -99,6 +99,7 @@ class TensorFile {
 ///   TensorFileWriter writer(path, declarations, metadata);
 ///   for (…) writer.Append(bytes of the next tensor, in the order of the declarations);
 ///   writer.Finish();   // until then there is no file at `path`
+/// What processes of this machine left of the same path when they were killed is removed.
 class TensorFileWriter {
  public:
   TensorFileWriter(const std::filesystem::path& path, std::span<const TensorDeclaration> tensors,

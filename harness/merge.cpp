@@ -6,6 +6,7 @@
 #include <map>
 #include <set>
 #include <tuple>
+#include <utility>
 
 #include "core/error.h"
 #include "core/file.h"
@@ -145,6 +146,17 @@ void CopyRealTrials(const Store& from, Store& to) {
   to.AddRealTrials(fresh);
 }
 
+/// Where those episodes began. A scene is kept for a task and an initial state, under the name of whichever episode of them
+/// comes first, which need not be one of these.
+void TakeInitialScenes(const Store& from, const std::vector<Episode>& episodes, Store& to) {
+  std::set<std::pair<std::string, std::string>> begun;
+  for (const Episode& episode : episodes) begun.insert({episode.key.pair.task, episode.key.pair.initial_state});
+  for (const PairKey& pair : from.InitialScenes()) {
+    if (begun.contains({pair.task, pair.initial_state}))
+      to.AddInitialScene(pair, from.LoadInitialScene(pair.task, pair.initial_state).value());
+  }
+}
+
 }  // namespace
 
 MergeSummary MergeRuns(const std::vector<fs::path>& shards, const fs::path& out) {
@@ -173,18 +185,11 @@ MergeSummary MergeRuns(const std::vector<fs::path>& shards, const fs::path& out)
 
 int TakeEpisodes(const Store& from, const std::function<bool(const EpisodeKey&)>& wanted, Store& to) {
   std::vector<Episode> episodes = from.Episodes();
-  std::erase_if(episodes, [&](const Episode& episode) {
-    return IsFailure(episode.stop) || !wanted(episode.key) || to.Has(episode.key);
-  });
+  std::erase_if(episodes, [&](const Episode& episode) { return IsFailure(episode.stop) || !wanted(episode.key); });
+  TakeInitialScenes(from, episodes, to);
+  std::erase_if(episodes, [&](const Episode& episode) { return to.Has(episode.key); });
   std::set<std::string> taken;
-  std::set<PairKey> pairs;
-  for (const Episode& episode : episodes) {
-    taken.insert(episode.key.Id());
-    pairs.insert(episode.key.pair);
-  }
-  for (const PairKey& pair : from.InitialScenes()) {
-    if (pairs.contains(pair)) to.AddInitialScene(pair, from.LoadInitialScene(pair.task, pair.initial_state).value());
-  }
+  for (const Episode& episode : episodes) taken.insert(episode.key.Id());
   CopyEpisodes(episodes, from, to);
   CopyVerdicts(from, taken, to);
   return static_cast<int>(episodes.size());

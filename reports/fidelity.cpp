@@ -1,11 +1,14 @@
 #include "reports/fidelity.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <map>
 #include <set>
 
 #include "core/statistics/confusion.h"
 #include "core/statistics/rates.h"
+#include "reports/wording.h"
 
 namespace evac {
 namespace {
@@ -25,6 +28,12 @@ Confusion ConfusionOf(const std::vector<FidelityRow>& rows, const std::string& k
     confusion.both_failure += !*row.real && !*said;
   }
   return confusion;
+}
+
+/// Of whose imagined clip the judge could tell how it ended.
+std::vector<FidelityRow> ToldOf(std::vector<FidelityRow> rows) {
+  std::erase_if(rows, [](const FidelityRow& row) { return !row.model; });
+  return rows;
 }
 
 /// The episode as `Compare` counts it.
@@ -99,7 +108,7 @@ std::vector<FidelityCell> CellsOf(const std::vector<FidelityRow>& rows) {
   };
   for (const auto& [key, cell] : counts) {
     const auto& [task, policy, checkpoint] = key;
-    cells.push_back({task, policy, checkpoint, cell.n, share(cell.real, cell.n), share(cell.again, cell.both),
+    cells.push_back({task, policy, checkpoint, cell.n, cell.both, share(cell.real, cell.n), share(cell.again, cell.both),
                      share(cell.model, cell.n), share(cell.agree, cell.n)});
   }
   return cells;
@@ -135,12 +144,14 @@ std::optional<std::int64_t> UsableHorizon(const std::vector<ChunkDrift>& chunks)
 OutcomeMatch MatchOf(const std::vector<FidelityRow>& rows, const std::string& kind, FidelityColumn column) {
   const Confusion confusion = ConfusionOf(rows, kind, column);
   OutcomeMatch match;
+  match.asked = std::ranges::count(rows, kind, &FidelityRow::kind);
   match.n = confusion.total();
-  const auto rate = [](std::int64_t count, std::int64_t of, const char* none) {
+  const auto rate = [&match](std::int64_t count, std::int64_t of, const char* none) {
     if (of > 0) return WilsonInterval(count, of);
+    const Undefined why{match.asked == 0 ? "nothing was asked" : match.n == 0 ? "no pairs" : none};
     Estimate estimate;
-    estimate.value = Undefined{none};
-    estimate.interval = Undefined{none};
+    estimate.value = why;
+    estimate.interval = why;
     return estimate;
   };
   const std::int64_t failed = confusion.only_judge_success + confusion.both_failure,
@@ -152,6 +163,24 @@ OutcomeMatch MatchOf(const std::vector<FidelityRow>& rows, const std::string& ki
   return match;
 }
 
+std::vector<std::string> FailedSentences(const std::vector<PartEpisodes>& parts) {
+  std::vector<std::string> sentences;
+  for (const PartEpisodes& part : parts) {
+    if (part.failed > 0)
+      sentences.push_back(fmt::format("{}: {} of {} failed and {} in no number; the last: {}", part.part, part.failed,
+                                      Counted(part.episodes, "episode"), part.failed == 1 ? "is" : "are", part.last_failure));
+  }
+  return sentences;
+}
+
+bool HasOtherPairs(const Fidelity& fidelity) {
+  return fidelity.closed.n > 0 && fidelity.closed_again.n != fidelity.closed_again_told.n;
+}
+
+std::string PairsText(const OutcomeMatch& match) {
+  return match.n == match.asked ? fmt::format("{}", match.n) : fmt::format("{} of {}", match.n, match.asked);
+}
+
 Fidelity FidelityOf(FidelityInput input) {
   Fidelity fidelity;
   fidelity.cells = CellsOf(input.rows);
@@ -161,6 +190,7 @@ Fidelity FidelityOf(FidelityInput input) {
   fidelity.mmrv_again = MeanMmrv(fidelity.again);
   fidelity.closed = MatchOf(input.rows, "closed_loop", FidelityColumn::kModel);
   fidelity.closed_again = MatchOf(input.rows, "closed_loop", FidelityColumn::kAgain);
+  fidelity.closed_again_told = MatchOf(ToldOf(input.rows), "closed_loop", FidelityColumn::kAgain);
   fidelity.open = MatchOf(input.rows, "open_loop", FidelityColumn::kModel);
   fidelity.executed = MatchOf(input.rows, "executed", FidelityColumn::kModel);
   fidelity.wrong = WrongOutcomesOf(input.rows);

@@ -32,7 +32,8 @@ struct ChunkDrift {
   Number psnr = Undefined{"no clip is so long"};         ///< of all pixels
   Number psnr_moving = Undefined{"nothing moved"};       ///< of pixels that differ from the first frame in reality
   Number psnr_moving_copy = Undefined{"nothing moved"};  ///< of those, had the first frame stood still
-  Number gripper_px = Undefined{"not found"};            ///< mean distance of the gripper from where it really is
+  Number gripper_px = Undefined{"not found"};  ///< mean distance of the gripper, where it was found, from where it really is
+  Number gripper_found = Undefined{"out of sight"};  ///< in which share of the frames whose real picture shows where it is
 };
 
 /// Of replays: what pictures say, apart from outcomes.
@@ -49,6 +50,13 @@ struct JudgeQualityOnReal {
   Number kappa_masked = Undefined{"not asked"};  ///< with the object's pixels painted over
 };
 
+/// The episodes of one part of the measurement, in all its worlds. Those that failed are in no number.
+struct PartEpisodes {
+  std::string part;  ///< its folder: closed, open, …
+  std::int64_t episodes = 0, failed = 0;
+  std::string last_failure = {};
+};
+
 struct FidelityInput {
   std::string suite_hash, model_hash;  ///< hex
   std::vector<FidelityRow> rows;
@@ -56,19 +64,22 @@ struct FidelityInput {
   std::vector<ChunkDrift> horizon;  ///< of long rollouts
   Number seconds_per_chunk = Undefined{"nothing was imagined"};
   JudgeQualityOnReal judge;
+  std::vector<PartEpisodes> parts;  ///< that were asked
 };
 
 /// One policy on one task, closed loop; rates over the states that count in both worlds.
 struct FidelityCell {
   std::string task, policy, checkpoint;
-  std::int64_t n = 0;
+  std::int64_t n = 0;        ///< in reality and in the model
+  std::int64_t n_again = 0;  ///< in reality and in reality once more: `again` is over these
   Number real = Undefined{"no pairs"}, again = Undefined{"no pairs"}, model = Undefined{"no pairs"},
          agreement = Undefined{"no pairs"};
 };
 
 /// How often two columns of outcomes agree, and how they do not.
 struct OutcomeMatch {
-  std::int64_t n = 0;
+  std::int64_t asked = 0;  ///< rows of that kind
+  std::int64_t n = 0;      ///< of those, with an outcome in both columns: all else is over these
   Estimate agreement;
   Estimate hallucinated;  ///< success said, of those that truly failed
   Estimate missed;        ///< failure said, of those that truly succeeded
@@ -83,6 +94,7 @@ struct Fidelity {
   WorldComparison model, again;  ///< of the closed loop, against reality
   Number mmrv = Undefined{"no task has two policies"}, mmrv_again = Undefined{"no task has two policies"};  ///< mean over tasks
   OutcomeMatch closed, closed_again, open;
+  OutcomeMatch closed_again_told;  ///< reality against itself over the pairs whose imagined clip the judge could tell, too
   OutcomeMatch executed;  ///< what the model says of the actions chosen in it, against what they come to in reality
   /// Wrong outcomes of the closed loop whose actions were executed in reality: where the model goes wrong.
   struct WrongOutcomes {
@@ -97,6 +109,14 @@ struct Fidelity {
   std::optional<std::int64_t> usable_horizon_chunks;  ///< up to the first that gains less than 2 dB over a still picture
 };
 Fidelity FidelityOf(FidelityInput input);
+/// Whether reality is held against itself over other pairs than the model is: clips that its judge could not tell, or that
+/// failed, are in one and not in the other.
+bool HasOtherPairs(const Fidelity& fidelity);
+/// "38", or "38 of 40" where some of those asked have no outcome.
+std::string PairsText(const OutcomeMatch& match);
+
+/// "open: 2 of 40 episodes failed and are in no number; the last: …", for each part in which some did.
+std::vector<std::string> FailedSentences(const std::vector<PartEpisodes>& parts);
 
 /// fidelity.json (docs/fidelity.md); undefined numbers are null, their reasons stand under "undefined".
 std::string FidelityJson(const Fidelity& fidelity);

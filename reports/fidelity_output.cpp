@@ -49,40 +49,57 @@ Json DriftsOf(const std::vector<ChunkDrift>& chunks) {
   for (const ChunkDrift& chunk : chunks) clips.push_back(chunk.clips);
   return {{"clips_by_chunk", clips},
           {"gripper_px_error_by_chunk", ByChunk(chunks, &ChunkDrift::gripper_px)},
+          {"gripper_found_by_chunk", ByChunk(chunks, &ChunkDrift::gripper_found)},
           {"psnr_by_chunk", ByChunk(chunks, &ChunkDrift::psnr)},
           {"psnr_moving_by_chunk", ByChunk(chunks, &ChunkDrift::psnr_moving)},
           {"psnr_moving_copy_by_chunk", ByChunk(chunks, &ChunkDrift::psnr_moving_copy)}};
 }
 
-Number ObjectError(const OpenLoopDrift& drift) {
+Number ObjectError(const Fidelity& fidelity) {
+  const OpenLoopDrift& drift = fidelity.input.open_loop;
+  if (fidelity.open.asked == 0) return Undefined{"nothing was asked"};
   if (drift.object_px.empty()) return Undefined{"the object was found in no real clip's end"};
   std::vector<double> sorted = drift.object_px;
   std::sort(sorted.begin(), sorted.end());
   return Quantile(sorted, kObjectQuantile);
 }
 
+/// n and the shares of what two columns of outcomes say.
+void PutMatch(const OutcomeMatch& match, NumberWriter& writer) {
+  writer.Put("n", match.n);
+  writer.Put("agreement", match.agreement.value);
+  writer.Put("hallucinated", match.hallucinated.value);
+  writer.Put("missed", match.missed.value);
+}
+
 Json OpenLoopJson(const Fidelity& fidelity) {
   NumberWriter open;
-  open.Put("n", fidelity.open.n);
-  open.Put("agreement", fidelity.open.agreement.value);
-  open.Put("hallucinated", fidelity.open.hallucinated.value);
-  open.Put("missed", fidelity.open.missed.value);
-  open.Put("object_px_error_p85", ObjectError(fidelity.input.open_loop));
+  PutMatch(fidelity.open, open);
+  open.Put("object_px_error_p85", ObjectError(fidelity));
   Json json = open.Take();
   json.update(DriftsOf(fidelity.input.open_loop.chunks));
   return json;
 }
 
 Json ExecutedJson(const Fidelity& fidelity) {
-  const OutcomeMatch& executed = fidelity.executed;
   NumberWriter writer;
-  writer.Put("n", executed.n);
-  writer.Put("agreement", executed.agreement.value);
-  writer.Put("hallucinated", executed.hallucinated.value);
-  writer.Put("missed", executed.missed.value);
+  PutMatch(fidelity.executed, writer);
   writer.Put("wrong_of_actions", fidelity.wrong.of_actions);
   writer.Put("wrong_led_astray", fidelity.wrong.led_astray);
   return writer.Take();
+}
+
+Json ToldJson(const OutcomeMatch& told) {
+  NumberWriter writer;
+  PutMatch(told, writer);
+  return writer.Take();
+}
+
+Json PartsJson(const std::vector<PartEpisodes>& parts) {
+  Json list = Json::array();
+  for (const PartEpisodes& part : parts)
+    list.push_back({{"part", part.part}, {"episodes", part.episodes}, {"failed", part.failed}});
+  return list;
 }
 
 Json CellsJson(const std::vector<FidelityCell>& cells) {
@@ -93,6 +110,7 @@ Json CellsJson(const std::vector<FidelityCell>& cells) {
     writer.Put("policy", Json(cell.policy));
     writer.Put("checkpoint", Json(cell.checkpoint));
     writer.Put("n", cell.n);
+    writer.Put("n_real_real", cell.n_again);
     writer.Put("real_sr", cell.real);
     writer.Put("real2_sr", cell.again);
     writer.Put("wm_sr", cell.model);
@@ -138,10 +156,10 @@ std::string Words(const Number& number) { return number ? fmt::format("{:.3f}", 
 
 /// Pictures alone: a row per chunk.
 std::string DriftText(const std::vector<ChunkDrift>& chunks) {
-  std::vector<std::vector<std::string>> rows = {{"chunk", "clips", "dB", "dB of what moves", "had it stood still", "gripper px"}};
+  std::vector<std::vector<std::string>> rows = {{"chunk", "clips", "dB", "dB of what moves", "had it stood still", "gripper px", "gripper found"}};
   for (std::size_t i = 0; i < chunks.size(); ++i)
     rows.push_back({std::to_string(i + 1), std::to_string(chunks[i].clips), Words(chunks[i].psnr), Words(chunks[i].psnr_moving),
-                    Words(chunks[i].psnr_moving_copy), Words(chunks[i].gripper_px)});
+                    Words(chunks[i].psnr_moving_copy), Words(chunks[i].gripper_px), Words(chunks[i].gripper_found)});
   return TextTable(rows);
 }
 
@@ -158,6 +176,8 @@ std::string FidelityJson(const Fidelity& fidelity) {
   all.Put("spearman", correlation.spearman.value);
   all.Put("mmrv", fidelity.mmrv);
   all.Put("mmrv_real_real", fidelity.mmrv_again);
+  all.Put("n", fidelity.closed.n);
+  all.Put("n_real_real", fidelity.closed_again.n);
   all.Put("agreement", fidelity.closed.agreement.value);
   all.Put("agreement_real_real", fidelity.closed_again.agreement.value);
   all.Put("kappa", fidelity.closed.kappa.value);
@@ -165,13 +185,19 @@ std::string FidelityJson(const Fidelity& fidelity) {
   all.Put("hallucinated_real_real", fidelity.closed_again.hallucinated.value);
   all.Put("missed", fidelity.closed.missed.value);
   all.Put("missed_real_real", fidelity.closed_again.missed.value);
+  all.Put("told_real_real", ToldJson(fidelity.closed_again_told));
   all.Put("open_loop", OpenLoopJson(fidelity));
   all.Put("executed", ExecutedJson(fidelity));
   all.Put("counterfactual", CounterfactualsJson(fidelity));
   all.Put("horizon", DriftsOf(fidelity.input.horizon));
-  all.Put("usable_horizon_chunks", fidelity.usable_horizon_chunks ? Json(*fidelity.usable_horizon_chunks) : Json(nullptr));
+  if (fidelity.usable_horizon_chunks) {
+    all.Put("usable_horizon_chunks", *fidelity.usable_horizon_chunks);
+  } else {
+    all.Put("usable_horizon_chunks", Undefined{"no long rollouts"});
+  }
   all.Put("seconds_per_chunk", fidelity.input.seconds_per_chunk);
   all.Put("judge", JudgeJson(fidelity.input.judge));
+  all.Put("parts", PartsJson(fidelity.input.parts));
   return all.Take().dump(1) + "\n";
 }
 
@@ -185,7 +211,9 @@ std::string FidelityCsv(const std::vector<FidelityRow>& rows) {
 }
 
 std::string FidelityText(const Fidelity& fidelity) {
-  if (fidelity.cells.empty()) return DriftText(fidelity.input.open_loop.chunks);
+  std::string failed;
+  for (const std::string& sentence : FailedSentences(fidelity.input.parts)) failed += sentence + "\n";
+  if (fidelity.cells.empty()) return DriftText(fidelity.input.open_loop.chunks) + failed;
   std::vector<std::vector<std::string>> rows = {{"task", "policy", "n", "real", "again", "model", "agreement"}};
   for (const FidelityCell& cell : fidelity.cells)
     rows.push_back({cell.task, PolicyLabel(cell.policy, cell.checkpoint), std::to_string(cell.n), Words(cell.real),
@@ -193,11 +221,12 @@ std::string FidelityText(const Fidelity& fidelity) {
   std::string text = TextTable(rows) + "\n";
   std::vector<std::vector<std::string>> whole = {{"", "n", "agreement", "hallucinated", "missed"}};
   const auto add = [&](const std::string& name, const OutcomeMatch& match) {
-    whole.push_back({name, std::to_string(match.n), Words(match.agreement.value), Words(match.hallucinated.value),
+    whole.push_back({name, PairsText(match), Words(match.agreement.value), Words(match.hallucinated.value),
                      Words(match.missed.value)});
   };
   add("closed loop", fidelity.closed);
   add("real against real", fidelity.closed_again);
+  if (HasOtherPairs(fidelity)) add("real against real, of the closed loop's pairs", fidelity.closed_again_told);
   if (fidelity.open.n > 0) add("open loop", fidelity.open);
   if (fidelity.executed.n > 0) add("executed", fidelity.executed);
   for (const Fidelity::Counterfactual& one : fidelity.counterfactuals) add(one.kind, one.match);
@@ -206,7 +235,7 @@ std::string FidelityText(const Fidelity& fidelity) {
   text += fmt::format("Pearson {} (low {}), Spearman {}, MMRV within tasks {} (real against real {})\n", Words(correlation.pearson.value),
                       Words(LowOf(correlation.pearson)), Words(correlation.spearman.value), Words(fidelity.mmrv),
                       Words(fidelity.mmrv_again));
-  return text;
+  return text + failed;
 }
 
 }  // namespace evac

@@ -51,7 +51,7 @@ std::string TableHead(const std::vector<std::string>& columns) {
 
 std::string MatchRow(const std::string& name, const OutcomeMatch& match) {
   return fmt::format("<tr><th scope=\"row\">{}</th><td class=\"num\">{}</td><td class=\"num\">{}</td><td class=\"num\">{}</td>"
-                     "<td class=\"num\">{}</td><td class=\"num\">{}</td></tr>", Escaped(name), match.n,
+                     "<td class=\"num\">{}</td><td class=\"num\">{}</td></tr>", Escaped(name), PairsText(match),
                      WithInterval(match.agreement, 100, 0, " %"), WithInterval(match.hallucinated, 100, 0, " %"),
                      WithInterval(match.missed, 100, 0, " %"), WithInterval(match.kappa, 1, 2, ""));
 }
@@ -68,6 +68,7 @@ std::string WhereItGoesWrong(const Fidelity& fidelity) {
 std::string MatchTable(const Fidelity& fidelity) {
   std::string rows = MatchRow("closed loop: the policies act in the world model", fidelity.closed) +
                      MatchRow("reality against reality, other noise", fidelity.closed_again);
+  if (HasOtherPairs(fidelity)) rows += MatchRow("reality against reality, of the closed loop's pairs", fidelity.closed_again_told);
   if (fidelity.open.n > 0) rows += MatchRow("open loop: recorded actions replayed", fidelity.open);
   if (fidelity.executed.n > 0) rows += MatchRow("executed: what policies chose in the world model, done in reality", fidelity.executed);
   for (const Fidelity::Counterfactual& one : fidelity.counterfactuals) rows += MatchRow(one.kind, one.match);
@@ -169,9 +170,9 @@ std::string ChunkTable(const std::vector<ChunkDrift>& chunks) {
     rows += fmt::format("<tr><th scope=\"row\">{}</th><td class=\"num\">{}</td>", i + 1, chunks[i].clips);
     for (const Number& number : {chunks[i].psnr, chunks[i].psnr_moving, chunks[i].psnr_moving_copy, chunks[i].gripper_px})
       rows += "<td class=\"num\">" + Decimal(number, 1) + "</td>";
-    rows += "</tr>";
+    rows += "<td class=\"num\">" + Percent(chunks[i].gripper_found) + "</td></tr>";
   }
-  return TableHead({"chunk", "clips", "dB", "dB of what moves", "had it stood still", "gripper off by, pixels"}) + rows +
+  return TableHead({"chunk", "clips", "dB", "dB of what moves", "had it stood still", "gripper off by, pixels", "gripper found"}) + rows +
          "</tbody></table></div>";
 }
 
@@ -180,6 +181,13 @@ std::string RecordedBody(const Fidelity& fidelity) {
   const std::vector<ChunkDrift>& chunks = fidelity.input.open_loop.chunks;
   return Section("pictures", "Pictures") + DriftChart(chunks) + ChunkTable(chunks) + "</section>" + Section("clips", "Clips") +
          Clips(fidelity, "open_loop", std::nullopt, std::nullopt) + "</section>";
+}
+
+/// A line per part in which episodes failed.
+std::string Failed(const Fidelity& fidelity) {
+  std::string html;
+  for (const std::string& sentence : FailedSentences(fidelity.input.parts)) html += "<p>" + Escaped(sentence) + "</p>";
+  return html;
 }
 
 std::string RecordedHeadline(const Fidelity& fidelity) {
@@ -198,7 +206,8 @@ std::string RecordedHeadline(const Fidelity& fidelity) {
 std::string FidelityPage(const Fidelity& fidelity) {
   const bool has_outcomes = !fidelity.cells.empty();
   return PageHead("Fidelity of the world model", PageScripts::kNone, kStyle) + "<body><header><h1>How true is the world model?</h1></header>\n<main>" +
-         (has_outcomes ? Headline(fidelity) + WholeBody(fidelity) : RecordedHeadline(fidelity) + RecordedBody(fidelity)) +
+         (has_outcomes ? Headline(fidelity) + Failed(fidelity) + WholeBody(fidelity)
+                       : RecordedHeadline(fidelity) + Failed(fidelity) + RecordedBody(fidelity)) +
          fmt::format("<section id=\"provenance\"><h2>Made from</h2><p class=\"quiet\">suite {:.16}…, world model "
                      "{:.16}…</p></section></main></body></html>\n",
                      fidelity.input.suite_hash, fidelity.input.model_hash);

@@ -18,6 +18,15 @@ std::array<double, 12> Twelve(const Config& page, const std::string& key) {
   return twelve;
 }
 
+ActionStatistics StatisticsIn(const Config& page) {
+  page.AllowOnly({"robot", "mean", "deviation"});
+  ActionStatistics statistics{page.Get<std::string>("robot"), Twelve(page, "mean"), Twelve(page, "deviation")};
+  const auto& deviation = statistics.deviation;
+  page.Require(std::all_of(deviation.begin(), deviation.end(), [](double value) { return value > 0; }), "deviation",
+               "12 positive numbers");
+  return statistics;
+}
+
 }  // namespace
 
 ActionStatistics AgiBotWorldStatistics() {
@@ -31,13 +40,11 @@ ActionStatistics AgiBotWorldStatistics() {
 }
 
 ActionStatistics ReadActionStatistics(const std::filesystem::path& path) {
-  const Config page = Config::FromFile(path);
-  page.AllowOnly({"robot", "mean", "deviation"});
-  ActionStatistics statistics{page.Get<std::string>("robot"), Twelve(page, "mean"), Twelve(page, "deviation")};
-  const auto& deviation = statistics.deviation;
-  page.Require(std::all_of(deviation.begin(), deviation.end(), [](double value) { return value > 0; }), "deviation",
-               "12 positive numbers");
-  return statistics;
+  return StatisticsIn(Config::FromFile(path));
+}
+
+ActionStatistics ParseActionStatistics(const std::string& text, const std::string& name) {
+  return StatisticsIn(Config::FromText(text, name));
 }
 
 }  // namespace evac

@@ -6,6 +6,8 @@
 
 namespace evac {
 
+inline constexpr double kStatisticsFrames_hz = 30;  ///< of the recordings that motion statistics are per frame of
+
 /// Mean and standard deviation of a robot's motion from one frame to the next at 30 Hz: left xyz (metres), left roll
 /// pitch yaw (radians), then right.
 struct ActionStatistics {
@@ -19,5 +21,7 @@ ActionStatistics AgiBotWorldStatistics();
 /// A page with `robot`, `mean` and `deviation`: one per robot, in configs/robots.
 /// @throws InvalidInput naming file and field: not 12 numbers, not finite, a deviation that is not positive.
 ActionStatistics ReadActionStatistics(const std::filesystem::path& path);
+/// The same of a text that stands elsewhere. @param name  stands for the file in messages
+ActionStatistics ParseActionStatistics(const std::string& text, const std::string& name);
 
 }  // namespace evac

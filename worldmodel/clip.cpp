@@ -81,9 +81,12 @@ cv::Mat Shrunk(const cv::Mat& picture, int shrink) {
   return small;
 }
 
-EpisodeTruth NothingKnown(std::size_t frames, std::size_t views) {
-  return {views, std::vector<float>(frames * views * 2, std::numeric_limits<float>::quiet_NaN()),
-          std::vector<std::uint8_t>(frames, 0)};
+EpisodeTruth NothingKnown(std::size_t frames, const std::vector<Camera>& cameras) {
+  EpisodeTruth truth;
+  for (const Camera& camera : cameras) truth.cameras.push_back(camera.name);
+  truth.object_px.assign(frames * cameras.size() * 2, std::numeric_limits<float>::quiet_NaN());
+  truth.contact.assign(frames, 0);
+  return truth;
 }
 
 }  // namespace
@@ -110,7 +113,7 @@ Camera Cropped(const Camera& camera, const Crop& crop, const cv::Size& picture_p
 ClipSource ReadClipSource(const Recording& recording, const EpisodeTruth* truth, int shrink) {
   ClipSource source;
   source.arms = recording.told.empty() ? recording.arms : recording.told;
-  const std::size_t steps = source.arms.size(), views = recording.cameras.size();
+  const std::size_t steps = source.arms.size();
   for (const Camera& camera : recording.cameras)
     source.cameras.push_back(Resized(camera, camera.width_px / shrink, camera.height_px / shrink));
   RecordedFrames walk(recording);
@@ -118,7 +121,7 @@ ClipSource ReadClipSource(const Recording& recording, const EpisodeTruth* truth,
     std::vector<cv::Mat>& pictures = source.pictures.emplace_back();
     for (const cv::Mat& picture : walk.Next()) pictures.push_back(Shrunk(picture, shrink));
   }
-  source.truth = truth != nullptr ? *truth : NothingKnown(steps, views);
+  source.truth = truth != nullptr ? *truth : NothingKnown(steps, recording.cameras);
   for (float& value : source.truth.object_px) value /= static_cast<float>(shrink);
   return source;
 }

@@ -52,7 +52,7 @@ struct ClipSource {
 };
 
 /// Decodes the recording's pictures, `shrink` video pixels to one, and puts cameras and truth into their pixels.
-/// @param truth  in pixels of the video, or null
+/// @param truth  of the recording's cameras in their order, in pixels of the video, or null
 /// @throws Error of kind short_video or broken_video.
 ClipSource ReadClipSource(const Recording& recording, const EpisodeTruth* truth, int shrink);
 

@@ -14,8 +14,6 @@
 namespace evac {
 namespace {
 
-constexpr double kRawFramePeriod_s = 1.0 / 30;  ///< of the recordings whose statistics normalise the actions
-
 void CheckFits(const Task& task, const InitialScene& scene, const std::string& world) {
   if (scene.arms.size() != task.arms.size())
     throw InvalidInput("world {}: the first frame of task {} shows {} arms, wanted {}", world, task.id,
@@ -67,7 +65,7 @@ EvacWorld::EvacWorld(Imaginer imaginer, FirstScene first_scene, EvacWorldOptions
 }
 
 WorldStep EvacWorld::Reset(SceneId scene, const Task& task, const InitialState& initial, std::uint64_t seed) {
-  const double period_s = imaginer_.options().conditioning.stride * kRawFramePeriod_s;
+  const double period_s = imaginer_.options().conditioning.stride / kStatisticsFrames_hz;
   if (std::abs(task.period_s - period_s) > 1e-6)
     throw InvalidInput("world {}: its frames are {:.4g} s apart, those of task {} {:.4g} s", options_.name, period_s,
                        task.id, task.period_s);

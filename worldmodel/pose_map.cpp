@@ -122,11 +122,10 @@ DrawnGripper Drawn(Side side, const GripperPose& pose) {
 }
 
 PoseMapOptions PoseMapOptions::ForHeight(int height_px) {
-  const auto scaled = [&](int size_px) {
-    return std::max(1, static_cast<int>(std::lround(size_px * static_cast<double>(height_px) / 320)));
-  };
-  const PoseMapOptions published;
-  return {scaled(published.radius_px), scaled(published.thickness_px), false};
+  nn::PoseMapConfig config;
+  config.scaled = true;
+  const nn::PoseMapSizes sizes = config.Sizes(height_px);
+  return {sizes.radius_px, sizes.thickness_px, false};
 }
 
 PoseMapOptions PoseMapOptions::Of(const nn::ModelConfig& config) {

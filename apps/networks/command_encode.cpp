@@ -80,9 +80,7 @@ void LinkInto(const std::filesystem::path& folder, const std::filesystem::path& 
     if (std::filesystem::equivalent(file, to) || Sha256HexOfFile(file) == Sha256HexOfFile(to)) return;
     throw InvalidInput("{} is another file than {}: wanted a folder of its own for each packing", to.string(), file.string());
   }
-  std::error_code refused;
-  std::filesystem::create_hard_link(file, to, refused);
-  if (refused) std::filesystem::copy_file(file, to);
+  LinkOrCopy(file, to);
 }
 
 /// A packing as SHARDS, whose latents are what a world model imagines of its clips; shards.json comes last.

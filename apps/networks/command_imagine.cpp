@@ -15,9 +15,10 @@ void AddInputs(CLI::App& command, ImagineArguments& arguments) {
   command.add_option("--extrinsics", inputs.files.extrinsics, "base_from_camera: .npy [4, 4], or AgiBot World's .json");
   command.add_option("--intrinsics", inputs.files.intrinsics, "pinhole: .npy [3, 3], or AgiBot World's .json");
   command
-      .add_option("--cameras", inputs.cameras, "the views, with commas between them (a folder's; default: head first)")
+      .add_option("--cameras", inputs.cameras, "the views, with commas between them (a folder's; default: what the weights "
+                  "say, else the first of head, hand_left, hand_right)")
       ->delimiter(',');
-  command.add_option("--stride", inputs.stride, "every Nth recorded step is a frame; default: those 0.1 s apart")
+  command.add_option("--stride", inputs.stride, "every Nth recorded step is a frame; default: those as far apart as the weights say, else 0.1 s")
       ->check(CLI::Range(1, 1000));
 }
 
@@ -36,7 +37,8 @@ void AddModel(CLI::App& command, ImagineArguments& arguments) {
   SamplerArguments& sampler = arguments.sampler;
   command.add_option("--weights", arguments.weights, "a checkpoint (docs/weights.md)");
   command.add_option("--statistics", arguments.statistics,
-                     "a robot's page of motion statistics; default: apps/configs/robots/agibotworld.yaml's");
+                     "a robot's page of motion statistics; default: what the weights say, of weights that say nothing "
+                     "apps/configs/robots/agibotworld.yaml's");
   command.add_option("--solver", sampler.solver, "ddim, or dpm: DPM-Solver++(2M)")
       ->check(CLI::IsMember({"ddim", "dpm"}))
       ->capture_default_str();

@@ -8,6 +8,7 @@
 #include "apps/interrupts.h"
 #include "apps/network_parts.h"
 #include "apps/networks/codec_identity.h"
+#include "apps/networks/packed_clips.h"
 #include "apps/networks/train_arguments.h"
 #include "apps/networks/training_page.h"
 #include "core/file.h"
@@ -32,6 +33,7 @@ ExitCode RunTraining(const TrainArguments& arguments, const char* section, const
   const CatchInterrupts catch_interrupts;
   TrainingProgress progress(stderr);
   const train::JobPlace place = PlaceOf(arguments, progress);
+  CheckHoldouts(place.shards);
   nn::KeepFreedMemory();
   const nn::LibraryThreads threads(LibraryThreadsOf(place, options.job));
   return End(run(place, options), arguments.out, file);
@@ -71,8 +73,8 @@ ExitCode RunWorld(const TrainArguments& arguments) {
   return RunTraining<train::WorldOptions>(arguments, "world", "weights.safetensors", run);
 }
 
-void AddInit(CLI::App& command, TrainArguments& arguments, const char* what) {
-  command.add_option("--init", arguments.init, what)->check(CLI::ExistingFile);
+CLI::Option* AddInit(CLI::App& command, TrainArguments& arguments, const char* what) {
+  return command.add_option("--init", arguments.init, what)->check(CLI::ExistingFile);
 }
 
 void AddCodec(CLI::App& group, ExitCode& exit_code) {
@@ -113,15 +115,20 @@ void AddWorld(CLI::App& group, ExitCode& exit_code) {
   command->add_option("--codec", arguments->codec, "the codec's weights, which encoded the shards")
       ->required()
       ->check(CLI::ExistingFile);
-  command->add_option("--forecast", arguments->forecast, "of `evac train forecast`, where the sizes have one; stays as it is")
+  command
+      ->add_option("--forecast", arguments->forecast,
+                   "of `evac train forecast`, where the sizes have one and --init has not; stays as it is")
       ->check(CLI::ExistingFile);
-  AddInit(*command, *arguments, "a checkpoint to go on from: fine-tuning; every key must fit");
+  CLI::Option* init = AddInit(*command, *arguments, "a checkpoint to go on from: fine-tuning; every key must fit");
   command
       ->add_option("--init-except", arguments->init_except,
                    "keys that begin so are drawn anew instead, with commas between them")
-      ->delimiter(',');
-  command->add_flag("--init-widen", arguments->init_widen,
-                    "the checkpoint is of a model that was shown less: what is new counts nothing at first");
+      ->delimiter(',')
+      ->needs(init);
+  command
+      ->add_flag("--init-widen", arguments->init_widen,
+                 "the checkpoint is of a model that was shown less: what is new counts nothing at first")
+      ->needs(init);
   command->footer(
       "Examples:\n"
       "  evac train world out/shards --config apps/configs/desk_model.yaml --training apps/configs/desk_training.yaml "

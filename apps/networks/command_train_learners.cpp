@@ -1,5 +1,6 @@
 #include <fmt/format.h>
 
+#include <charconv>
 #include <memory>
 #include <optional>
 
@@ -29,6 +30,7 @@ ExitCode RunLearner(const TrainArguments& arguments, const std::string& section,
   const CatchInterrupts catch_interrupts;
   TrainingProgress progress(stderr);
   const train::JobPlace place = PlaceOf(arguments, progress);
+  CheckHoldouts(place.shards);
   nn::KeepFreedMemory();
   const nn::LibraryThreads threads(1);
   return End(train(place, options), arguments.out, (section + ".safetensors").c_str());
@@ -66,6 +68,7 @@ ExitCode CalibrateOnly(const TrainArguments& arguments) {
   ReadTrainingPage(arguments.training, "judge", arguments.settings, SettingsOf(options));
   TrainingProgress progress(stderr);
   const train::JobPlace place = PlaceOf(arguments, progress);
+  CheckHoldouts(place.shards);
   nn::KeepFreedMemory();
   CalibrateJudge(place, options, ShardJudgeData(arguments, place).data);
   fmt::print("{}: calibrated anew\n", (place.out / "judge.safetensors").string());
@@ -94,6 +97,14 @@ ExitCode RunJudgeFromLabels(const LabelledArguments& arguments) {
                                             const LabelledClips clips = ReadLabelledClips(runs, place.say);
                                             return TrainJudge(place, options, {*clips.learn, *clips.holdout});
                                           });
+}
+
+/// What is wrong with the side of a picture, or nothing.
+std::string ComplaintOfSide(const std::string& text) {
+  int side_px = 0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), side_px);
+  const bool is_whole = error == std::errc() && end == text.data() + text.size();
+  return is_whole && side_px % 8 == 0 ? "" : "found " + text + ", wanted a multiple of 8";
 }
 
 ExitCode RunPolicy(const TrainArguments& arguments) {
@@ -133,7 +144,7 @@ void AddJudgeTrain(CLI::App& judge, ExitCode& exit_code) {
   command->add_option("RUNS", runs.runs, "folders of runs; their clips are what it learns from")
       ->required()
       ->check(CLI::ExistingDirectory);
-  command->add_option("--truth", runs.truth, "whose verdicts: a judge's name, human:STUDY say (evac ls shows them)")
+  command->add_option("--truth", runs.truth, "whose verdicts: a judge's name, human say (evac ls shows them)")
       ->capture_default_str();
   command->add_option("--worlds", runs.worlds, "clips of these worlds alone, with commas between them")->delimiter(',');
   command->add_option("--holdout", runs.holdout, "share of initial states that are kept apart to measure with")
@@ -142,10 +153,7 @@ void AddJudgeTrain(CLI::App& judge, ExitCode& exit_code) {
   command->add_option("--least", runs.least, "labels of each kind that a task must have")
       ->check(CLI::Range(1, 1000000))
       ->capture_default_str();
-  const auto side =
-      CLI::Range(8, 1024) &
-      CLI::Validator([](const std::string& text) { return std::stoi(text) % 8 == 0 ? "" : "wanted a multiple of 8"; },
-                     "multiple of 8");
+  const auto side = CLI::Range(8, 1024) & CLI::Validator(ComplaintOfSide, "multiple of 8");
   command->add_option("--height-px", runs.height_px, "of a picture as the judge sees it")
       ->check(side)
       ->capture_default_str();
@@ -153,7 +161,7 @@ void AddJudgeTrain(CLI::App& judge, ExitCode& exit_code) {
   AddTraining(*command, std::shared_ptr<TrainArguments>(arguments, &arguments->training));
   command->footer(
       "Example:\n"
-      "  evac judge train out/mine --truth human:study --training apps/configs/desk_training.yaml --out out/judge\n"
+      "  evac judge train out/mine --truth human --training apps/configs/desk_training.yaml --out out/judge\n"
       "  evac judge out/next --judge classifier --weights out/judge/judge.safetensors\n"
       "It does not judge clips that it learned from. OUT: judge.safetensors with its card, metrics.csv, holdout.csv,\n"
       "judged.csv, thresholds.csv, curves.svg (docs/classifier_judge.md)");

@@ -18,6 +18,7 @@
 #include "worldmodel/nn/mean_weights.h"
 #include "worldmodel/nn/weight_keys.h"
 #include "worldmodel/nn/weights.h"
+#include "worldmodel/train/train_world.h"
 #include "worldmodel/train/weight_files.h"
 
 namespace evac {
@@ -28,7 +29,7 @@ using Clock = std::chrono::steady_clock;
 using Json = nlohmann::ordered_json;
 
 struct WeightsArguments {
-  std::string in, out, config, forecast;
+  std::string in, out, config, forecast, shards;
   std::vector<std::string> several;
   std::string dtype = "f32";
   std::uint64_t seed = 0;
@@ -222,6 +223,16 @@ void DemandPage(const WeightsArguments& arguments) {
                              : fit.extra[0] + " is not its own");
 }
 
+/// What the weights were trained for, of weights that do not say it, from the shards that they learned from.
+void AddWhatFor(const std::string& shards, const std::string& weights, TensorMetadata& metadata) {
+  const train::ShardSet set(shards, train::Split::kTrain);
+  for (const auto& [key, value] : train::WhatFor(set.metadata())) {
+    const auto [found, is_new] = metadata.emplace(key, value);
+    if (!is_new && found->second != value)
+      throw InvalidInput("{}: its {} is '{}', that of --shards {} is '{}'", weights, key, found->second, shards, value);
+  }
+}
+
 ExitCode RunConvert(const WeightsArguments& arguments) {
   DemandNew(arguments.out);
   DemandPage(arguments);
@@ -232,6 +243,7 @@ ExitCode RunConvert(const WeightsArguments& arguments) {
   for (const auto& [key, value] : source.file().metadata()) {
     if (key != "layout") options.metadata.emplace(key, value);
   }
+  if (!arguments.shards.empty()) AddWhatFor(arguments.shards, arguments.in, options.metadata);
   if (arguments.forecast.empty()) {
     Save(arguments, source, std::move(options));
     return ExitCode::kOk;
@@ -310,6 +322,9 @@ void AddConvert(CLI::App& group, const Arguments& arguments, ExitCode& exit_code
   command->add_flag("--lean", arguments->lean, "leave out what nothing reads");
   command->add_option("--forecast", arguments->forecast, "of `evac train forecast`: takes the place of the one in IN")
       ->check(CLI::ExistingFile);
+  command->add_option("--shards", arguments->shards,
+                      "what IN learned from: OUT says what it is for, where IN does not (period, cameras, statistics, …)")
+      ->check(CLI::ExistingDirectory);
   command->footer(
       "Examples:\n"
       "  evac weights convert evac.ckpt evac.safetensors\n"

@@ -8,13 +8,19 @@
 #include "worldmodel/evac_world.h"
 #include "worldmodel/nn/memory.h"
 #include "worldmodel/nn/weights.h"
+#include "worldmodel/shard_writer.h"
+#include "worldmodel/trained_for.h"
 
 namespace evac {
 namespace {
 
-constexpr double kRawFrames_hz = 30;  ///< of the statistics
+/// The page's pose maps, as the suite has them drawn.
+PoseMapOptions PoseMapsOf(const SuiteEvac& evac, nn::ModelConfig config) {
+  config.pose_map.scaled |= evac.pose_map_scales;
+  return PoseMapOptions::Of(config);
+}
 
-ImaginerOptions OptionsOf(const SuiteEvac& evac, nn::ModelConfig config, int threads_per_scene) {
+ImaginerOptions OptionsOf(const SuiteEvac& evac, const nn::ModelConfig& config, int threads_per_scene) {
   const auto has = [&](const char* quirk) {
     return std::find(evac.quirks.begin(), evac.quirks.end(), quirk) != evac.quirks.end();
   };
@@ -26,10 +32,9 @@ ImaginerOptions OptionsOf(const SuiteEvac& evac, nn::ModelConfig config, int thr
   options.sampler.guidance_rescale = evac.cfg_rescale;
   options.sampler.memory_not_scaled = has("memory_not_scaled");
   options.sampler.residual_noise = has("residual_noise");
-  if (evac.statistics) options.conditioning.statistics = ReadActionStatistics(*evac.statistics);
-  options.conditioning.stride = evac.period_s * kRawFrames_hz;
-  config.pose_map.scaled |= evac.pose_map_scales;
-  options.conditioning.pose_map = PoseMapOptions::Of(config);
+  options.conditioning.statistics = TrainedFor::Read(evac.weights).StatisticsOr(evac.statistics);
+  options.conditioning.stride = evac.period_s * kStatisticsFrames_hz;
+  options.conditioning.pose_map = PoseMapsOf(evac, config);
   options.conditioning.pose_map.draw_behind_camera = has("draw_behind_camera");
   options.decoded_start = has("decoded_start");
   options.identity = fmt::format("{} threads {}", evac.hash, threads_per_scene);
@@ -69,10 +74,26 @@ std::unique_ptr<const nn::EvacModel> Load(const SuiteEvac& evac, const nn::Model
   throw InvalidInput("{}", error.what());
 }
 
+/// Weights that say what they were trained for are asked for nothing else.
+void CheckTrainedFor(const SuiteEvac& evac, const nn::ModelConfig& config, const std::string& name,
+                     const std::vector<Task>& tasks) {
+  const TrainedFor trained = TrainedFor::Read(evac.weights);
+  const std::string who = fmt::format("world {}", name);
+  if (!trained.statistics && !evac.statistics)
+    std::fprintf(stderr, "evac: warning: %s: neither the suite nor %s says the statistics of the arms' motion: taken are AgiBot World's\n",
+                 who.c_str(), evac.weights.c_str());
+  trained.StatisticsOr(evac.statistics);
+  trained.CheckPeriod(evac.period_s, who + ": field period_s");
+  trained.CheckPoseMap(PoseMapWords(PoseMapsOf(evac, config)), who);
+  for (const Task& task : tasks) trained.CheckCameras(NamesOf(task.cameras), fmt::format("{}: task {}", who, task.id));
+}
+
 }  // namespace
 
-void CheckNetwork(const SuiteEvac& evac) try {
-  nn::FileWeights(evac.weights, ReadEvacConfig(evac.config));
+void CheckNetwork(const SuiteWorld& world, const std::vector<Task>& tasks) try {
+  const nn::ModelConfig config = ReadEvacConfig(world.evac->config);
+  nn::FileWeights(world.evac->weights, config);
+  CheckTrainedFor(*world.evac, config, world.name, tasks);
 } catch (const TensorError& error) {
   throw InvalidInput("{}", error.what());
 }

@@ -3,22 +3,29 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <iterator>
 #include <map>
 
 #include "apps/evaluate.h"
 #include "apps/factory.h"
+#include "apps/judge_with_progress.h"
 #include "apps/networks/fidelity_frames.h"
 #include "apps/networks/fidelity_judge.h"
 #include "apps/networks/fidelity_plans.h"
 #include "apps/interrupts.h"
 #include "core/version.h"
 #include "harness/scheduler.h"
+#include "judges/oracle_judge.h"
 #include "worldmodel/evac_config.h"
 
 namespace evac {
 namespace {
 
 namespace fs = std::filesystem;
+
+bool Asks(const FidelityArguments& arguments, const char* part) {
+  return std::find(arguments.parts.begin(), arguments.parts.end(), part) != arguments.parts.end();
+}
 
 /// One call's work: what it was asked, and what it has measured so far.
 class Measuring {
@@ -30,9 +37,16 @@ class Measuring {
         worlds_(WorldsOf(suite_)),
         model_(ReadEvacConfig(worlds_.model.evac->config)),
         chunk_(static_cast<int>(model_.chunk)),
-        judge_(arguments.classifier) {
+        judge_(arguments.classifier),
+        replayed_(ToTheLastAction(suite_.tasks, suite_)) {
     input_.suite_hash = suite_.hash;
     input_.model_hash = worlds_.model.evac->hash;
+  }
+
+  /// What would else be found out when reality was already asked.
+  void Check() const {
+    judge_.RequireKnows(suite_.tasks);
+    if (Asks(arguments_, "counterfactual")) Counterfactuals({}, replayed_, 1);
   }
 
   ExitCode Closed() {
@@ -40,10 +54,13 @@ class Measuring {
                                                             .suite_hash = suite_.hash,
                                                             .suite_path = fs::absolute(suite_.path).lexically_normal().string(),
                                                             .evac_version = EVAC_VERSION});
+    RequireSameParts();
     StateReality(out_, suite_);
     TakeRealityOf(store);
     const ExitCode exit_code = Evaluate(suite_, store, {});
     if (exit_code != ExitCode::kOk) return exit_code;
+    OracleJudge oracle(store);  // whatever judges the suite asks for: it says what is true
+    JudgeWithProgress(oracle, store, {});
     judge_.Rate(store);
     const OutcomesOf outcomes(store, judge_.name());
     for (const Episode& episode : store.Episodes()) {
@@ -52,6 +69,7 @@ class Measuring {
       input_.rows.push_back({"closed_loop", episode.key.pair, outcomes.Truth(episode.key), outcomes.Truth(again),
                              outcomes.Said(model), outcomes.Clip(episode.key), outcomes.Clip(model)});
     }
+    input_.parts.push_back(EpisodesOf("closed", store));
     input_.judge = judge_.QualityOn(store, worlds_.real.name, out_ / "masked");
     return ExitCode::kOk;
   }
@@ -59,7 +77,7 @@ class Measuring {
   void Open() {
     const Store closed = Store::Open(out_ / "closed", Store::Mode::kReadOnly);
     const std::vector<Replay> replays = ReplaysOf(closed, worlds_.real.name, suite_);
-    Store store = RunReplays({suite_, out_ / "open", "open loop", suite_.tasks, {worlds_.model}, out_ / "closed"}, replays);
+    Store store = RunReplays(OpenRun(), replays);
     judge_.Rate(store);
     const OutcomesOf truth(closed, judge_.name()), imagined(store, judge_.name());
     DriftMeter drift(chunk_);
@@ -70,6 +88,7 @@ class Measuring {
       AddDrift(replay, truth.Clip(real), imagined.Clip(model), drift);
     }
     input_.open_loop = {drift.object_px(), drift.Chunks()};
+    input_.parts.push_back(EpisodesOf("open", store));
   }
 
   /// What policies chose in the model, done in reality: whether the model is wrong about what it is told, or policies are
@@ -77,13 +96,14 @@ class Measuring {
   void Executed() {
     const Store closed = Store::Open(out_ / "closed", Store::Mode::kReadOnly);
     const std::vector<Replay> replays = ReplaysOf(closed, worlds_.model.name, suite_);
-    const Store store = RunReplays({suite_, out_ / "executed", "executed", suite_.tasks, {worlds_.again}}, replays);
+    const Store store = RunReplays(ExecutedRun(), replays);
     const OutcomesOf imagined(closed, judge_.name()), truth(store, judge_.name());
     for (const Replay& replay : replays) {
       const EpisodeKey really{replay.pair, worlds_.again.name}, model{replay.pair, worlds_.model.name};
       input_.rows.push_back({"executed", replay.pair, truth.Truth(really), std::nullopt, imagined.Said(model),
                              truth.Clip(really), imagined.Clip(model)});
     }
+    input_.parts.push_back(EpisodesOf("executed", store));
   }
 
   void Counterfactual() {
@@ -93,12 +113,8 @@ class Measuring {
     std::erase_if(successes, [&](const Replay& replay) {
       return outcomes.Truth({replay.pair, worlds_.real.name}) != std::optional<bool>(true);
     });
-    auto kinds = Counterfactuals(std::move(successes), suite_.tasks, arguments_.counterfactual_states);
-    for (evac::Counterfactual& kind : kinds) {
-      PointAt(kind.tasks, kind.replays);
-      const std::string folder = "counterfactual_" + kind.name;
-      Store store = RunReplays(
-          {suite_, out_ / folder, folder, kind.tasks, {worlds_.real, worlds_.model}, {}, Earlier(folder)}, kind.replays);
+    for (const evac::Counterfactual& kind : Counterfactuals(std::move(successes), replayed_, arguments_.counterfactual_states)) {
+      Store store = RunReplays(CounterfactualRun(kind), kind.replays);
       judge_.Rate(store);
       const OutcomesOf found(store, judge_.name());
       for (const Replay& replay : kind.replays) {
@@ -106,27 +122,22 @@ class Measuring {
         input_.rows.push_back({"counterfactual:" + kind.name, replay.pair, found.Truth(real), std::nullopt,
                                found.Said(model), found.Clip(real), found.Clip(model)});
       }
+      input_.parts.push_back(EpisodesOf("counterfactual_" + kind.name, store));
     }
   }
 
   void Horizon() {
     const Store closed = Store::Open(out_ / "closed", Store::Mode::kReadOnly);
-    const auto frames = static_cast<std::size_t>(arguments_.horizon_chunks * chunk_);
-    std::vector<Task> tasks = suite_.tasks;
-    for (Task& task : tasks) {
-      task.still.enabled = false;
-      task.max_chunks = arguments_.horizon_chunks * chunk_ / suite_.chunk_size + 1;
-    }
-    std::vector<Replay> replays =
-        LongRollouts(ReplaysOf(closed, worlds_.real.name, suite_), {arguments_.horizon_states, frames});
-    PointAt(tasks, replays);
-    const Store store =
-        RunReplays({suite_, out_ / "horizon", "horizon", tasks, {worlds_.real, worlds_.model}, {}, Earlier("horizon")}, replays);
+    const ReplayRun run = HorizonRun();
+    const std::vector<Replay> replays =
+        LongRollouts(ReplaysOf(closed, worlds_.real.name, suite_), {arguments_.horizon_states, run.frames});
+    const Store store = RunReplays(run, replays);
     const OutcomesOf found(store, judge_.name());
     DriftMeter drift(chunk_);
     for (const Replay& replay : replays)
       AddDrift(replay, found.Clip({replay.pair, worlds_.real.name}), found.Clip({replay.pair, worlds_.model.name}), drift);
     input_.horizon = drift.Chunks();
+    input_.parts.push_back(EpisodesOf("horizon", store));
   }
 
   /// Measured anew every time.
@@ -143,6 +154,43 @@ class Measuring {
   }
 
  private:
+  ReplayRun OpenRun() const {
+    ReplayRun run = ReplaysIn("open", {worlds_.model});
+    run.name = "open loop";
+    run.scenes = out_ / "closed";
+    return run;
+  }
+  ReplayRun ExecutedRun() const { return ReplaysIn("executed", {worlds_.again}); }
+  ReplayRun CounterfactualRun(const evac::Counterfactual& kind) const {
+    const std::string folder = "counterfactual_" + kind.name;
+    ReplayRun run = ReplaysIn(folder, {worlds_.real, worlds_.model});
+    run.tasks = kind.tasks;
+    run.reality = Earlier(folder);
+    return run;
+  }
+  ReplayRun HorizonRun() const {
+    ReplayRun run = ReplaysIn("horizon", {worlds_.real, worlds_.model});
+    run.frames_per_chunk = static_cast<std::size_t>(chunk_);
+    run.frames = static_cast<std::size_t>(arguments_.horizon_chunks) * run.frames_per_chunk;
+    run.rule = fmt::format("after {} frames", run.frames);
+    for (Task& task : run.tasks) task.max_chunks = static_cast<int>(run.frames) / suite_.chunk_size + 1;
+    run.reality = Earlier("horizon");
+    return run;
+  }
+  /// A part in that folder of OUT, every replay of it to its last action.
+  ReplayRun ReplaysIn(const std::string& folder, const std::vector<SuiteWorld>& worlds) const {
+    return {.suite = suite_, .folder = out_ / folder, .name = folder, .tasks = replayed_, .worlds = worlds, .rule = kToTheLastAction};
+  }
+
+  /// What an earlier call left in OUT goes on as it began, or not at all: found out before hours are spent.
+  void RequireSameParts() const {
+    if (Asks(arguments_, "open")) RequireSameReplays(OpenRun());
+    if (Asks(arguments_, "executed")) RequireSameReplays(ExecutedRun());
+    if (Asks(arguments_, "horizon")) RequireSameReplays(HorizonRun());
+    if (!Asks(arguments_, "counterfactual")) return;
+    for (const evac::Counterfactual& kind : Counterfactuals({}, replayed_, 1)) RequireSameReplays(CounterfactualRun(kind));
+  }
+
   /// That part's run in the folder of `--reality`; empty: none was given.
   fs::path Earlier(const std::string& part) const {
     return arguments_.reality.empty() ? fs::path() : fs::path(arguments_.reality) / part;
@@ -161,12 +209,6 @@ class Measuring {
     TakeReality(Earlier("closed"), wanted, store);
   }
 
-  /// Replays are of `suite_.tasks`; here are others of the same names.
-  static void PointAt(const std::vector<Task>& tasks, std::vector<Replay>& replays) {
-    for (Replay& replay : replays)
-      replay.task = &*std::find_if(tasks.begin(), tasks.end(), [&](const Task& task) { return task.id == replay.pair.task; });
-  }
-
   void AddDrift(const Replay& replay, const std::string& real, const std::string& model, DriftMeter& drift) const {
     if (real.empty() || model.empty()) return;
     drift.Add({replay.task, out_ / real, out_ / model, replay.actions, suite_.video.scale,
@@ -180,31 +222,28 @@ class Measuring {
   nn::ModelConfig model_;
   int chunk_;  ///< K
   FidelityJudge judge_;
+  std::vector<Task> replayed_;  ///< the suite's, in which actions are replayed
   FidelityInput input_;
 };
-
-bool Asks(const FidelityArguments& arguments, const char* part) {
-  return std::find(arguments.parts.begin(), arguments.parts.end(), part) != arguments.parts.end();
-}
 
 }  // namespace
 
 FidelityWorlds WorldsOf(const Suite& suite) {
-  FidelityWorlds found;
-  for (const SuiteWorld& world : suite.worlds) {
-    if (world.is_real) found.real = world;
-    if (world.evac) found.model = world;
-  }
-  for (const SuiteWorld& world : suite.worlds) {
-    if (!world.is_real && world.type == "mujoco" && world.profile == found.real.profile) found.again = world;
-  }
-  const auto require = [&](const SuiteWorld& world, const char* wanted) {
-    if (world.name.empty()) throw InvalidInput("{}: field worlds: wanted {}", suite.path.string(), wanted);
+  const auto the_one = [&](const char* wanted, const std::function<bool(const SuiteWorld&)>& is_it) {
+    std::vector<SuiteWorld> found;
+    std::ranges::copy_if(suite.worlds, std::back_inserter(found), is_it);
+    if (found.size() == 1) return found.front();
+    std::string names;
+    for (const SuiteWorld& world : found) names += fmt::format("{}{}", names.empty() ? "found " : " and ", world.name);
+    throw InvalidInput("{}: field worlds: {}{}wanted {}", suite.path.string(), names, names.empty() ? "" : ", ", wanted);
   };
-  require(found.real, "one with role: real");
-  require(found.model, "one of type evac");
-  require(found.again, "another of type mujoco with the real world's profile: reality once more");
-  return found;
+  FidelityWorlds worlds;
+  worlds.real = the_one("one with role: real", [](const SuiteWorld& world) { return world.is_real; });
+  worlds.model = the_one("one of type evac", [](const SuiteWorld& world) { return world.evac.has_value(); });
+  worlds.again = the_one("another of type mujoco with the real world's profile: reality once more", [&](const SuiteWorld& world) {
+    return !world.is_real && world.type == "mujoco" && world.profile == worlds.real.profile;
+  });
+  return worlds;
 }
 
 ExitCode RunFidelity(const FidelityArguments& arguments) {
@@ -216,6 +255,7 @@ ExitCode RunFidelity(const FidelityArguments& arguments) {
   const Suite suite = ReadSuite(arguments.suite, arguments.assignments);
   if (suite.recording) return RunRecordedFidelity(arguments, suite);
   Measuring measuring(arguments, suite);
+  measuring.Check();
   const ExitCode closed = measuring.Closed();  // what all other parts are made from
   if (closed != ExitCode::kOk) return closed;
   if (Asks(arguments, "open")) measuring.Open();

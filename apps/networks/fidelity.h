@@ -13,11 +13,10 @@
 #include "harness/suite.h"
 #include "reports/fidelity.h"
 
-/// `evac fidelity`: is the world model true? (docs/fidelity.md) It fills OUT/closed, OUT/open, OUT/counterfactual_NAME and
-/// OUT/horizon, each a run of its own that any kill leaves resumable, and counts them (reports/fidelity.h).
+/// `evac fidelity`: is the world model true? (docs/fidelity.md) It fills OUT/closed, OUT/open, OUT/executed,
+/// OUT/counterfactual_NAME and OUT/horizon, each a run of its own that any kill leaves resumable, and counts them
+/// (reports/fidelity.h).
 namespace evac {
-
-enum class FidelityPart { kClosed, kOpen, kCounterfactual, kHorizon };
 
 struct FidelityArguments {
   std::string suite, out;
@@ -33,6 +32,7 @@ ExitCode RunFidelity(const FidelityArguments& arguments);
 
 /// Of a suite with a `recording`: the actions of every recording of that folder, replayed in the suite's world model and
 /// held against the recorded pictures. Nobody knows how they ended, so only pictures are compared.
+/// @throws InvalidInput naming an option that means nothing there.
 ExitCode RunRecordedFidelity(const FidelityArguments& arguments, const Suite& suite);
 
 /// The three worlds of a fidelity suite.
@@ -41,7 +41,7 @@ struct FidelityWorlds {
   SuiteWorld again;  ///< the same profile under another name: other noise
   SuiteWorld model;  ///< type evac
 };
-/// @throws InvalidInput naming which of them the suite lacks.
+/// @throws InvalidInput naming which of them the suite lacks, or has more than once.
 FidelityWorlds WorldsOf(const Suite& suite);
 
 /// Actions to be executed from an initial state, whatever is observed.
@@ -52,7 +52,7 @@ struct Replay {
   std::vector<Arms> actions;
 };
 
-/// The executed actions of every episode of a world that did not fail. The jobs point into `suite.tasks`.
+/// The executed actions of every episode of a world that did not fail. They point into `suite.tasks`.
 std::vector<Replay> ReplaysOf(const Store& store, const std::string& world, const Suite& suite);
 
 /// Where replays are run, and what from.
@@ -60,22 +60,30 @@ struct ReplayRun {
   const Suite& suite;
   std::filesystem::path folder;
   std::string name;               ///< "open loop": shown, and part of the run's hash
-  std::vector<Task> tasks;        ///< as they are declared in the store
+  std::vector<Task> tasks;        ///< as they are declared in the store, and replayed in
   std::vector<SuiteWorld> worlds; ///< in the order they run
+  std::string rule = {};          ///< when a replay ends: part of the run's hash; empty: no part of it
+  std::size_t frames = 0;         ///< of long rollouts, of each; 0: they are as long as their actions
+  std::size_t frames_per_chunk = 1;  ///< K, to say how many chunks that is
   std::filesystem::path scenes = {};  ///< the run whose first frames imagined episodes start from; empty: this one
   std::filesystem::path reality = {}; ///< an earlier run whose simulated episodes are taken over; empty: none
   /// Makes a world in the place of apps/factory.h; null, or an answer that is null: the factory does.
   std::function<std::unique_ptr<World>(const SuiteWorld& world)> make = {};
 };
-/// Runs what is missing. @returns the store, judged by the oracle where there is physics.
+/// Runs what is missing, and again what failed in an earlier call. @returns the store, judged by the oracle where there is physics.
 /// @throws InternalError if it was interrupted.
-Store RunReplays(const ReplayRun& run, const std::vector<Replay>& replays);
+Store RunReplays(const ReplayRun& run, std::vector<Replay> replays);
+/// @throws InvalidInput if the run's folder holds replays of the same actions that ended by another rule: says which.
+void RequireSameReplays(const ReplayRun& run);
 
 /// Seconds that a world model takes per chunk of K frames and scene, of as many scenes at once as the suite has lanes,
 /// its cache unused. @param scenes  whose first frames it starts from
 /// @returns undefined if no replay is a chunk long
 Number SecondsPerChunk(const SuiteWorld& model, const Suite& suite, const Store& scenes, std::vector<Replay> replays,
                        int chunk);
+
+/// How many episodes a part has, and how many of them failed.
+PartEpisodes EpisodesOf(const std::string& part, const Store& store);
 
 /// Says in OUT which reality it is about: the suite without its world model.
 void StateReality(const std::filesystem::path& out, const Suite& suite);

@@ -57,6 +57,16 @@ std::string ObjectOf(const Task& task) {
 
 }  // namespace
 
+std::vector<Task> ToTheLastAction(std::vector<Task> tasks, const Suite& suite) {
+  constexpr double kLongestThought_s = 3600;  // where it is measured no suite says how long
+  for (Task& task : tasks) {
+    task.still.enabled = false;
+    const double per_chunk = suite.chunk_size + suite.latency.Periods(kLongestThought_s, task.period_s);
+    task.max_chunks = static_cast<int>(std::min(1e6, task.max_chunks * per_chunk / suite.chunk_size)) + 1;
+  }
+  return tasks;
+}
+
 std::vector<Counterfactual> Counterfactuals(std::vector<Replay> successes, const std::vector<Task>& tasks, int per_task) {
   Shuffle(successes);
   const std::vector<Replay> chosen = FirstOfEachTask(std::move(successes), per_task);

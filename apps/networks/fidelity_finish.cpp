@@ -31,6 +31,17 @@ Number SecondsPerChunk(const SuiteWorld& model, const Suite& suite, const Store&
   return spent.count() / static_cast<double>(batch.size());
 }
 
+PartEpisodes EpisodesOf(const std::string& part, const Store& store) {
+  PartEpisodes counted{.part = part};
+  for (const Episode& episode : store.Episodes()) {
+    ++counted.episodes;
+    if (!IsFailure(episode.stop)) continue;
+    ++counted.failed;
+    counted.last_failure = episode.key.Id() + ": " + episode.failure;
+  }
+  return counted;
+}
+
 void FinishFidelity(const std::filesystem::path& out, FidelityInput input) {
   const Fidelity fidelity = FidelityOf(std::move(input));
   WriteFileAtomically(out / "episodes.csv", FidelityCsv(fidelity.input.rows));

@@ -44,9 +44,8 @@ cv::Mat Moved(const cv::Mat& frame, const cv::Mat& first) {
   return cv::max(channels[0], cv::max(channels[1], channels[2])) > kMovedGreyLevels;
 }
 
-/// How far the gripper's patch of the real picture lies from there in the imagined one; nothing if it is out of sight,
-/// too plain to be found, or not there.
-std::optional<double> GripperError(const ClipPair& clips, const Arms& arms, const cv::Mat& real, const cv::Mat& model) {
+/// Where the gripper is in the head camera's picture; nothing if it is out of sight.
+std::optional<cv::Rect> GripperPatch(const ClipPair& clips, const Arms& arms) {
   const Camera& camera = clips.task->cameras.front();
   const Eigen::Vector3d tool = arms.back().base_from_gripper * Eigen::Vector3d(0, 0, clips.tool_length_m);
   const auto at = Project(camera, BaseFromCamera(camera, arms).inverse() * tool);
@@ -54,9 +53,14 @@ std::optional<double> GripperError(const ClipPair& clips, const Arms& arms, cons
   const cv::Point centre(static_cast<int>(std::floor(at->x())), static_cast<int>(std::floor(at->y())));
   const cv::Rect patch(centre.x - kPatch_px, centre.y - kPatch_px, 2 * kPatch_px + 1, 2 * kPatch_px + 1);
   const cv::Rect all(0, 0, camera.width_px, camera.height_px);
-  if ((patch & all) != patch) return std::nullopt;
+  return (patch & all) == patch ? std::optional(patch) : std::nullopt;
+}
+
+/// How far that patch of the real picture lies from there in the imagined one; nothing if it is too plain to be found, or
+/// not there.
+std::optional<double> GripperError(const cv::Rect& patch, const cv::Mat& real, const cv::Mat& model) {
   const cv::Rect around = cv::Rect(patch.x - kSearch_px, patch.y - kSearch_px, patch.width + 2 * kSearch_px,
-                                   patch.height + 2 * kSearch_px) & all;
+                                   patch.height + 2 * kSearch_px) & cv::Rect({}, model.size());
   cv::Mat score;
   cv::matchTemplate(model(around), real(patch), score, cv::TM_CCOEFF_NORMED);
   double best = 0;
@@ -99,7 +103,10 @@ void DriftMeter::Add(const ClipPair& clips) {
     sums.copy_error += SquaredError(real[t], real[0], moved);
     sums.moving_values += 3.0 * cv::countNonZero(moved);
     if (t - 1 >= clips.commands.size()) continue;
-    if (const auto px = GripperError(clips, clips.commands[t - 1], real[t](head_px), model[t](head_px))) {
+    const auto patch = GripperPatch(clips, clips.commands[t - 1]);
+    if (!patch) continue;
+    ++sums.grippers_in_sight;
+    if (const auto px = GripperError(*patch, real[t](head_px), model[t](head_px))) {
       sums.gripper_px += *px;
       ++sums.grippers;
     }
@@ -121,6 +128,8 @@ std::vector<ChunkDrift> DriftMeter::Chunks() const {
     chunk.psnr_moving = Psnr(sums.moving_error, sums.moving_values);
     chunk.psnr_moving_copy = Psnr(sums.copy_error, sums.moving_values);
     if (sums.grippers > 0) chunk.gripper_px = sums.gripper_px / static_cast<double>(sums.grippers);
+    if (sums.grippers_in_sight > 0)
+      chunk.gripper_found = static_cast<double>(sums.grippers) / static_cast<double>(sums.grippers_in_sight);
     chunks.push_back(chunk);
   }
   return chunks;

@@ -37,7 +37,7 @@ class DriftMeter {
     std::int64_t clips = 0, frames = 0;
     double error = 0, moving_error = 0, copy_error = 0, gripper_px = 0;
     double values = 0, moving_values = 0;
-    std::int64_t grippers = 0;
+    std::int64_t grippers = 0, grippers_in_sight = 0;  ///< found, of those that the real picture shows
   };
 
   int chunk_;

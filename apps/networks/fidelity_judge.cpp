@@ -87,12 +87,21 @@ std::optional<bool> OutcomeOf(Label label) {
   return std::nullopt;
 }
 
+/// What a judge said of one episode; nothing if it was not asked.
+std::optional<bool> SaidBy(const std::string& judge, const std::map<std::string, Verdict>& of_episode) {
+  const auto found = of_episode.find(judge);
+  return found == of_episode.end() ? std::nullopt : OutcomeOf(found->second.label);
+}
+
 }  // namespace
+
+void FidelityJudge::RequireKnows(const std::vector<Task>& tasks) const {
+  if (!classifier_.empty()) ClassifierJudge(classifier_, "").CheckKnows(tasks);
+}
 
 void FidelityJudge::Rate(Store& store) {
   if (classifier_.empty()) return;
   ClassifierJudge judge(classifier_, store.folder());
-  judge.CheckKnows(store.Tasks());
   JudgeWithProgress(judge, store, {});
   name_ = judge.Name();
 }
@@ -123,13 +132,13 @@ JudgeQualityOnReal FidelityJudge::QualityOn(Store& store, const std::string& wor
   for (const Episode& episode : store.Episodes()) {
     if (IsFailure(episode.stop) || !is_told(episode)) continue;
     const auto& of_episode = verdicts.at(episode.key.Id());
-    const auto truth = OutcomeOf(of_episode.at("oracle").label);
+    const auto truth = SaidBy("oracle", of_episode);
     if (!truth) continue;
     const Verdict& said = of_episode.at(name_);
     probabilities.push_back(*said.probability);
     truths.push_back(*truth);
     count(OutcomeOf(said.label), *truth, plain);
-    count(OutcomeOf(of_episode.at(masked_judge.Name()).label), *truth, masked);
+    count(SaidBy(masked_judge.Name(), of_episode), *truth, masked);
   }
   quality.auroc = AreaUnderRoc(probabilities, truths);
   quality.ece = CalibrationOf(probabilities, truths).ece;
@@ -153,9 +162,7 @@ std::string OutcomesOf::Clip(const EpisodeKey& key) const {
 std::optional<bool> OutcomesOf::By(const std::string& judge, const EpisodeKey& key) const {
   if (!clips_.contains(key.Id())) return std::nullopt;
   const auto episode = verdicts_.find(key.Id());
-  if (episode == verdicts_.end()) return std::nullopt;
-  const auto verdict = episode->second.find(judge);
-  return verdict == episode->second.end() ? std::nullopt : OutcomeOf(verdict->second.label);
+  return episode == verdicts_.end() ? std::nullopt : SaidBy(judge, episode->second);
 }
 
 }  // namespace evac

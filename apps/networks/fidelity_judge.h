@@ -5,6 +5,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "core/judge.h"
 #include "core/store.h"
@@ -18,6 +19,8 @@ class FidelityJudge {
   /// @param classifier  its weights; empty: nobody
   explicit FidelityJudge(std::string classifier) : classifier_(std::move(classifier)) {}
 
+  /// @throws InvalidInput if the weights are none, or do not know the tasks and their cameras.
+  void RequireKnows(const std::vector<Task>& tasks) const;
   /// Rates what it has not rated yet.
   void Rate(Store& store);
   /// Empty before it rated anything.

@@ -7,6 +7,13 @@
 
 namespace evac {
 
+/// When replays of a closed loop's actions end (ReplayRun::rule).
+inline constexpr const char* kToTheLastAction = "to the last action";
+/// The tasks as they are replayed so: no stop rule, and no limit that the actions of an episode could reach. The rule would
+/// end a replay in a world model, where arms are commanded and not observed, a chunk before it ends the one in reality. What
+/// is said here follows from the suite alone: a run's tasks are the same in every call.
+std::vector<Task> ToTheLastAction(std::vector<Task> tasks, const Suite& suite);
+
 /// Actions that succeeded, changed so that they must fail, and the tasks they are replayed in.
 struct Counterfactual {
   std::string name;         ///< shifted, never_closes, object_away

@@ -1,6 +1,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <utility>
 
 #include "apps/factory.h"
 #include "apps/networks/fidelity.h"
@@ -10,6 +11,7 @@
 #include "apps/networks/pack_sources.h"
 #include "worldmodel/echo_world.h"
 #include "worldmodel/evac_config.h"
+#include "worldmodel/trained_for.h"
 
 namespace evac {
 namespace {
@@ -19,15 +21,46 @@ namespace fs = std::filesystem;
 const InitialState kRecorded{"recording", 0};
 
 const SuiteWorld& ModelOf(const Suite& suite) {
-  const auto found = std::ranges::find_if(suite.worlds, [](const SuiteWorld& world) { return world.evac.has_value(); });
+  const auto is_model = [](const SuiteWorld& world) { return world.evac.has_value(); };
+  const auto found = std::ranges::find_if(suite.worlds, is_model);
   if (found == suite.worlds.end()) throw InvalidInput("{}: field worlds: wanted one of type evac", suite.path.string());
-  return *found;
+  const auto other = std::find_if(found + 1, suite.worlds.end(), is_model);
+  if (other == suite.worlds.end()) return *found;
+  throw InvalidInput("{}: field worlds: found {} and {}, wanted one of type evac", suite.path.string(), found->name, other->name);
+}
+
+/// Pictures are compared, of replays: what asks about outcomes or for another part would be passed over in silence.
+void RefuseWhatMeansNothing(const FidelityArguments& given) {
+  const FidelityArguments none;
+  const std::vector<std::string> replays = {"open"};
+  const std::pair<const char*, bool> options[] = {
+      {"--classifier", given.classifier != none.classifier},
+      {"--reality", given.reality != none.reality},
+      {"--parts", given.parts != none.parts && given.parts != replays},
+      {"--counterfactual-states", given.counterfactual_states != none.counterfactual_states},
+      {"--horizon-states", given.horizon_states != none.horizon_states},
+      {"--horizon-chunks", given.horizon_chunks != none.horizon_chunks}};
+  for (const auto& [option, is_given] : options) {
+    if (is_given)
+      throw InvalidInput("{}: means nothing for a suite with a recording: its actions are replayed in the model and held against "
+                         "its pictures, and nobody says how it ended; leave it out", option);
+  }
+}
+
+/// Which arms are its actions: those that the network learned from, where its weights say so.
+ArmsKind ArmsReadBy(const TrainedFor& trained) {
+  if (trained.arms_read == "told") return ArmsKind::kTold;
+  return trained.arms_read == "measured" ? ArmsKind::kMeasured : ArmsKind::kAuto;
 }
 
 /// Those that can be read as the network was trained; of the others, how many and why is said.
 std::vector<Recording> ReadAll(const fs::path& folder, const SuiteWorld& model, const nn::ModelConfig& config) {
   const std::vector<fs::path> folders = FindRecordings(folder);
-  SourceOptions how{.period_s = model.evac->period_s, .cameras = {}, .views = static_cast<std::size_t>(config.views)};
+  const TrainedFor trained = TrainedFor::Read(model.evac->weights);
+  SourceOptions how{.period_s = model.evac->period_s,
+                    .cameras = trained.cameras,
+                    .views = static_cast<std::size_t>(config.views),
+                    .arms = ArmsReadBy(trained)};
   how.least_frames = static_cast<std::size_t>(config.chunk) + 1;
   how.cameras = ChooseViews(folders, how);
   std::vector<Recording> recordings;
@@ -71,6 +104,7 @@ Suite WithTasks(const Suite& suite, const std::vector<Recording>& recordings) {
 }  // namespace
 
 ExitCode RunRecordedFidelity(const FidelityArguments& arguments, const Suite& given) {
+  RefuseWhatMeansNothing(arguments);
   const SuiteWorld& model = ModelOf(given);
   const nn::ModelConfig config = ReadEvacConfig(model.evac->config);
   const std::vector<Recording> recordings = ReadAll(*given.recording, model, config);
@@ -93,6 +127,7 @@ ExitCode RunRecordedFidelity(const FidelityArguments& arguments, const Suite& gi
   const Store store = RunReplays(run, replays);
 
   FidelityInput input;
+  input.parts = {EpisodesOf("open", store)};
   input.suite_hash = suite.hash;
   input.model_hash = model.evac->hash;
   const OutcomesOf found(store, "");

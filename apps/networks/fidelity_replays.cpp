@@ -1,6 +1,9 @@
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <limits>
 #include <map>
+#include <optional>
 #include <utility>
 
 #include "apps/factory.h"
@@ -56,14 +59,15 @@ class GivenActions final : public Policy {
   std::map<SceneId, std::pair<const std::vector<Arms>*, std::size_t>> playing_;
 };
 
-/// Of a run of replays. Those that an earlier evac made, from other scenes than their actions are of, have another.
-std::string HashOf(const ReplayRun& run, const std::string& suite_hash) {
-  return Sha256Hex(run.name + " from the states of " + suite_hash);
+/// Of a run of replays. Those that an earlier evac made, from other scenes than their actions are of, have another; so have
+/// those that it ended by another rule: theirs is without one.
+std::string HashOf(const std::string& name, const std::string& suite_hash, const std::string& rule) {
+  return Sha256Hex(name + " from the states of " + suite_hash + (rule.empty() ? "" : ", " + rule));
 }
 
 RunInfo InfoOf(const ReplayRun& run) {
   return {.suite_text = run.suite.text,
-          .suite_hash = HashOf(run, run.suite.hash),
+          .suite_hash = HashOf(run.name, run.suite.hash, run.rule),
           .suite_path = fs::absolute(run.suite.path).lexically_normal().string(),
           .evac_version = EVAC_VERSION};
 }
@@ -92,15 +96,72 @@ std::set<EpisodeKey> SimulatedKeys(const ReplayRun& run, const std::vector<Repla
   return keys;
 }
 
-/// Whether what is in `run.reality` began where the closed loop beside it did.
-bool BeganThere(const ReplayRun& run) {
+/// The run in a folder; nothing if none was begun there.
+std::optional<Store> BegunIn(const fs::path& folder) try {
+  return Store::Open(folder, Store::Mode::kReadOnly);
+} catch (const Error&) {
+  return std::nullopt;
+}
+
+/// Of the first that did not fail; 0: there is none.
+std::size_t FramesOf(const Store& replays) {
+  for (Episode& episode : replays.Episodes()) {
+    if (IsFailure(episode.stop)) continue;
+    replays.LoadSteps(episode);
+    return episode.commands.size();
+  }
+  return 0;
+}
+
+/// How replays that are there already are other ones than `run`'s; nothing if they are not.
+/// @param suite_hash  of the closed loop that they are of
+std::optional<std::string> WhatDiffers(const ReplayRun& run, const Store& there, const std::string& suite_hash) {
+  const std::string found = there.run().suite_hash;
+  if (found == HashOf(run.name, suite_hash, run.rule)) return std::nullopt;
+  const std::size_t frames = run.frames > 0 ? FramesOf(there) : 0, k = run.frames_per_chunk;
+  if (frames > 0 && frames != run.frames)
+    return fmt::format("--horizon-chunks: found {} ({} frames), wanted {} ({} frames)", frames / k, frames, run.frames / k, run.frames);
+  if (found == HashOf(run.name, suite_hash, ""))
+    return fmt::format("an earlier evac ended its replays by another rule, wanted {}", run.rule);
+  return "its replays began in other scenes than their actions are of (an earlier evac)";
+}
+
+/// Whether what is in `run.reality` are the same replays, of the closed loop beside them.
+bool IsOfSameReplays(const ReplayRun& run) {
   const fs::path closed = run.reality.parent_path() / "closed";
   if (!fs::exists(run.reality) || !fs::exists(closed)) return false;
-  const std::string found = Store::Open(run.reality, Store::Mode::kReadOnly).run().suite_hash;
-  if (found == HashOf(run, Store::Open(closed, Store::Mode::kReadOnly).run().suite_hash)) return true;
-  fmt::print(stderr, "evac: warning: {}: its replays began in other scenes than their actions are of (an earlier evac): not taken over\n",
-             run.reality.string());
-  return false;
+  const std::string suite_hash = Store::Open(closed, Store::Mode::kReadOnly).run().suite_hash;
+  const auto differs = WhatDiffers(run, Store::Open(run.reality, Store::Mode::kReadOnly), suite_hash);
+  if (differs) fmt::print(stderr, "evac: warning: {}: {}: not taken over\n", run.reality.string(), *differs);
+  return !differs;
+}
+
+/// In the tasks of the run, whatever those are that they were made from.
+void PointAt(const std::vector<Task>& tasks, std::vector<Replay>& replays) {
+  for (Replay& replay : replays)
+    replay.task = &*std::find_if(tasks.begin(), tasks.end(), [&](const Task& task) { return task.id == replay.pair.task; });
+}
+
+/// What failed in an earlier call is tried again in this one.
+void RemoveFailed(Store& store) {
+  for (const Episode& episode : store.Episodes()) {
+    if (IsFailure(episode.stop)) store.RemoveFailed(episode.key);
+  }
+}
+
+RolloutOptions OptionsOf(const ReplayRun& run, const SuiteWorld& world, ProgressDisplay& display) {
+  RolloutOptions options;
+  options.lanes = run.suite.lanes;
+  options.lane = {.chunk_size = run.suite.chunk_size,
+                  .policy_chunk_size = run.suite.chunk_size,
+                  .latency = {},
+                  .video = run.suite.video,
+                  .film = world.film,
+                  .keep_initial_scene = world.is_real};
+  options.failures_left = std::numeric_limits<int>::max();  // a failed replay is a row without an outcome
+  options.on_progress = [&display](const Progress& progress) { display.Show(progress, ProgressDisplay::Clock::now()); };
+  options.interrupted = IsInterrupted;
+  return options;
 }
 
 }  // namespace
@@ -121,11 +182,20 @@ std::vector<Replay> ReplaysOf(const Store& store, const std::string& world, cons
   return replays;
 }
 
-Store RunReplays(const ReplayRun& run, const std::vector<Replay>& replays) {
+void RequireSameReplays(const ReplayRun& run) {
+  const auto there = BegunIn(run.folder);
+  if (!there) return;
+  if (const auto differs = WhatDiffers(run, *there, run.suite.hash))
+    throw InvalidInput("{}: {}: remove that folder, and the same command makes them anew", run.folder.string(), *differs);
+}
+
+Store RunReplays(const ReplayRun& run, std::vector<Replay> replays) {
+  PointAt(run.tasks, replays);
   Store store = Store::CreateOrContinue(run.folder, InfoOf(run));
+  RemoveFailed(store);
   store.RemoveOrphans();
   DeclareReplays(run, replays, store);
-  if (BeganThere(run)) TakeReality(run.reality, SimulatedKeys(run, replays), store);
+  if (IsOfSameReplays(run)) TakeReality(run.reality, SimulatedKeys(run, replays), store);
   std::optional<Store> scenes;
   if (!run.scenes.empty()) scenes = Store::Open(run.scenes, Store::Mode::kReadOnly);
   int total = 0, missing = 0;
@@ -141,19 +211,10 @@ Store RunReplays(const ReplayRun& run, const std::vector<Replay>& replays) {
     display.Begin(run.name + " · " + world.name);
     std::unique_ptr<World> made = run.make ? run.make(world) : nullptr;
     if (!made) made = MakeWorld(world, run.suite, scenes ? &*scenes : &store);
-    RolloutOptions options;
-    options.lanes = run.suite.lanes;
-    options.lane = {.chunk_size = run.suite.chunk_size,
-                    .policy_chunk_size = run.suite.chunk_size,
-                    .latency = {},
-                    .video = run.suite.video,
-                    .film = world.film,
-                    .keep_initial_scene = world.is_real};
-    options.failures_left = total;  // a failed replay is a row without an outcome
-    options.on_progress = [&](const Progress& progress) { display.Show(progress, ProgressDisplay::Clock::now()); };
-    options.interrupted = IsInterrupted;
-    if (RunEpisodes(actions, *made, jobs, store, options).interrupted)
-      throw InternalError("interrupted; the same command goes on");
+    const Summary summary = RunEpisodes(actions, *made, jobs, store, OptionsOf(run, world, display));
+    if (summary.failed > 0)
+      display.Say(fmt::format("{} replays failed; the last: {}", summary.failed, summary.last_failure));
+    if (summary.interrupted) throw InternalError("interrupted; the same command goes on");
   }
   OracleJudge oracle(store);
   JudgeEpisodes(oracle, store, {});

@@ -31,7 +31,7 @@ struct ImagineArguments {
   ImagineInputs inputs;
   std::string weights;  ///< a checkpoint
   SamplerArguments sampler;
-  std::string statistics;  ///< a robot's page of motion statistics; empty: AgiBot World's
+  std::string statistics;  ///< a robot's page of motion statistics; empty: the weights' own
   bool png = false;        ///< also OUT/frames/frame_%05d.png
   bool restart = false;    ///< throw away what OUT holds of another job
   std::string config;      ///< a page of sizes; empty: the published ones
@@ -52,7 +52,7 @@ struct ReferenceQuirks {
   static ReferenceQuirks Named(const std::string& names);
 };
 
-/// The motion statistics that a command asks for.
+/// The motion statistics that a command asks for, or those of its weights (TrainedFor::StatisticsOr).
 ActionStatistics StatisticsOf(const ImagineArguments& arguments);
 
 /// How the maps of pictures of this size are drawn.

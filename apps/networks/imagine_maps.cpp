@@ -9,6 +9,7 @@
 #include "core/geometry.h"
 #include "worldmodel/conditioning.h"
 #include "worldmodel/evac_config.h"
+#include "worldmodel/trained_for.h"
 
 namespace evac {
 
@@ -17,7 +18,9 @@ nn::ModelConfig ModelSizes(const ImagineArguments& arguments) {
 }
 
 ActionStatistics StatisticsOf(const ImagineArguments& arguments) {
-  return arguments.statistics.empty() ? AgiBotWorldStatistics() : ReadActionStatistics(arguments.statistics);
+  const std::optional<std::filesystem::path> page =
+      arguments.statistics.empty() ? std::nullopt : std::optional<std::filesystem::path>(arguments.statistics);
+  return TrainedFor::Read(arguments.weights).StatisticsOr(page);
 }
 
 ReferenceQuirks ReferenceQuirks::Named(const std::string& names) {

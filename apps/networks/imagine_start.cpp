@@ -11,8 +11,6 @@
 namespace evac {
 namespace {
 
-constexpr double kReleasedPeriod_s = 0.1;
-
 void CheckNamed(const ImagineInputs& inputs) {
   const std::pair<const char*, const std::filesystem::path*> files[] = {{"--frame", &inputs.files.frame},
                                                                         {"--actions", &inputs.files.actions},
@@ -38,7 +36,8 @@ std::vector<std::string> Cameras(const ImagineInputs& inputs, std::size_t views)
 }
 
 Recording Read(const ImagineInputs& inputs, std::size_t views) {
-  const RecordingOptions options{.cameras = Cameras(inputs, views), .count_video_frames = false};
+  const RecordingOptions options{.cameras = Cameras(inputs, views), .count_video_frames = false,
+                                 .read_told = inputs.read_told};
   return inputs.recording.empty() ? ReadRecordingFiles(inputs.files, options)
                                   : ReadRecording(inputs.recording, options);
 }
@@ -64,16 +63,17 @@ void Append(std::string& bytes, const Arms& arms) {
 ImagineStart ReadImagineStart(const ImagineInputs& inputs, std::size_t views) {
   CheckNamed(inputs);
   Recording recording = Read(inputs, views);
-  const int automatic = std::max(1, static_cast<int>(std::lround(kReleasedPeriod_s / recording.period_s)));
+  const int automatic = std::max(1, static_cast<int>(std::lround(inputs.period_s / recording.period_s)));
+  std::vector<Arms>& track = recording.told.empty() ? recording.arms : recording.told;
   ImagineStart start;
   start.stride = inputs.stride > 0 ? inputs.stride : automatic;
   start.source = recording.source;
   start.scene = InitialSceneOf(recording);
-  for (std::size_t step = 0; step < recording.arms.size(); step += static_cast<std::size_t>(start.stride))
-    start.arms.push_back(std::move(recording.arms[step]));
+  for (std::size_t step = 0; step < track.size(); step += static_cast<std::size_t>(start.stride))
+    start.arms.push_back(std::move(track[step]));
   if (start.arms.size() < 2) {
     throw InvalidInput("{}: of {} steps every {} leaves nothing to imagine after the first frame", recording.source,
-                       recording.arms.size(), start.stride);
+                       track.size(), start.stride);
   }
   start.period_s = recording.period_s * start.stride;
   start.files = std::move(recording.files);

@@ -14,7 +14,9 @@ struct ImagineInputs {
   std::string recording;             ///< a folder (docs/formats/recording.md); empty: `files`
   RecordingFiles files;              ///< the head camera alone
   std::vector<std::string> cameras;  ///< the views, in this order; empty: of head, hand_left, hand_right the first V
-  int stride = 0;  ///< every nth recorded step is one frame; 0: as many as make the released model's 0.1 s
+  int stride = 0;         ///< every nth recorded step is one frame; 0: as many as make `period_s`
+  double period_s = 0.1;  ///< the network's; the released model's, unless its weights say another
+  bool read_told = false;  ///< the arms are where they were told to be, if the recording says so; else where they were
 };
 
 /// The first frame, and what the arms do from then on.

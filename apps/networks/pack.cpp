@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <map>
 #include <nlohmann/json.hpp>
 #include <optional>
 
@@ -45,6 +46,7 @@ struct Packing {
   std::vector<PackSource> sources;
   std::vector<LeftOut> left_out;
   std::vector<std::string> tasks;
+  std::string arms_read;  ///< told or measured: what its actions are
   ClipOptions clip;
   std::vector<PlannedShard> shards;
   std::string recipe;  ///< SHA-256 of all that it is made from
@@ -80,26 +82,55 @@ void LookAtAll(const PackArguments& arguments, Packing& packing) {
       packing.left_out.push_back(std::move(one.left_out));
     }
   }
+}
+
+std::size_t ArmsOf(const PackSource& source) { return source.track.front().size(); }
+
+/// One robot per packing: as many arms in all recordings as in most of them; the first decides between equals.
+void LeaveOutOtherRobots(Packing& packing) {
+  std::map<std::size_t, int> recordings;  // by their number of arms
+  for (const PackSource& source : packing.sources) ++recordings[ArmsOf(source)];
+  std::size_t wanted = 0;
+  for (const PackSource& source : packing.sources) {
+    if (wanted == 0 || recordings[ArmsOf(source)] > recordings[wanted]) wanted = ArmsOf(source);
+  }
+  std::erase_if(packing.sources, [&](const PackSource& source) {
+    const std::size_t found = ArmsOf(source);
+    if (found == wanted) return false;
+    packing.left_out.push_back({source.folder, "other_robot",
+                                fmt::format("{}: {} arms, wanted {} as in {} recordings", source.folder.string(), found,
+                                            wanted, recordings[wanted])});
+    return true;
+  });
+}
+
+/// Says how many were left out. @throws InvalidInput if that is all of them
+void SayLeftOut(const Packing& packing) {
   if (!packing.left_out.empty()) Tell(CountByKind(packing.left_out));
   if (packing.sources.empty())
     throw InvalidInput("no recording can be packed; the last one: {}", packing.left_out.back().sentence);
 }
 
-/// One robot per packing: as many arms in all recordings as in the first.
-void LeaveOutOtherRobots(Packing& packing) {
-  const std::size_t arms = packing.sources.front().track.front().size();
-  std::erase_if(packing.sources, [&](const PackSource& source) {
-    const std::size_t found = source.track.front().size();
-    if (found == arms) return false;
-    packing.left_out.push_back({source.folder, "other_robot",
-                                fmt::format("{}: {} arms, wanted {} as in {}", source.folder.string(), found, arms,
-                                            packing.sources.front().folder.string())});
-    return true;
-  });
+/// @throws InvalidInput if the choice was left open and would be told in some recordings and measured in others
+std::string ArmsRead(ArmsKind asked, const std::vector<PackSource>& sources) {
+  if (asked != ArmsKind::kAuto) return asked == ArmsKind::kTold ? "told" : "measured";
+  const auto is_collected = [](const PackSource& source) { return source.row.has_value(); };
+  const auto collected = std::find_if(sources.begin(), sources.end(), is_collected),
+             other = std::find_if_not(sources.begin(), sources.end(), is_collected);
+  if (collected != sources.end() && other != sources.end())
+    throw InvalidInput("{} is of a collection, whose arms would be told, {} is not, whose would be measured: "
+                       "wanted --arms told or --arms measured for all",
+                       collected->folder.string(), other->folder.string());
+  return collected != sources.end() ? "told" : "measured";
 }
 
 /// Told arms are drawn, and carry their cameras, where the network's page says that they are seen.
-void SayLag(const LagSums& lag, double page_frames) {
+void SayLag(const LagSums& lag, const Packing& packing) {
+  const double page_frames = packing.clip.pose_map.lag_frames;
+  if (packing.arms_read == "measured" && page_frames > 0)
+    Tell(fmt::format("evac: warning: the arms packed are measured ones, and pose_map.lag_frames is {}, which is for "
+                     "told ones: pose maps and moving cameras are drawn that late; wanted 0, or --arms told",
+                     page_frames));
   const std::optional<double> frames = lag.Frames();
   if (!frames) return;
   Tell(fmt::format("arms are {:.2f} frames behind what they are told; pose_map.lag_frames is {}{}", *frames, page_frames,
@@ -116,7 +147,7 @@ void MeasureMotion(const PackArguments& arguments, Packing& packing) {
     sums.Add(source.track);
     lag.Add(source.lag);
   }
-  SayLag(lag, packing.clip.pose_map.lag_frames);
+  SayLag(lag, packing);
   packing.clip.delta_frames = arguments.period_s * kRawFrames_hz;
   packing.clip.statistics = arguments.statistics.empty() ? sums.Statistics("packed", packing.clip.delta_frames)
                                                          : ReadActionStatistics(arguments.statistics);
@@ -146,9 +177,10 @@ void PlanShards(const PackArguments& arguments, Packing& packing) {
 
 std::string RecipeOf(const PackArguments& arguments, const Packing& packing) {
   std::string all =
-      fmt::format("evac-shard 1 seed {} crops {} hold-out {} clips {} period {} size {}x{} maps {}", arguments.seed,
-                  arguments.crops, arguments.hold_out, arguments.clips_per_shard, arguments.period_s,
-                  packing.clip.picture_px.width, packing.clip.picture_px.height, PoseMapWords(packing.clip.pose_map));
+      fmt::format("evac-shard 1 seed {} crops {} hold-out {} clips {} period {} size {}x{} maps {} arms {}",
+                  arguments.seed, arguments.crops, arguments.hold_out, arguments.clips_per_shard, arguments.period_s,
+                  packing.clip.picture_px.width, packing.clip.picture_px.height, PoseMapWords(packing.clip.pose_map),
+                  packing.arms_read);
   for (const std::string& camera : packing.how.cameras) all += " " + camera;
   for (const PackSource& source : packing.sources) all += "\n" + source.name + " " + source.sha256;
   return Sha256Hex(all + "\n" + StatisticsPage(packing.clip.statistics));
@@ -160,11 +192,11 @@ Packing Plan(const PackArguments& arguments) {
   packing.how = {arguments.period_s, arguments.cameras, static_cast<std::size_t>(config.views), arguments.arms,
                  static_cast<std::size_t>(config.chunk + 1)};
   packing.clip.picture_px = {static_cast<int>(config.image_width_px), static_cast<int>(config.image_height_px)};
-  nn::ModelConfig scaled = config;
-  scaled.pose_map.scaled = true;
-  packing.clip.pose_map = PoseMapOptions::Of(scaled);
+  packing.clip.pose_map = PoseMapOptions::Of(config);
   LookAtAll(arguments, packing);
   LeaveOutOtherRobots(packing);
+  SayLeftOut(packing);
+  packing.arms_read = ArmsRead(arguments.arms, packing.sources);
   for (const PackSource& source : packing.sources) packing.tasks.push_back(source.task);
   std::sort(packing.tasks.begin(), packing.tasks.end());
   packing.tasks.erase(std::unique(packing.tasks.begin(), packing.tasks.end()), packing.tasks.end());
@@ -195,7 +227,7 @@ Clip Make(const PlannedClip& planned, const PackArguments& arguments, const Pack
   const PackSource& source = packing.sources[planned.source];
   const Recording recording = ReadForPacking(source.folder, packing.how);
   std::optional<EpisodeTruth> truth;
-  if (source.row) truth = ReadTruth(TruthPath(*PlaceOf(source.folder)), source.frames, recording.cameras.size());
+  if (source.row) truth = ReadTruth(TruthPath(*PlaceOf(source.folder)), source.frames, recording.cameras);
   const ClipSource read =
       ReadClipSource(recording, truth ? &*truth : nullptr, source.row ? source.row->video_scale : 1);
   const cv::Size picture_px = read.pictures.front().front().size();
@@ -218,13 +250,14 @@ std::string Joined(const std::vector<std::string>& names) {
 }
 
 TensorMetadata MetadataOf(std::size_t number, const PackArguments& arguments, const Packing& packing) {
-  const bool one_arm = packing.sources.front().track.front().size() == 1;
+  const bool one_arm = ArmsOf(packing.sources.front()) == 1;
   return {{"split", packing.shards[number].holds_out ? "holdout" : "train"},
           {"period_s", fmt::format("{}", arguments.period_s)},
           {"height_px", std::to_string(packing.clip.picture_px.height)},
           {"width_px", std::to_string(packing.clip.picture_px.width)},
           {"cameras", Joined(packing.how.cameras)},
           {"arms", one_arm ? "right" : "left,right"},
+          {"arms_read", packing.arms_read},
           {"tasks", Joined(packing.tasks)},
           {"pose_map", PoseMapWords(packing.clip.pose_map)},
           {"delta_frames", fmt::format("{}", packing.clip.delta_frames)},

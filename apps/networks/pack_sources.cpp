@@ -66,7 +66,7 @@ PackSource Examine(const fs::path& folder, const SourceOptions& options) {
                        options.least_frames)
         .Called("too_short");
   }
-  if (source.row) ReadTruth(TruthPath(*place), source.frames, recording.cameras.size());
+  if (source.row) ReadTruth(TruthPath(*place), source.frames, recording.cameras);
   source.sha256 = HashOfFiles(recording, source.row, folder);
   return source;
 }

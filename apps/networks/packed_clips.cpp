@@ -1,7 +1,10 @@
 #include "apps/networks/packed_clips.h"
 
+#include <algorithm>
+#include <iterator>
 #include <map>
 #include <nlohmann/json.hpp>
+#include <set>
 #include <sstream>
 
 #include "core/error.h"
@@ -40,7 +43,52 @@ at::Tensor ClipIds(const std::filesystem::path& shard) {
   return ids.to(at::kLong).clone();
 }
 
+/// The initial states of one packing.
+struct SplitStates {
+  std::set<std::string> learned, held_out;
+};
+
+SplitStates StatesOf(const std::filesystem::path& folder) {
+  const std::vector<std::string> states = ReadRecordings(folder / "shards.json").states;
+  SplitStates split;
+  for (const std::filesystem::path& shard : train::ShardPaths(folder)) {
+    const TensorFile file = TensorFile::Open(shard);
+    const auto split_said = file.metadata().find("split");
+    const bool holds_out = split_said != file.metadata().end() && split_said->second == "holdout";
+    const at::Tensor ids = ClipIds(shard);
+    for (std::int64_t i = 0; i < ids.size(0); ++i) {
+      const auto recording = ids.data_ptr<std::int64_t>()[i];
+      if (recording < 0 || recording >= std::ssize(states))
+        throw InvalidInput("{}: a clip of recording {}, wanted below {}", shard.string(), recording, states.size());
+      (holds_out ? split.held_out : split.learned).insert(states[static_cast<std::size_t>(recording)]);
+    }
+  }
+  return split;
+}
+
+/// @param learner, keeper  folders of the states
+void CheckHoldout(const std::string& learner, const std::set<std::string>& learned, const std::string& keeper,
+                  const std::set<std::string>& held_out) {
+  std::vector<std::string> both;
+  std::ranges::set_intersection(learned, held_out, std::back_inserter(both));
+  if (both.empty()) return;
+  throw InvalidInput("{}: {} of the {} initial states that {} holds out are learned from here, as {}: wanted packings "
+                     "of one --seed and one --holdout",
+                     learner, both.size(), held_out.size(), keeper, both.front());
+}
+
 }  // namespace
+
+void CheckHoldouts(const train::ShardFolders& folders) {
+  std::map<std::filesystem::path, SplitStates> packings;
+  for (const std::filesystem::path& folder : folders) packings[folder];
+  if (packings.size() < 2) return;
+  for (auto& [folder, states] : packings) states = StatesOf(folder);
+  for (const auto& [learner, learns] : packings) {
+    for (const auto& [keeper, keeps] : packings)
+      CheckHoldout(learner.string(), learns.learned, keeper.string(), keeps.held_out);
+  }
+}
 
 std::vector<std::string> NamesIn(const std::string& joined) {
   std::vector<std::string> names;

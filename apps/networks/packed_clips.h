@@ -27,6 +27,11 @@ struct PackedSet {
   std::vector<std::string> tasks, cameras;
 };
 
+/// What one packing holds out, another may not learn from: each split is its packing's own.
+/// @throws InvalidInput naming two of the folders and how many initial states both have; if a shards.json lacks what is
+///   said of recordings, where there are several folders
+void CheckHoldouts(const train::ShardFolders& folders);
+
 /// Names with commas between them.
 std::vector<std::string> NamesIn(const std::string& joined);
 std::string Joined(const std::vector<std::string>& names);

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <set>
 
 #include "apps/networks/shard_rows.h"
@@ -40,6 +41,33 @@ Mount MountOf(const std::string& camera) {
 
 /// One row of `actions`: the arm that carries a camera. @param mount  not kBase
 ArmState CarrierOf(const float* row, Mount mount) { return ArmOf(row + (mount == Mount::kLeftGripper ? 0 : 8)); }
+
+/// A clip that shows all that its camera saw: its crop begins in the corner and is the largest of its recording's.
+const PackedClip& WholePicture(const PackedSet& set) {
+  std::vector<at::Tensor> of_shards;
+  for (const train::Shard& shard : set.shards.shards()) {
+    const nn::MappedTensors file(TensorFile::Open(shard.path));
+    of_shards.push_back(file.Get("crop").to(at::kLong).clone());
+    nn::CheckShape(shard.path.string() + ": crop", of_shards.back(), {shard.clip_start.size(0) - 1, 4});
+  }
+  const at::Tensor crops = at::cat(of_shards);  // [clips, 4]: x, y, width, height
+  const auto recording = [&](std::size_t clip) {
+    return std::pair(set.shards.shards()[set.clips[clip].shard].path.parent_path(), set.clips[clip].recording);
+  };
+  const auto crop = [&](std::size_t clip) { return crops.data_ptr<std::int64_t>() + 4 * clip; };
+  std::map<std::pair<std::filesystem::path, std::int64_t>, std::int64_t> largest_px2;
+  for (std::size_t i = 0; i < set.clips.size(); ++i) {
+    std::int64_t& largest = largest_px2[recording(i)];
+    largest = std::max(largest, crop(i)[2] * crop(i)[3]);
+  }
+  for (std::size_t i = 0; i < set.clips.size(); ++i) {
+    const bool is_whole = crop(i)[0] == 0 && crop(i)[1] == 0 && crop(i)[2] * crop(i)[3] == largest_px2[recording(i)];
+    if (is_whole) return set.clips[i];
+  }
+  throw InvalidInput("policy training: none of {} clips shows a whole picture, wanted crop 0 of a recording as `evac "
+                     "pack` makes it: it says what the cameras are",
+                     set.clips.size());
+}
 
 bool HoldsContact(const train::Shard& shard, std::int64_t first, std::int64_t end) {
   const auto* contact = shard.contact.data_ptr<std::uint8_t>();
@@ -209,7 +237,7 @@ double PolicyTraining::Measure(const LearnedNet& net, std::int64_t moments) cons
 }
 
 std::vector<Camera> CamerasOf(const PackedSet& set) {
-  const PackedClip& clip = set.clips.front();
+  const PackedClip& clip = WholePicture(set);
   const train::Shard& shard = set.shards.shards()[clip.shard];
   const at::Tensor actions = ActionsOf(shard.path);
   std::vector<Camera> cameras;

@@ -74,7 +74,8 @@ Eigen::Isometry3d ToldCamera(const train::Shard& shard, std::int64_t clip_first,
                              Mount mount);
 /// {right}, or {left, right}: whose arms the shards hold.
 std::vector<std::string> ArmsOf(const PackedSet& set);
-/// The views' cameras of a clip, on their mounts, as the card keeps them.
+/// The views' cameras, on their mounts, as the card keeps them: of a clip that shows the whole picture.
+/// @throws InvalidInput if there is none
 std::vector<Camera> CamerasOf(const PackedSet& set);
 
 }  // namespace evac

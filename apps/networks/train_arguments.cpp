@@ -6,9 +6,25 @@
 #include <thread>
 
 #include "apps/interrupts.h"
+#include "core/config.h"
+#include "core/hash.h"
 #include "worldmodel/evac_config.h"
 
 namespace evac {
+namespace {
+
+/// " page <hash> init <hash>": what JobPlace::begun_with is.
+std::string BegunWith(const TrainArguments& arguments) {
+  std::string text;
+  if (!arguments.config.empty()) text += " page " + Config::FromFile(arguments.config).ContentHash();
+  if (!arguments.forecast.empty()) text += " forecast " + Sha256HexOfFile(arguments.forecast);
+  if (arguments.init.empty()) return text;
+  text += (arguments.init_widen ? " widened init " : " init ") + Sha256HexOfFile(arguments.init);
+  for (const std::string& prefix : arguments.init_except) text += " except " + prefix;
+  return text;
+}
+
+}  // namespace
 
 void AddShared(CLI::App& command, const std::shared_ptr<TrainArguments>& arguments) {
   command.add_option("SHARDS", arguments->shards, "folders of `evac pack` (docs/formats/shards.md); one that is named twice counts twice")
@@ -22,10 +38,12 @@ void AddTraining(CLI::App& command, const std::shared_ptr<TrainArguments>& argum
       .add_option("--training", arguments->training, "the page of training options; what is left out is the paper's")
       ->check(CLI::ExistingFile);
   command.add_option("--set", arguments->settings, "NAME=VALUE, one option of that page; may be given again");
-  command.add_option("--minutes", arguments->minutes, "as many steps as fit, counted once after the first")
-      ->check(CLI::Range(0.001, 1e6));
+  CLI::Option* minutes =
+      command.add_option("--minutes", arguments->minutes, "as many steps as fit, counted once after the first");
+  minutes->check(CLI::Range(0.001, 1e6));
   command.add_option("--steps", arguments->steps, "so many steps")
-      ->check(CLI::Range(std::int64_t{1}, std::int64_t{1} << 40));
+      ->check(CLI::Range(std::int64_t{1}, std::int64_t{1} << 40))
+      ->excludes(minutes);
   command
       .add_option("--threads", arguments->threads, "default: one per core; the last digits of the sums depend on it")
       ->check(CLI::Range(1, 1024));
@@ -52,7 +70,8 @@ train::JobPlace PlaceOf(const TrainArguments& arguments, TrainingProgress& progr
           arguments.threads > 0 ? arguments.threads : cores,
           IsInterrupted,
           [&](const train::TrainerProgress& at) { progress.Show(at); },
-          [&](const std::string& sentence) { progress.Say(sentence); }};
+          [&](const std::string& sentence) { progress.Say(sentence); },
+          BegunWith(arguments)};
 }
 
 int LibraryThreadsOf(const train::JobPlace& place, const train::JobOptions& options) {
@@ -65,6 +84,11 @@ ExitCode End(const train::TrainerSummary& summary, const std::filesystem::path& 
                summary.steps);
     return ExitCode::kInternal;
   }
+  if (summary.steps_now == 0 && summary.step >= summary.steps)
+    fmt::print(stderr,
+               "nothing was left to do: the training in {} is planned for {} steps and has done them; more --steps go "
+               "on for longer\n",
+               out.string(), summary.steps);
   const std::string best =
       summary.best ? fmt::format(", best hold-out {:.6g} at step {}", *summary.best, summary.best_step) : "";
   fmt::print("{}: {} after {} steps{}\n", (out / file).string(), summary.why, summary.step, best);

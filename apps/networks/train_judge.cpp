@@ -226,7 +226,7 @@ train::TrainerSummary TrainJudge(const train::JobPlace& place, const JudgeTraini
   const ClassifierNet& net = learners.net();
   const JudgeTraining training(data.learn, split.fit, options);
   options.job.trainer.identity = IdentityOf(SettingsOf(options)) + data.learn.recipe + data.learn.Codec() +
-                                 " workers " + std::to_string(learners.count());
+                                 " workers " + std::to_string(learners.count()) + place.begun_with;
   train::Trainer trainer(learners.weights().all(), options.job.trainer, place.out);
   const auto loss = [&](const ClassifierNet& of, const train::StepPlace& at) { return training.Loss(of, at); };
   learners.Replicate(trainer, loss);

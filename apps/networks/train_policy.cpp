@@ -46,7 +46,8 @@ train::TrainerSummary TrainPolicy(const train::JobPlace& place, const PolicyOpti
   if (place.say) place.say(fmt::format("{} clips to imitate, {} to measure with", training.clips(), measuring.clips()));
   if (codec) card["codec"] = set.shards.codec();
   options.job.trainer.identity = IdentityOf(SettingsOf(options)) + set.shards.metadata().at("recipe") + " " +
-                                 (codec ? set.shards.codec() : "") + " workers " + std::to_string(learners.count());
+                                 (codec ? set.shards.codec() : "") + " workers " + std::to_string(learners.count()) +
+                                 place.begun_with;
   train::Trainer trainer(learners.weights().all(), options.job.trainer, place.out);
   const auto loss = [&](const LearnedNet& of, const train::StepPlace& at) { return training.Loss(of, at); };
   learners.Replicate(trainer, loss);

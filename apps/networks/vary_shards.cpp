@@ -36,15 +36,23 @@ struct Variant {
 class VariedCollection {
  public:
   VariedCollection(const VaryArguments& arguments)
-      : recipe_(ReadRecipe(arguments.recipe, {})), collection_(arguments.collection) {
+      : recipe_(ReadRecipe(arguments.recipe, arguments.assignments)), collection_(arguments.collection) {
     const fs::path path = arguments.shards / "shards.json", claim = collection_ / "collection.json";
+    std::string made_by;
     try {
       json::parse(ReadFile(path)).at("recordings").get_to(names_);
-      seed_ = std::stoull(json::parse(ReadFile(claim)).at("seed").get<std::string>());
+      const json page = json::parse(ReadFile(claim));
+      seed_ = std::stoull(page.at("seed").get<std::string>());
+      page.at("recipe_sha256").get_to(made_by);
     } catch (const std::exception& error) {
       throw InvalidInput("{}: {}; wanted what `evac pack` and `evac collect` write: {} and {}", arguments.shards.string(),
                          error.what(), path.string(), claim.string());
     }
+    if (made_by == recipe_.hash) return;
+    throw InvalidInput(
+        "{}: `evac collect` had the recipe {}, `evac vary` has {} by --recipe {} and --set: wanted the recipe of the "
+        "collection, with the same --set and the pages, scenes and weights that it names as they were",
+        claim.string(), made_by, recipe_.hash, arguments.recipe.string());
   }
 
   const Recipe& recipe() const { return recipe_; }
@@ -62,8 +70,10 @@ class VariedCollection {
     CollectJob job = JobAt(recipe_, seed_, row.index);
     if (job.row.task != row.task || job.row.state_seed != row.state_seed || job.row.world_seed != row.world_seed ||
         job.row.behaviour != row.behaviour)
-      throw InvalidInput("{}: episode {} is '{}' of {}; by this recipe it would be '{}' of {}: wanted the recipe of the collection",
-                         path.string(), row.index, row.behaviour, row.task, job.row.behaviour, job.row.task);
+      throw InvalidInput(
+          "{}: episode {} is '{}' of {}; by its recipe and seed it would be '{}' of {}: wanted a row of this version of "
+          "evac",
+          path.string(), row.index, row.behaviour, row.task, job.row.behaviour, job.row.task);
     return job;
   }
 
@@ -137,7 +147,10 @@ class Varier {
     std::vector<Variant> variants;
     if (job.behaviour->without_object) return variants;  // whatever is done, nothing comes of it
     const Task& task = TaskOf(job);
-    const std::string& period_s = set_.shards.metadata().at("period_s");
+    const TensorMetadata& packing = set_.shards.metadata();
+    if (const auto arms = packing.find("arms_read"); arms != packing.end() && arms->second == "measured")
+      throw InvalidInput("{}: arms_read is measured, wanted told: what is varied is what the arms were told", arguments_.shards.string());
+    const std::string& period_s = packing.at("period_s");
     if (std::abs(std::stod(period_s) - task.period_s) > 1e-9)
       throw InvalidInput("{}: period_s is {}, wanted {} as {} has it", arguments_.shards.string(), period_s, task.period_s, task.id);
     const train::Shard& shard = set_.shards.shards()[clip.shard];

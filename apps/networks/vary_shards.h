@@ -2,11 +2,14 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <string>
+#include <vector>
 
 namespace evac {
 
 struct VaryArguments {
   std::filesystem::path shards, collection, recipe;
+  std::vector<std::string> assignments;  ///< `--set`, as the collection was made with
   int count = 4;  ///< variants of each clip
   std::uint64_t seed = 1;
   int jobs = 0;  ///< clips at the same time; 0: one per core. Changes no byte

@@ -112,7 +112,7 @@ void Write(const std::filesystem::path& path, const LearningShards& o, const Ten
 
 void WriteLearningShards(const std::filesystem::path& folder, const LearningShards& options) {
   MakeFolders(folder);
-  nlohmann::json states = nlohmann::json::array(), behaviours = states, fates = states;
+  nlohmann::json states = nlohmann::json::array(), behaviours = states, fates = states, shards = states;
   SplitMix64 random(1);
   for (const bool holds_out : {false, true}) {
     const Tensors tensors = Empty(options, holds_out ? options.clips : 0);
@@ -127,10 +127,12 @@ void WriteLearningShards(const std::filesystem::path& folder, const LearningShar
       behaviours.push_back(options.behaviour);
       fates.push_back(success ? "success" : "near_miss");
     }
-    Write(folder / (holds_out ? "shard_00001.safetensors" : "shard_00000.safetensors"), options, tensors, holds_out);
+    const std::string name = holds_out ? "shard_00001.safetensors" : "shard_00000.safetensors";
+    Write(folder / name, options, tensors, holds_out);
+    shards.push_back({{"file", name}, {"sha256", Sha256HexOfFile(folder / name)}});
   }
-  WriteFileAtomically(folder / "shards.json",
-                      nlohmann::json{{"states", states}, {"behaviours", behaviours}, {"fates", fates}}.dump());
+  const nlohmann::json page = {{"states", states}, {"behaviours", behaviours}, {"fates", fates}, {"shards", shards}};
+  WriteFileAtomically(folder / "shards.json", page.dump());
 }
 
 nn::VaeConfig LearningCodec() {

@@ -4,6 +4,7 @@
 
 #include "judges/classifier_judge.h"
 #include "policies/learned_policy.h"
+#include "worldmodel/trained_for.h"
 
 /// What ships opens, and stays small.
 namespace evac {
@@ -28,6 +29,15 @@ TEST(ShippedWeights, OpenAsWhatTheyAreCalled) {
   }
   EXPECT_GE(policies, 4U) << "checkpoints of one training";
   EXPECT_GE(judges, 1U);
+}
+
+TEST(ShippedWeights, OfTheWorldModelSayWhatTheyAreFor) {
+  const TrainedFor trained = TrainedFor::Read(kShipped / "evac.safetensors");
+  EXPECT_EQ(trained.period_s, 0.1);
+  EXPECT_EQ(trained.cameras, (std::vector<std::string>{"head", "hand_right"}));
+  EXPECT_EQ(trained.arms_read, "told");
+  ASSERT_TRUE(trained.statistics.has_value());
+  EXPECT_NO_THROW(trained.StatisticsOr(kShipped / "statistics.yaml"));
 }
 
 TEST(ShippedWeights, AreAtMost25MBInAll) {

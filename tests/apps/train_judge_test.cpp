@@ -214,7 +214,7 @@ TEST_F(CodedJudgeTest, ItLearnsFromClipsAsTheCodecGivesThemBackAndIsMeasuredOnTh
 TEST_F(CodedJudgeTest, LatentsOfAnotherCodecAreRefused) {
   for (const auto& shard : train::ShardPaths(folder_ / "shards")) {
     train::CheckpointWeights weights(codec_);
-    train::EncodeShard(nn::Vae(nn::Scope(weights, train::kCodecPrefix), config_), shard, {"another", "shard"});
+    train::EncodeShard(nn::Vae(nn::Scope(weights, train::kCodecPrefix), config_), shard, {"another", Sha256HexOfFile(shard)});
   }
   const ShardCodec shard_codec(codec_, config_);
   EXPECT_THAT([&] { Train(Place("judge"), Quick(2), &shard_codec); },
@@ -346,6 +346,14 @@ TEST_F(TrainJudgeTest, GoesOnFromAJudgeOfTheSameTasksAloneAndKeepsWhatItLearnedF
               ThrowsMessage<Error>(HasSubstr("tasks is 'pour', wanted 'carry'")));
   Train(Place("marked"), Quick(2), nullptr, with("marked.safetensors", "learned_from", "0123456789ab"));
   EXPECT_EQ(WeightFile(folder_ / "marked" / "judge.safetensors", "evac-classifier 1").Text("learned_from"), "0123456789ab");
+}
+
+TEST_F(TrainJudgeTest, GoesOnOnlyWithWhatItWasBegunWith) {
+  train::JobPlace place = Place("judge");
+  place.begun_with = " init one";
+  Train(place, Quick(2));
+  place.begun_with = " init another";
+  EXPECT_THAT([&] { Train(place, Quick(2)); }, ThrowsMessage<TensorError>(HasSubstr("is a training with other options")));
 }
 
 TEST(Calibrate, AtTheThresholdBothErrorsAreEqualShares) {

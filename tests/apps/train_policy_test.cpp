@@ -87,6 +87,48 @@ TEST_F(TrainPolicyTest, TheCardKeepsTheCamerasOfTheShards) {
   EXPECT_TRUE(cameras[1].mount_from_camera.translation().isApprox(Eigen::Vector3d(0.1, 0, -0.9), 1e-5));
 }
 
+/// The training clips, two by two, become crops of one recording: the first a part of it, with twice the focal length.
+/// @param corner_px  where the second one's crop begins
+void CropClips(const std::filesystem::path& folder, std::int64_t corner_px) {
+  const std::filesystem::path shard = folder / "shard_00000.safetensors";
+  nn::MappedTensors file(TensorFile::Open(shard));
+  std::vector<at::Tensor> tensors;
+  std::vector<TensorView> views;
+  for (const TensorView& view : file.file().tensors()) {
+    at::Tensor tensor = file.Get(view.name).clone();
+    const at::Tensor starts = file.Get("clip_start");
+    for (std::int64_t clip = 0; clip + 1 < starts.size(0); ++clip) {
+      const bool is_part = clip % 2 == 0;
+      const std::int64_t first = starts[clip].item<std::int64_t>();
+      const std::int64_t frames = starts[clip + 1].item<std::int64_t>() - first;
+      const std::vector<std::int64_t> part = {0, 0, 80, 60}, whole = {corner_px, 0, 96, 64};
+      if (view.name == "clip_id") tensor[clip] = clip / 2;
+      if (view.name == "crop") tensor[clip].copy_(at::tensor(is_part ? part : whole));
+      if (view.name == "k" && is_part) tensor.narrow(0, first, frames).mul_(2);
+    }
+    tensors.push_back(tensor);
+    views.push_back(nn::ViewOf(view.name, tensors.back()));
+  }
+  WriteTensorFile(shard, views, file.file().metadata());
+}
+
+TEST_F(TrainPolicyTest, TheCardsCamerasAreThoseOfAWholePicture) {
+  const auto cameras = [&] { return CamerasOf(PackedSet({folder_ / "shards"}, train::Split::kTrain)); };
+  const double whole_px = cameras().front().fx_px;
+  CropClips(folder_ / "shards", 0);
+  EXPECT_EQ(cameras().front().fx_px, whole_px) << "not that of the first clip, which shows a part";
+  CropClips(folder_ / "shards", 3);
+  EXPECT_THAT(cameras, ThrowsMessage<Error>(HasSubstr("none of 24 clips shows a whole picture")));
+}
+
+TEST_F(TrainPolicyTest, GoesOnOnlyWithWhatItWasBegunWith) {
+  train::JobPlace place = Place("policy");
+  TrainPolicy(place, Quick(2), nullptr, {});
+  place.begun_with = " page another";
+  EXPECT_THAT([&] { TrainPolicy(place, Quick(2), nullptr, {}); },
+              ThrowsMessage<TensorError>(HasSubstr("is a training with other options")));
+}
+
 TEST_F(TrainPolicyTest, ItIsShownWhatTheCodecGivesBackAndNoOtherCodecsLatents) {
   const std::filesystem::path weights = EncodeLearningShards(folder_ / "shards", folder_ / "codec");
   const ShardCodec codec(weights, LearningCodec());
@@ -110,7 +152,7 @@ TEST_F(TrainPolicyTest, ItIsShownWhatTheCodecGivesBackAndNoOtherCodecsLatents) {
             CodecSha256(weights));
   for (const auto& shard : train::ShardPaths(folder_ / "shards")) {
     train::CheckpointWeights again(weights);
-    train::EncodeShard(nn::Vae(nn::Scope(again, train::kCodecPrefix), LearningCodec()), shard, {"another", "shard"});
+    train::EncodeShard(nn::Vae(nn::Scope(again, train::kCodecPrefix), LearningCodec()), shard, {"another", Sha256HexOfFile(shard)});
   }
   EXPECT_THAT([&] { TrainPolicy(Place("refused"), Quick(2), &codec, {}); },
               ThrowsMessage<TensorError>(HasSubstr("did not make the shards' latents")));

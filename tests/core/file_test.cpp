@@ -2,6 +2,9 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <fstream>
 
 #include "core/error.h"
 #include "tests/support/temp_folder.h"
@@ -56,6 +59,33 @@ TEST(File, WhatCannotBeWrittenIsNamedAndTheOldFileStays) {
   EXPECT_THAT(MessageOf([&] { WriteFileAtomically(folder / "f", "new"); }), HasSubstr("No space left"));
   EXPECT_EQ(ReadFile(folder / "f"), "old");
   EXPECT_FALSE(fs::is_symlink(folder / "f.tmp"));
+}
+
+TEST(File, AnotherNameIsALinkWhereTheDiskHasThem) {
+  const TempFolder folder;
+  WriteFileAtomically(folder / "f", "x");
+  LinkOrCopy(folder / "f", folder / "g");
+  EXPECT_TRUE(fs::equivalent(folder / "f", folder / "g"));
+}
+
+TEST(File, AFileOfAnotherDiskIsCopiedWholeOrNotAtAll) {
+  const TempFolder folder;
+  const fs::path from = "/dev/shm/evac-file-test-" + std::to_string(::getpid());
+  std::ofstream(from) << "whole";
+  std::error_code refused;
+  fs::create_hard_link(from, folder / "link", refused);
+  if (!refused || !fs::exists(from)) {
+    fs::remove(from);
+    GTEST_SKIP() << "/dev/shm is no other disk here";
+  }
+  std::ofstream(folder / "f.tmp") << "half, of a process that was killed";
+  LinkOrCopy(from, folder / "f");
+  EXPECT_EQ(ReadFile(folder / "f"), "whole");
+  EXPECT_FALSE(fs::exists(folder / "f.tmp"));
+  MakeFolders(folder / "g.tmp/in_the_way");
+  EXPECT_THAT(MessageOf([&] { LinkOrCopy(from, folder / "g"); }), HasSubstr((folder / "g").string()));
+  EXPECT_FALSE(fs::exists(folder / "g"));
+  fs::remove(from);
 }
 
 TEST(File, FoldersAreMadeAsFarAsTheyAreMissing) {

@@ -2,11 +2,15 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <sys/wait.h>
 #include <unistd.h>
 
+#include <csignal>
 #include <cstring>
 #include <filesystem>
 #include <fstream>
+
+#include "tests/support/command.h"
 
 namespace evac {
 namespace {
@@ -69,6 +73,21 @@ TEST_F(TensorFileOnDisk, AFileThatWasNotFinishedIsNotThere) {
     EXPECT_THAT([&] { writer.Finish(); }, ThrowsMessage<TensorError>(HasSubstr("4 declared bytes are missing")));
   }
   EXPECT_TRUE(std::filesystem::is_empty(folder_));
+}
+
+TEST_F(TensorFileOnDisk, WhatAKilledWriterLeftGoesWithTheNextWriterOfTheSamePath) {
+  const pid_t writer = StartCommand({"/bin/sleep", "600"}, folder_ / "log");
+  const std::string left = "a.partial-" + std::to_string(writer);
+  const std::vector<std::string> others = {"a", "b." + left, "a.partial-", "a.partial-1x", "a.partial--1", "log"};
+  for (const std::string& name : others) std::ofstream(folder_ / name) << "x";
+  std::ofstream(folder_ / left) << "half";
+  WriteTensorFile(folder_ / "a", {}, {});
+  EXPECT_TRUE(std::filesystem::exists(folder_ / left)) << "its process lives";
+  ::kill(writer, SIGKILL);
+  ::waitpid(writer, nullptr, 0);
+  WriteTensorFile(folder_ / "a", {}, {});
+  EXPECT_FALSE(std::filesystem::exists(folder_ / left));
+  for (const std::string& name : others) EXPECT_TRUE(std::filesystem::exists(folder_ / name)) << name;
 }
 
 TEST_F(TensorFileOnDisk, AMissingFileIsNamed) {

@@ -58,5 +58,14 @@ TEST_F(MeanOfWeights, OfDifferentCodecsIsRefused) {
   EXPECT_THROW(MeanWeights({a}, config_), TensorError);
 }
 
+TEST_F(MeanOfWeights, IsForWhatThoseAreForThatSayIt) {
+  const fs::path a = Written("a", 1, {{"period_s", "0.1"}}), b = Written("b", 2, {}),
+                 c = Written("c", 3, {{"period_s", "0.2"}});
+  EXPECT_EQ(MeanWeights({a, b}, config_).Metadata().at("period_s"), "0.1");
+  EXPECT_EQ(MeanWeights({b, a}, config_).Metadata().at("period_s"), "0.1");
+  EXPECT_THAT([&] { MeanWeights({a, b, c}, config_); },
+              testing::ThrowsMessage<TensorError>(testing::AllOf(testing::HasSubstr("period_s is '0.1'"), testing::HasSubstr("'0.2'"))));
+}
+
 }  // namespace
 }  // namespace evac::nn

@@ -21,9 +21,9 @@ std::optional<bool> Outcome(char letter) {
 
 /// One row per letter: reality, reality again, the model.
 void Add(std::vector<FidelityRow>& rows, const std::string& kind, const std::string& checkpoint, const std::string& real,
-         const std::string& again, const std::string& model) {
+         const std::string& again, const std::string& model, const std::string& task = "take_bottle") {
   for (std::size_t i = 0; i < real.size(); ++i)
-    rows.push_back({kind, {"take_bottle", "7-" + std::to_string(i), "pick", checkpoint, 1}, Outcome(real[i]),
+    rows.push_back({kind, {task, "7-" + std::to_string(i), "pick", checkpoint, 1}, Outcome(real[i]),
                     Outcome(again[i]), Outcome(model[i]), "closed/real.mp4", "closed/model.mp4"});
 }
 
@@ -98,19 +98,119 @@ TEST(Fidelity, TheHorizonEndsWhereAStillPictureIsAsGood) {
   EXPECT_EQ(FidelityOf(input).usable_horizon_chunks, 4) << "where reality stands still there is nothing to beat";
 }
 
+/// Two policies on two tasks; no two numbers of it are alike, so that none can stand where another belongs.
+FidelityInput TwoTasks() {
+  FidelityInput input;
+  Add(input.rows, "closed_loop", "good", "ssssssssff", "ssssssssff", "ssssffffss", "take_bottle");
+  Add(input.rows, "closed_loop", "bad", "sssfffffff", "ssffffffff", "sssssfffff", "take_bottle");
+  Add(input.rows, "closed_loop", "good", "sssssfffff", "sssffsffff", "sss-ffff--", "take_ham");
+  Add(input.rows, "closed_loop", "bad", "ssssffffff", "sssssfssff", "ssssfff-ff", "take_ham");
+  Add(input.rows, "open_loop", "good", "sssff", "-----", "ssfsf");
+  Add(input.rows, "executed", "good", "ssfff", "-----", "sffss");
+  Add(input.rows, "counterfactual:shifted", "good", "fffs", "----", "ffss");
+  return input;
+}
+
+TEST(Fidelity, JsonSaysOfTheModelWhatIsOfTheModelAndOfRealityWhatIsOfReality) {
+  const Json json = Json::parse(FidelityJson(FidelityOf(TwoTasks())));
+  EXPECT_EQ(json["n"], 36);
+  EXPECT_DOUBLE_EQ(json["agreement"], 27.0 / 36);
+  EXPECT_DOUBLE_EQ(json["hallucinated"], 4.0 / 17);
+  EXPECT_DOUBLE_EQ(json["missed"], 5.0 / 19);
+  EXPECT_EQ(json["n_real_real"], 40);
+  EXPECT_DOUBLE_EQ(json["agreement_real_real"], 33.0 / 40);
+  EXPECT_DOUBLE_EQ(json["hallucinated_real_real"], 4.0 / 20);
+  EXPECT_DOUBLE_EQ(json["missed_real_real"], 3.0 / 20);
+  EXPECT_EQ(json["told_real_real"]["n"], 36) << "without the four clips that the judge could not tell";
+  EXPECT_DOUBLE_EQ(json["told_real_real"]["agreement"], 31.0 / 36);
+  EXPECT_DOUBLE_EQ(json["told_real_real"]["hallucinated"], 3.0 / 17);
+  EXPECT_DOUBLE_EQ(json["told_real_real"]["missed"], 2.0 / 19);
+  const Json& ham = json["cells"][3];
+  EXPECT_EQ(ham["task"], "take_ham");
+  EXPECT_EQ(ham["checkpoint"], "good");
+  EXPECT_EQ(ham["n"], 7);
+  EXPECT_EQ(ham["n_real_real"], 10);
+  EXPECT_DOUBLE_EQ(ham["real_sr"], 4.0 / 7);
+  EXPECT_DOUBLE_EQ(ham["real2_sr"], 4.0 / 10);
+  EXPECT_DOUBLE_EQ(ham["wm_sr"], 3.0 / 7);
+  EXPECT_DOUBLE_EQ(ham["agreement"], 6.0 / 7);
+}
+
+/// Over the ham, reality ranks good above bad (4/7, 4/9) and the model does not (3/7, 4/9): the violation is reality's gap.
+TEST(Fidelity, RankViolationsAreRealitysGapsAveragedOverTasks) {
+  const Json json = Json::parse(FidelityJson(FidelityOf(TwoTasks())));
+  EXPECT_NEAR(json["mmrv"], (0 + (4.0 / 7 - 4.0 / 9)) / 2, 1e-12);
+  EXPECT_NEAR(json["mmrv_real_real"], (0 + (5.0 / 10 - 4.0 / 10)) / 2, 1e-12);
+}
+
+TEST(Fidelity, JsonSaysWhatEachPartCameTo) {
+  FidelityInput input = TwoTasks();
+  input.open_loop.object_px = {1, 2, 3};
+  input.parts = {{"closed", 120, 0}, {"open", 40, 2, "evac/take_ham: NaN"}};
+  ChunkDrift chunk;
+  chunk.clips = 5;
+  chunk.psnr = 31.0;
+  chunk.psnr_moving = 22.0;
+  chunk.psnr_moving_copy = 15.0;
+  chunk.gripper_px = 1.5;
+  chunk.gripper_found = 0.75;
+  input.open_loop.chunks = {chunk, {}};
+  const Json json = Json::parse(FidelityJson(FidelityOf(input)));
+  const Json& open = json["open_loop"];
+  EXPECT_EQ(open["n"], 5);
+  EXPECT_DOUBLE_EQ(open["agreement"], 3.0 / 5);
+  EXPECT_DOUBLE_EQ(open["hallucinated"], 1.0 / 2);
+  EXPECT_DOUBLE_EQ(open["missed"], 1.0 / 3);
+  EXPECT_NEAR(open["object_px_error_p85"], 2.7, 1e-12);
+  EXPECT_EQ(open["clips_by_chunk"], Json::parse("[5, 0]"));
+  EXPECT_EQ(open["psnr_by_chunk"], Json::parse("[31.0, null]"));
+  EXPECT_EQ(open["psnr_moving_by_chunk"], Json::parse("[22.0, null]"));
+  EXPECT_EQ(open["psnr_moving_copy_by_chunk"], Json::parse("[15.0, null]"));
+  EXPECT_EQ(open["gripper_px_error_by_chunk"], Json::parse("[1.5, null]"));
+  EXPECT_EQ(open["gripper_found_by_chunk"], Json::parse("[0.75, null]"));
+  EXPECT_DOUBLE_EQ(json["executed"]["agreement"], 2.0 / 5);
+  EXPECT_DOUBLE_EQ(json["executed"]["hallucinated"], 2.0 / 3);
+  EXPECT_DOUBLE_EQ(json["executed"]["missed"], 1.0 / 2);
+  EXPECT_EQ(json["counterfactual"], Json::parse(R"([{"kind": "shifted", "n": 4, "hallucinated": 0.3333333333333333}])"));
+  EXPECT_EQ(json["parts"], Json::parse(R"([{"part": "closed", "episodes": 120, "failed": 0}, {"part": "open", "episodes": 40, "failed": 2}])"));
+}
+
 TEST(Fidelity, JsonHasEveryFieldAndSaysWhyOneIsNull) {
-  const Json json = Json::parse(FidelityJson(FidelityOf(Sample())));
-  for (const char* field : {"cells", "pearson", "pearson_low", "spearman", "mmrv", "mmrv_real_real", "agreement", "agreement_real_real",
-                            "kappa", "hallucinated", "hallucinated_real_real", "missed", "missed_real_real", "open_loop",
-                            "executed", "counterfactual", "usable_horizon_chunks", "seconds_per_chunk", "judge"})
+  FidelityInput input;
+  Add(input.rows, "closed_loop", "good", "sff", "sff", "sff");
+  Add(input.rows, "open_loop", "good", "sff", "---", "---");
+  const Json json = Json::parse(FidelityJson(FidelityOf(std::move(input))));
+  for (const char* field : {"cells", "pearson", "pearson_low", "spearman", "mmrv", "mmrv_real_real", "kappa", "open_loop", "executed",
+                            "counterfactual", "horizon", "usable_horizon_chunks", "seconds_per_chunk", "judge"})
     EXPECT_TRUE(json.contains(field)) << field;
-  for (const char* field : {"n", "agreement", "hallucinated", "missed", "object_px_error_p85", "gripper_px_error_by_chunk", "psnr_by_chunk",
-                            "psnr_moving_by_chunk", "psnr_moving_copy_by_chunk"})
-    EXPECT_TRUE(json["open_loop"].contains(field)) << field;
   for (const char* field : {"auroc", "kappa", "ece", "kappa_masked"}) EXPECT_TRUE(json["judge"].contains(field)) << field;
   EXPECT_TRUE(json["seconds_per_chunk"].is_null());
   EXPECT_EQ(json["undefined"]["seconds_per_chunk"], "nothing was imagined");
-  EXPECT_EQ(json["counterfactual"][0]["kind"], "shifted");
+  EXPECT_TRUE(json["usable_horizon_chunks"].is_null());
+  EXPECT_EQ(json["undefined"]["usable_horizon_chunks"], "no long rollouts");
+  EXPECT_EQ(json["open_loop"]["undefined"]["hallucinated"], "no pairs") << "nobody could tell: not that nothing failed";
+  EXPECT_EQ(json["executed"]["undefined"]["missed"], "nothing was asked");
+}
+
+TEST(Fidelity, SaysWhatHasNoOutcomeAndWhatFailed) {
+  FidelityInput input = Sample();
+  const std::string none = FidelityPage(FidelityOf(input));
+  EXPECT_THAT(none, Not(HasSubstr("in no number")));
+  EXPECT_THAT(none, HasSubstr("29 of 30")) << "one state of bad has no imagined outcome";
+  input.parts = {{"closed", 90, 0}, {"open", 40, 2, "evac/take_bottle: <NaN>"}};
+  const Fidelity fidelity = FidelityOf(std::move(input));
+  EXPECT_THAT(FidelityPage(fidelity), HasSubstr("open: 2 of 40 episodes failed and are in no number; the last: evac/take_bottle: &lt;NaN&gt;"));
+  EXPECT_THAT(FidelityText(fidelity), HasSubstr("open: 2 of 40 episodes failed and are in no number; the last: evac/take_bottle: <NaN>"));
+  EXPECT_THAT(FidelityText(fidelity), Not(HasSubstr("closed: ")));
+}
+
+TEST(Fidelity, RealityIsAlsoHeldAgainstItselfOverThePairsThatTheModelIsHeldAgainst) {
+  const Fidelity fidelity = FidelityOf(TwoTasks());
+  EXPECT_THAT(FidelityPage(fidelity), HasSubstr("reality against reality, of the closed loop&#39;s pairs"));
+  EXPECT_THAT(FidelityText(fidelity), HasSubstr("real against real, of the closed loop's pairs"));
+  FidelityInput all_told = TwoTasks();
+  for (FidelityRow& row : all_told.rows) row.model = row.real;
+  EXPECT_THAT(FidelityPage(FidelityOf(std::move(all_told))), Not(HasSubstr("of the closed loop&#39;s pairs"))) << "they are the same";
 }
 
 TEST(Fidelity, CsvLeavesEmptyWhatNobodyKnows) {

@@ -24,6 +24,7 @@ namespace {
 namespace fs = std::filesystem;
 using system_test::WaitUntil;
 using testing::HasSubstr;
+using testing::Not;
 
 const std::string kRecipe = EVAC_SOURCE_DIR "/apps/configs/desk_recipe.yaml";
 const std::string kModel = EVAC_SOURCE_DIR "/apps/configs/desk_model.yaml";
@@ -100,18 +101,65 @@ TEST(CollectCommand, ACollectionIsARecordingTreeThatPacks) {
   EXPECT_EQ(shard.metadata().at("cameras"), "head,hand_right");
 }
 
+TEST(CollectCommand, WhereTheObjectIsGoesWithTheCamerasThatArePacked) {
+  const TempFolder folder;
+  ASSERT_EQ(RunCommand(Words(folder / "all", {"--episodes", "1"})).exit_code, 0);
+  /// [T] of one view: its x and y, as bytes.
+  const auto places = [&](const std::string& cameras, std::size_t view) {
+    const fs::path out = folder / cameras;
+    const CommandResult packed = RunCommand({Binary("evac"), "pack", folder / "all", "--out", out, "--config", kModel,
+                                             "--cameras", cameras, "--holdout", "0"});
+    EXPECT_EQ(packed.exit_code, 0) << packed.err;
+    const TensorFile shard = TensorFile::Open(out / "shard_00000.safetensors");
+    const TensorView& all = shard.Get("object_px");
+    const std::size_t row_bytes = static_cast<std::size_t>(all.shape.at(1)) * 2 * sizeof(float);
+    std::string bytes;
+    for (std::size_t at = view * 2 * sizeof(float); at < all.bytes.size(); at += row_bytes)
+      bytes.append(reinterpret_cast<const char*>(all.bytes.data()) + at, 2 * sizeof(float));
+    return bytes;
+  };
+  const std::string head = places("head,hand_right", 0), hand = places("head,hand_right", 1);
+  EXPECT_NE(head, hand);
+  EXPECT_EQ(places("hand_right,head", 0), hand);
+  EXPECT_EQ(places("hand_right,head", 1), head);
+  EXPECT_EQ(places("head", 0), head);
+}
+
+TEST(CollectCommand, AnEpisodeThatDivergedIsARowWithoutARecording) {
+  const TempFolder folder;
+  const fs::path all = folder / "all", row_path = all / "rows/take_toast/000001.json";
+  ASSERT_EQ(RunCommand(Words(all, {"--episodes", "2"})).exit_code, 0);
+  CollectedEpisode row = ParseCollected(ReadFile(row_path), row_path);
+  row.success = false;
+  row.stop = row.fate = "diverged";
+  row.frames = row.contact_frames = 0;
+  WriteFileAtomically(row_path, CollectedJson(row) + "\n");
+  for (const char* part : {"observations", "parameters", "proprio_stats", "truth"}) fs::remove_all(all / part / "take_toast");
+  const CommandResult collected = RunCommand(Words(all, {"--episodes", "2"}));
+  ASSERT_EQ(collected.exit_code, 0) << collected.err;
+  EXPECT_THAT(collected.out, HasSubstr("2 episodes, 25 frames"));
+  EXPECT_THAT(ReadFile(all / "manifest.csv"), HasSubstr(",0,diverged,diverged,0,0,"));
+  EXPECT_EQ(ReadFile(all / "task_info/task_take_toast.json"), "[]\n");
+  const CommandResult packed = RunCommand({Binary("evac"), "pack", all, "--out", folder / "shards", "--config", kModel,
+                                           "--cameras", "head", "--holdout", "0"});
+  ASSERT_EQ(packed.exit_code, 0) << packed.err;
+  EXPECT_THAT(ReadFile(folder / "shards/shards.json"), testing::AllOf(HasSubstr("take_bottle/000000"), Not(HasSubstr("take_toast"))));
+}
+
 TEST(VaryCommand, DoesWhatWasToldAgainInTheSameScenes) {
   const TempFolder folder;
   ASSERT_EQ(RunCommand(Words(folder / "all", {"--episodes", "4"})).exit_code, 0);
   for (const char* shards : {"shards", "others"})
     ASSERT_EQ(RunCommand({Binary("evac"), "pack", folder / "all", "--out", folder / shards, "--config", kModel, "--cameras",
                           "head,hand_right", "--holdout", "0"}).exit_code, 0);
-  const auto vary = [&](const std::string& shards, const std::string& jobs, const std::string& recipe) {
-    return RunCommand({Binary("evac"), "vary", folder / shards, folder / "all", "--recipe", recipe, "--count", "2", "--jobs", jobs});
+  const auto vary = [&](const std::string& shards, const std::string& jobs, const std::string& set) {
+    return RunCommand({Binary("evac"), "vary", folder / shards, folder / "all", "--recipe", kRecipe, "--set", set, "--count",
+                       "2", "--jobs", jobs});
   };
-  const CommandResult varied = vary("shards", "2", kRecipe);
+  const std::string as_collected = "max_chunks=3";
+  const CommandResult varied = vary("shards", "2", as_collected);
   ASSERT_EQ(varied.exit_code, 0) << varied.err;
-  ASSERT_EQ(vary("others", "1", kRecipe).exit_code, 0);
+  ASSERT_EQ(vary("others", "1", as_collected).exit_code, 0);
   const fs::path path = folder / "shards/variants_00000.safetensors";
   EXPECT_EQ(Sha256HexOfFile(path), Sha256HexOfFile(folder / "others/variants_00000.safetensors"));
   const TensorFile variants = TensorFile::Open(path);
@@ -121,15 +169,21 @@ TEST(VaryCommand, DoesWhatWasToldAgainInTheSameScenes) {
   EXPECT_EQ(variants.Get("actions").shape, (std::vector<std::int64_t>{25 * count, 16}));
   EXPECT_EQ(variants.Get("object_px").shape, (std::vector<std::int64_t>{25 * count, 2, 2}));
   const auto written = fs::last_write_time(path);
-  EXPECT_THAT(vary("shards", "2", kRecipe).out, HasSubstr("0 new variants"));
+  EXPECT_THAT(vary("shards", "2", as_collected).out, HasSubstr("0 new variants"));
   EXPECT_EQ(fs::last_write_time(path), written);
   fs::remove(path);
-  std::string other = ReadFile(kRecipe);
-  for (std::size_t at; (at = other.find("../../")) != std::string::npos;) other.replace(at, 6, EVAC_SOURCE_DIR "/");
-  WriteFileAtomically(folder / "other.yaml", other.substr(0, other.find("mix:")) + "mix:\n  - {name: only, share: 1, policy: visual_pick}\n");
-  const CommandResult refused = vary("shards", "1", folder / "other.yaml");
+  const CommandResult refused = vary("shards", "1", "still.dwell_chunks=2");
   EXPECT_EQ(refused.exit_code, 2);
-  EXPECT_THAT(refused.err, HasSubstr("wanted the recipe of the collection"));
+  EXPECT_THAT(refused.err, testing::AllOf(HasSubstr("`evac collect` had the recipe " + ReadRecipe(kRecipe, {as_collected}).hash),
+                                          HasSubstr("`evac vary` has " + ReadRecipe(kRecipe, {"still.dwell_chunks=2"}).hash)));
+  EXPECT_FALSE(fs::exists(path));
+  const fs::path row_path = folder / "all/rows/take_bottle/000000.json";
+  CollectedEpisode row = ParseCollected(ReadFile(row_path), row_path);
+  ++row.world_seed;
+  WriteFileAtomically(row_path, CollectedJson(row));
+  const CommandResult other_row = vary("shards", "1", as_collected);
+  EXPECT_EQ(other_row.exit_code, 2);
+  EXPECT_THAT(other_row.err, HasSubstr(row_path.string() + ": episode 0 is"));
   EXPECT_FALSE(fs::exists(path));
 }
 

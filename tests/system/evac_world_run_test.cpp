@@ -8,12 +8,15 @@
 
 #include "apps/factory.h"
 #include "core/error.h"
+#include "core/file.h"
 #include "core/hash.h"
 #include "core/seed.h"
 #include "tests/support/command.h"
 #include "tests/support/temp_folder.h"
 #include "tests/system/run_support.h"
+#include "worldmodel/action_statistics.h"
 #include "worldmodel/evac_config.h"
+#include "worldmodel/motion_statistics.h"
 #include "worldmodel/nn/weights.h"
 
 namespace evac {
@@ -104,6 +107,33 @@ TEST_F(ImaginedRun, WeightsOfAnotherNetworkAreRefusedBeforeTheFirstEpisodeOfAnyW
   EXPECT_EQ(result.exit_code, 2) << result.err;
   EXPECT_THAT(result.err, HasSubstr("small.safetensors"));
   EXPECT_FALSE(fs::exists(folder_ / "run" / "videos"));
+}
+
+TEST_F(ImaginedRun, WeightsThatWereTrainedForSomethingElseAreRefusedBeforeTheFirstEpisodeOfAnyWorld) {
+  ActionStatistics other = AgiBotWorldStatistics();
+  other.deviation[7] *= 2;
+  const std::string other_page = folder_ / "other.yaml";
+  WriteFileAtomically(other_page, StatisticsPage(other));
+  const struct {
+    TensorMetadata says;
+    std::vector<std::string> settings;
+    std::string refusal;
+  } cases[] = {
+      {{{"period_s", "0.2"}}, {}, "field period_s: frames 0.1 s apart are asked for"},
+      {{{"cameras", "hand_right,head"}}, {}, "task take_bottle: found cameras head, hand_right, wanted hand_right, head"},
+      {{{"statistics", StatisticsPage(AgiBotWorldStatistics())}}, {"worlds.1.statistics=" + other_page}, "deviation of right y"},
+      {{{"pose_map", "radius_px=50 thickness_px=8"}}, {}, "pose maps would be drawn with radius_px="},
+  };
+  for (const auto& [says, settings, refusal] : cases) {
+    nn::RandomWeights random(5);
+    nn::SaveWeights(weights_, random, ReadEvacConfig(kSmallNetwork), {.metadata = says});
+    const CommandResult result = RunCommand(RunWords(kImagined, folder_ / "run", Settings(settings)));
+    EXPECT_EQ(result.exit_code, 2) << result.err;
+    EXPECT_THAT(result.err, HasSubstr(refusal));
+    EXPECT_THAT(result.err, HasSubstr("small.safetensors"));
+    EXPECT_FALSE(fs::exists(folder_ / "run" / "videos"));
+    fs::remove_all(folder_ / "run");
+  }
 }
 
 TEST_F(ImaginedRun, IsAnotherOneWithOtherWeights) {

@@ -71,6 +71,17 @@ Eigen::Vector3d FirstPlaceOfTheBottleIn(const fs::path& part) {
   return Eigen::Vector3d::Constant(std::nan(""));
 }
 
+/// How many chunks and how many actions of them were executed in that world, in a part's one episode.
+std::pair<int, std::size_t> LengthIn(const fs::path& part, const std::string& world) {
+  const Store store = Store::Open(part, Store::Mode::kReadOnly);
+  for (Episode& episode : store.Episodes()) {
+    if (episode.key.world != world) continue;
+    store.LoadSteps(episode);
+    return {episode.chunks, episode.commands.size()};
+  }
+  return {0, 0};
+}
+
 /// Where the arms were measured to be before anything was done, in an episode of that world.
 Arms FirstArmsIn(const fs::path& out, const std::string& world) {
   const Store store = Store::Open(out / "closed", Store::Mode::kReadOnly);
@@ -103,7 +114,14 @@ TEST_F(FidelityRun, AsksEveryPartAndEndsInTheSameNumbersWhenItWasKilled) {
   ASSERT_FALSE(real.empty());
   EXPECT_NE(real[0].base_from_gripper.translation(), again_measured.at(0).base_from_gripper.translation()) << "other noise than the real world's";
   const nlohmann::json numbers = Numbers(whole);
-  EXPECT_GE(numbers["open_loop"]["psnr_by_chunk"].size(), 2u);
+  const auto [chunks, actions] = LengthIn(whole / "closed", "real");
+  ASSERT_GT(chunks, 2);
+  EXPECT_EQ(LengthIn(whole / "open", "evac"), std::pair(chunks, actions)) << "a clip is as long as the one it is held against";
+  EXPECT_EQ(numbers["open_loop"]["psnr_by_chunk"].size(), actions / 8) << "the network's chunks are of 8";
+  EXPECT_EQ(LengthIn(whole / "executed", "again").second, LengthIn(whole / "closed", "evac").second);
+  for (const char* world : {"real", "evac"}) {
+    EXPECT_EQ(LengthIn(whole / "counterfactual_never_closes", world), std::pair(chunks, actions)) << world;
+  }
   EXPECT_EQ(numbers["horizon"]["psnr_moving_by_chunk"].size(), 3u);
   EXPECT_TRUE(fs::exists(whole / "index.html"));
 
@@ -126,6 +144,13 @@ TEST_F(FidelityRun, AsksEveryPartAndEndsInTheSameNumbersWhenItWasKilled) {
     EXPECT_THAT(taken.err, HasSubstr(part + "episodes taken over"));
   EXPECT_EQ(Numbers(again), numbers);
   EXPECT_EQ(ReadFile(again / "episodes.csv"), ReadFile(whole / "episodes.csv"));
+
+  // Longer rollouts are other ones, and said to be before anything runs.
+  words = Words(whole);
+  words.back() = "4";
+  const CommandResult longer = RunCommand(words);
+  EXPECT_EQ(longer.exit_code, 2) << longer.err;
+  EXPECT_THAT(longer.err, HasSubstr("horizon: --horizon-chunks: found 3 (24 frames), wanted 4 (32 frames)"));
 }
 
 /// They began from the suite's state, not from what that state is on the task: actions of one scene were done in another.
@@ -153,9 +178,11 @@ TEST_F(FidelityRun, ReplaysInRealityStartFromTheSceneThatTheirActionsAreOf) {
 
 TEST_F(FidelityRun, AClassifierJudgesTheClipsAndSaysHowFarItIs) {
   std::vector<std::string> words = Words(folder_ / "out");
-  words.insert(words.end(), {"--parts", "closed", "--classifier", EVAC_SOURCE_DIR "/worldmodel/weights/desk/judge.safetensors"});
+  words.insert(words.end(), {"--parts", "closed", "--classifier", EVAC_SOURCE_DIR "/worldmodel/weights/desk/judge.safetensors",
+                             "--set", "judges=[]"});
   const CommandResult result = RunCommand(words);
   ASSERT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_THAT(result.err, HasSubstr("3 of 3 episodes judged by oracle")) << "whatever judges the suite asks for";
   EXPECT_THAT(result.err, HasSubstr("3 of 3 episodes judged by classifier:")) << "real, unfilmed (left out), imagined";
   EXPECT_THAT(result.err, testing::ContainsRegex("1 of 1 episodes judged by classifier:[0-9a-f]*:masked"));
   const nlohmann::json numbers = Numbers(folder_ / "out");
@@ -179,6 +206,15 @@ TEST_F(FidelityRun, TakesOverNoOtherReality) {
   const CommandResult result = RunCommand(words);
   EXPECT_EQ(result.exit_code, 2) << result.err;
   EXPECT_THAT(result.err, HasSubstr("is about another reality (000000000000…"));
+}
+
+TEST_F(FidelityRun, LooksAtTheClassifierBeforeItAsksReality) {
+  std::vector<std::string> words = Words(folder_ / "out");
+  words.insert(words.end(), {"--classifier", (folder_ / "none.safetensors").string()});
+  const CommandResult result = RunCommand(words);
+  EXPECT_EQ(result.exit_code, 2) << result.err;
+  EXPECT_THAT(result.err, HasSubstr("none.safetensors"));
+  EXPECT_FALSE(fs::exists(folder_ / "out" / "closed"));
 }
 
 TEST_F(FidelityRun, SaysWhichWorldTheSuiteLacks) {

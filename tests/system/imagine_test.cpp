@@ -17,7 +17,9 @@
 #include "tests/support/synthetic_recording.h"
 #include "tests/support/temp_folder.h"
 #include "tests/system/process_support.h"
+#include "worldmodel/action_statistics.h"
 #include "worldmodel/evac_config.h"
+#include "worldmodel/motion_statistics.h"
 #include "worldmodel/nn/library.h"
 #include "worldmodel/nn/weights.h"
 
@@ -214,6 +216,23 @@ TEST_F(ImagineCommand, TheSameSeedImaginesTheSameBytesAndAnotherSeedOthers) {
   EXPECT_NE(a.at("frames/frame_00000.png"), c.at("frames/frame_00000.png"));
   EXPECT_EQ(a.count("frames/frame_00006.png"), 1u);
   EXPECT_EQ(a.count("frames/frame_00007.png"), 0u) << "what fills the last chunk is no frame";
+}
+
+TEST_F(ImagineCommand, WeightsSayHowActionsAreNormalisedAndWhichPeriodTheyAreFor) {
+  ActionStatistics mine = AgiBotWorldStatistics();
+  mine.robot = "mine";
+  mine.deviation[0] *= 3;
+  nn::RandomWeights weights(5);
+  const TensorMetadata says = {{"statistics", StatisticsPage(mine)}, {"period_s", "0.0333333"}, {"cameras", "head"}};
+  nn::SaveWeights(folder_ / "tiny.safetensors", weights, ReadEvacConfig(folder_ / "tiny.yaml"), {.metadata = says});
+  const CommandResult result = RunCommand(Frames("out"));
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  const auto job = nlohmann::json::parse(ReadFile(folder_ / "out/imagined.json")).at("job");
+  EXPECT_EQ(job.at("statistics").at("deviation"), nlohmann::json(mine.deviation));
+
+  ExpectRefused(Frames("refused", {"--statistics", EVAC_SOURCE_DIR "/apps/configs/robots/agibotworld.yaml"}),
+                "deviation of left x");
+  ExpectRefused(Words("refused", {"--weights", folder_ / "tiny.safetensors", "--steps", "2", "--stride", "3"}), "frames 0.1 s apart are asked for");
 }
 
 TEST_F(ImagineCommand, TheVideoShowsEachPictureAboveItsMapAndTheSidecarSaysHowItWasMade) {

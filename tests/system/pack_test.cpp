@@ -8,6 +8,7 @@
 #include <set>
 
 #include "apps/collect_recipe.h"
+#include "core/collection.h"
 #include "core/file.h"
 #include "core/hash.h"
 #include "core/tensor_file.h"
@@ -22,6 +23,7 @@ namespace {
 namespace fs = std::filesystem;
 using testing::AllOf;
 using testing::HasSubstr;
+using testing::Not;
 
 /// Two-step chunks of small pictures, one view.
 constexpr const char* kTiny = R"(
@@ -43,14 +45,56 @@ class PackCommand : public testing::Test {
 
   /// A real-looking two-armed recording of 9 steps at 30 Hz: three at 10 Hz.
   SyntheticClip Good() const { return SyntheticClip(9); }
+  /// The same without a left arm.
+  SyntheticClip OneArmed() const {
+    SyntheticClip clip = Good();
+    for (std::size_t step = 0; step < 9; ++step) {
+      clip.grippers[2 * step] = 0;
+      for (std::size_t i = 0; i < 3; ++i) clip.positions_m[6 * step + i] = 0;
+      for (std::size_t i = 0; i < 4; ++i) clip.quaternions_xyzw[8 * step + i] = i == 3 ? 1 : 0;
+    }
+    return clip;
+  }
   void Add(const std::string& name, const SyntheticClip& clip) { clip.Write(OneFolder(folder_ / ("data/" + name))); }
 
-  std::vector<std::string> Words(const std::string& out, const std::vector<std::string>& more = {}) const {
-    std::vector<std::string> words = {
-        Binary("evac"),      "pack", folder_ / "data", "--out", folder_ / out, "--config", folder_ / "tiny.yaml",
-        "--clips-per-shard", "2",    "--holdout",      "0"};
+  /// Below collected/ an episode of a collection, of two arms that are one step behind what they are told.
+  void AddCollected(const std::string& episode) const {
+    const TreePlace place{folder_ / "collected", "carry", episode};
+    const auto arms_at = [](int step) {
+      ArmState left, right;
+      left.base_from_gripper = Eigen::Translation3d(0.4 + 0.01 * step, 0.2, 0.3);
+      right.base_from_gripper = Eigen::Translation3d(0.4 + 0.01 * step, -0.2, 0.3);
+      return Arms{left, right};
+    };
+    RecordedEpisode recorded;
+    recorded.cameras = {{"head", 48, 32, 40, 40, 24, 16, Mount::kBase, SyntheticClip::MountFromCamera()}};
+    for (int step = 0; step < 5; ++step) {
+      recorded.arms.push_back(arms_at(std::max(0, step - 1)));
+      recorded.told.push_back(arms_at(step));
+      recorded.pictures.push_back({cv::Mat(32, 48, CV_8UC3, cv::Scalar::all(40 + step))});
+    }
+    WriteRecording(place, recorded, {.scale = 1});
+    WriteTruth(TruthPath(place), {{"head"}, std::vector<float>(10, 1), std::vector<std::uint8_t>(5, 0)});
+    CollectedEpisode row;
+    row.task = place.task;
+    row.episode = row.initial_state = episode;
+    row.stop = "still";
+    row.frames = 5;
+    WriteText(RowPath(place), CollectedJson(row));
+  }
+
+  std::vector<std::string> Words(const std::string& out, const std::vector<std::string>& more = {},
+                                 const std::vector<std::string>& inputs = {"data"}) const {
+    std::vector<std::string> words = {Binary("evac"), "pack"};
+    for (const std::string& input : inputs) words.push_back(folder_ / input);
+    const std::vector<std::string> always = {"--out", folder_ / out, "--config", folder_ / "tiny.yaml", "--clips-per-shard",
+                                             "2", "--holdout", "0"};
+    words.insert(words.end(), always.begin(), always.end());
     words.insert(words.end(), more.begin(), more.end());
     return words;
+  }
+  TensorMetadata Said(const std::string& out) const {
+    return TensorFile::Open(folder_ / out / "shard_00000.safetensors").metadata();
   }
   std::string HashesOf(const std::string& out) const {
     std::string all;
@@ -105,6 +149,85 @@ TEST_F(PackCommand, RealRecordingsAreThinnedToTheClipsPeriodAndKnowNoOutcome) {
   EXPECT_EQ(static_cast<int>(static_cast<std::int8_t>(shard.Get("outcome").bytes[0])), -1);
   const int second = std::to_integer<int>(shard.Get("frames").bytes[32 * 48 * 3 + 700]);
   EXPECT_NEAR(second, SyntheticClip::FrameGrey(3), 3) << "every third frame";
+}
+
+TEST_F(PackCommand, ShardsSayWhetherTheirArmsAreToldOrMeasured) {
+  Add("a", Good());
+  AddCollected("000000");
+  ASSERT_EQ(RunCommand(Words("real")).exit_code, 0);
+  EXPECT_EQ(Said("real").at("arms_read"), "measured");
+  const CommandResult told = RunCommand(Words("told", {}, {"collected"}));
+  ASSERT_EQ(told.exit_code, 0) << told.err;
+  EXPECT_EQ(Said("told").at("arms_read"), "told");
+  ASSERT_EQ(RunCommand(Words("measured", {"--arms", "measured"}, {"collected"})).exit_code, 0);
+  EXPECT_EQ(Said("measured").at("arms_read"), "measured");
+  EXPECT_NE(Said("measured").at("recipe"), Said("told").at("recipe"));
+}
+
+TEST_F(PackCommand, IsNotGoneOnWithByArmsOfAnotherKind) {
+  for (const char* episode : {"000000", "000001", "000002"}) AddCollected(episode);
+  ASSERT_EQ(RunCommand(Words("out", {}, {"collected"})).exit_code, 0);
+  const std::string whole = HashesOf("out");
+  const fs::path second = folder_ / "out/shard_00001.safetensors";
+  fs::remove(second);  // as if it had been killed before this one
+  fs::remove(folder_ / "out/shards.json");
+  const CommandResult other = RunCommand(Words("out", {"--arms", "measured"}, {"collected"}));
+  EXPECT_EQ(other.exit_code, 2);
+  EXPECT_THAT(other.err, HasSubstr("holds shards of other recordings or options"));
+  EXPECT_FALSE(fs::exists(second));
+  ASSERT_EQ(RunCommand(Words("out", {"--arms", "told"}, {"collected"})).exit_code, 0) << "as it was by itself";
+  EXPECT_EQ(HashesOf("out"), whole);
+}
+
+TEST_F(PackCommand, ACollectionBesideOtherRecordingsIsAskedWhichArmsAreMeant) {
+  Add("a", Good());
+  AddCollected("000000");
+  const CommandResult open = RunCommand(Words("out", {}, {"collected", "data"}));
+  EXPECT_EQ(open.exit_code, 2);
+  EXPECT_THAT(open.err, AllOf(HasSubstr("collected/observations/carry/000000 is of a collection"), HasSubstr("data/a is not"),
+                              HasSubstr("wanted --arms told or --arms measured for all")));
+  EXPECT_FALSE(fs::exists(folder_ / "out/packing.json"));
+  ASSERT_EQ(RunCommand(Words("out", {"--arms", "measured"}, {"collected", "data"})).exit_code, 0);
+}
+
+TEST_F(PackCommand, WarnsOfMeasuredArmsOnAPageThatHasToldOnesFollowLate) {
+  Add("a", Good());
+  AddCollected("000000");
+  EXPECT_THAT(RunCommand(Words("as_published")).err, Not(HasSubstr("warning")));
+  WriteText(folder_ / "tiny.yaml", std::string(kTiny) + "pose_map: {lag_frames: 0.5}\n");
+  const CommandResult measured = RunCommand(Words("measured")), told = RunCommand(Words("told", {}, {"collected"}));
+  EXPECT_EQ(measured.exit_code, 0);
+  EXPECT_THAT(measured.err, HasSubstr("evac: warning: the arms packed are measured ones, and pose_map.lag_frames is 0.5"));
+  EXPECT_THAT(told.err, AllOf(HasSubstr("arms are 1.00 frames behind what they are told; pose_map.lag_frames is 0.5"),
+                              Not(HasSubstr("warning"))));
+}
+
+TEST_F(PackCommand, DrawsMapsAsThePageOfTheNetworkSays) {
+  Add("a", Good());
+  ASSERT_EQ(RunCommand(Words("published")).exit_code, 0);
+  WriteText(folder_ / "tiny.yaml", std::string(kTiny) + "pose_map: {scaled: true}\n");
+  ASSERT_EQ(RunCommand(Words("scaled")).exit_code, 0);
+  EXPECT_EQ(Said("published").at("pose_map"), "radius_px=50 thickness_px=8");
+  EXPECT_EQ(Said("scaled").at("pose_map"), "radius_px=5 thickness_px=1");
+  const auto maps = [&](const char* out) {
+    const TensorFile shard = TensorFile::Open(folder_ / out / "shard_00000.safetensors");
+    const auto bytes = shard.Get("maps").bytes;
+    return std::string(reinterpret_cast<const char*>(bytes.data()), bytes.size());
+  };
+  EXPECT_NE(maps("published"), maps("scaled"));
+}
+
+TEST_F(PackCommand, PacksTheRobotOfMostRecordingsAndSaysTheOthers) {
+  Add("a", OneArmed());
+  for (const char* name : {"b", "c"}) Add(name, Good());
+  const CommandResult result = RunCommand(Words("out"));
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_EQ(Said("out").at("arms"), "left,right");
+  EXPECT_THAT(result.err, HasSubstr("1 recordings left out: 1 other_robot"));
+  EXPECT_THAT(ReadFile(folder_ / "out/left_out.csv"), HasSubstr("a: 1 arms, wanted 2 as in 2 recordings"));
+  fs::remove_all(folder_ / "data/c");
+  ASSERT_EQ(RunCommand(Words("even")).exit_code, 0);
+  EXPECT_EQ(Said("even").at("arms"), "right") << "the first of two";
 }
 
 TEST_F(PackCommand, ShardsAreImaginedAgainIntoAFolderOfTheirOwn) {

@@ -40,6 +40,13 @@ TEST_F(Refusals, AMissingSuiteOrProgramOrRunIsInvalidInput) {
   EXPECT_THAT(program.err, HasSubstr("no-such-policy"));
 }
 
+TEST_F(Refusals, AnOptionThatIsNoNumberIsInvalidInput) {
+  const CommandResult result = RunCommand({Binary("evac"), "judge", "train", folder_.path().string(), "--height-px", "abc",
+                                           "--out", (folder_ / "judge").string()});
+  EXPECT_EQ(result.exit_code, 2);
+  EXPECT_THAT(result.err, AllOf(HasSubstr("--height-px"), HasSubstr("found abc, wanted a multiple of 8")));
+}
+
 TEST_F(Refusals, APolicyWithAnotherPeriodEndsTheRunBeforeItStartsWithBothDeclarations) {
   const CommandResult result = Run({"policies.0.command=[evac-policy, hold, --period-s, \"0.25\"]"});
   EXPECT_EQ(result.exit_code, 2);

@@ -1,6 +1,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "core/hash.h"
 #include "tests/nn/support.h"
 #include "tests/support/temp_folder.h"
 #include "tests/train/synthetic_shards.h"
@@ -82,12 +83,14 @@ TEST(EncodeShard, WritesTheLatentsOfEveryPictureAndMap) {
   const nn::VaeConfig config = SmallCodec(2);
   const nn::Vae vae(nn::Scope(random, kCodecPrefix), config);
   const auto paths = ShardPaths(folder.path());
-  const EncodeOptions options{"the codec's hash", "the shard's hash"};
+  const std::string sha256 = Sha256HexOfFile(paths[0]);
+  const EncodeOptions options{"the codec's hash", sha256};
   EXPECT_FALSE(IsEncoded(paths[0], options));
-  for (const auto& path : paths) EncodeShard(vae, path, options);
+  for (const auto& path : paths) EncodeShard(vae, path, {"the codec's hash", Sha256HexOfFile(path)});
   EXPECT_TRUE(IsEncoded(paths[0], options));
-  EXPECT_FALSE(IsEncoded(paths[0], {"another codec", "the shard's hash"}));
-  EXPECT_FALSE(IsEncoded(paths[0], {"the codec's hash", "the shard's hash", "bfloat16"}));
+  EXPECT_FALSE(IsEncoded(paths[0], {"another codec", sha256}));
+  EXPECT_FALSE(IsEncoded(paths[0], {"the codec's hash", "another shard's hash"}));
+  EXPECT_FALSE(IsEncoded(paths[0], {"the codec's hash", sha256, "bfloat16"}));
   ShardSet shards(folder.path(), Split::kHoldout);
   shards.OpenLatents(8, config.Stride());
   const Shard& shard = shards.shards().front();
@@ -121,6 +124,41 @@ TEST(ShardSet, SeveralPackingsAreOneSetAndOneThatIsNamedTwiceCountsTwice) {
   WriteSyntheticShards(other, {.statistics = "of another robot"});
   EXPECT_THAT([&] { ShardSet(ShardFolders{a, other}, Split::kTrain); },
               testing::ThrowsMessage<TensorError>(testing::HasSubstr("statistics differs")));
+}
+
+TEST(ShardSet, RefusesAFolderWhoseShardsAreNotAllThere) {
+  const TempFolder folder;
+  const auto refusal = [&](const std::string& words) {
+    EXPECT_THAT([&] { ShardSet(folder.path(), Split::kTrain); },
+                testing::ThrowsMessage<TensorError>(testing::HasSubstr(words)));
+  };
+  WriteSyntheticShards(folder.path(), {});
+  const std::filesystem::path first = folder / "shard_00000.safetensors", second = folder / "shard_00001.safetensors",
+                              third = folder / "shard_00002.safetensors";
+  std::filesystem::rename(second, third);
+  refusal("its packing has 2 shards, missing are shard_00001.safetensors: wanted all");
+  std::filesystem::copy(third, second);
+  refusal("shard_00002.safetensors is none of them");
+  std::filesystem::remove(third);
+  EXPECT_EQ(ShardPaths(folder.path()), (std::vector<std::filesystem::path>{first, second}));
+  std::filesystem::remove(first);
+  refusal("missing are shard_00000.safetensors");
+  std::filesystem::remove(second);
+  refusal("has shards.json and no shard");
+}
+
+TEST(ShardSet, TakesToldAndMeasuredArmsTogetherOnlyWhereOneDoesNotSayWhichTheyAre) {
+  const TempFolder folder;
+  const std::filesystem::path told = folder / "told", measured = folder / "measured", before = folder / "before";
+  WriteSyntheticShards(told, {.arms_read = "told"});
+  WriteSyntheticShards(measured, {.arms_read = "measured"});
+  WriteSyntheticShards(before, {});
+  for (const ShardFolders& folders : {ShardFolders{told, measured}, ShardFolders{before, measured, told}})
+    EXPECT_THAT([&] { ShardSet(folders, Split::kTrain); },
+                testing::ThrowsMessage<TensorError>(testing::HasSubstr("arms_read differs")));
+  EXPECT_EQ(ShardSet(ShardFolders{before, told}, Split::kTrain).metadata().at("arms_read"), "told");
+  EXPECT_EQ(ShardSet(ShardFolders{told, before, told}, Split::kTrain).metadata().at("arms_read"), "told");
+  EXPECT_FALSE(ShardSet(before, Split::kTrain).metadata().contains("arms_read"));
 }
 
 TEST(ShardSet, PackingsOfOtherTasksAreOneSetWithAllOfTheirs) {

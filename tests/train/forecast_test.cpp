@@ -139,6 +139,24 @@ TEST(TrainForecast, LearnsFromVariantsAsOftenAsIsAsked) {
   EXPECT_EQ(agreement("variants", 1), 0) << "told the same, all variants fail";
 }
 
+TEST(TrainForecast, DoesNotGoOnWithOtherVariants) {
+  const TempFolder folder;
+  WriteSyntheticShards(folder / "shards", {});
+  const std::string recipe = RecipeOf(folder / "shards");
+  int left = 0;
+  JobPlace place{{folder / "shards"}, folder / "out", ForecastConfig(1)};
+  place.interrupted = [&] { return left-- == 0; };
+  const auto go_on = [&](int steps, std::int8_t outcome) {
+    WriteVariants(folder / "shards", outcome, recipe);
+    left = steps;
+    return TrainForecast(place, Quick(6)).why;
+  };
+  EXPECT_EQ(go_on(2, 0), "interrupted");
+  EXPECT_THAT([&] { go_on(2, 1); }, ThrowsMessage<TensorError>(HasSubstr("is a training with other options")))
+      << "as many, that ended otherwise";
+  EXPECT_EQ(go_on(100, 0), "done");
+}
+
 TEST(Variants, OfOtherShardsOrOfClipsThatAreNotThereAreRefused) {
   const TempFolder folder;
   WriteSyntheticShards(folder / "shards", {});
@@ -182,7 +200,7 @@ TEST(TrainWorld, IsShownAForecastThatStaysAsItWasGiven) {
   WorldStart start{folder / "codec" / "codec.safetensors"};
   CheckpointWeights codec_weights(start.codec);
   const nn::Vae vae(nn::Scope(codec_weights, kCodecPrefix), config.vae);
-  for (const auto& shard : ShardPaths(folder / "shards")) EncodeShard(vae, shard, {"codec", "shard"});
+  EncodeSyntheticShards(vae, folder / "shards");
   TrainForecast({{folder / "shards"}, folder / "forecast", config}, Quick(20));
   start.forecast = folder / "forecast" / "forecast.safetensors";
   WorldOptions options;

@@ -4,6 +4,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "core/hash.h"
 #include "tests/nn/support.h"
 #include "tests/support/temp_folder.h"
 #include "tests/train/synthetic_shards.h"
@@ -29,7 +30,7 @@ nn::ModelConfig SmallConfig() {
 struct Scene {
   explicit Scene(std::int64_t left_over = 0) : model(random, config) {
     WriteSyntheticShards(folder / "shards", {.clips = 3, .frames = 1 + 2 * config.chunk + left_over, .views = 2});
-    for (const auto& shard : ShardPaths(folder / "shards")) EncodeShard(model.vae(), shard, {"codec", "shard"});
+    EncodeSyntheticShards(model.vae(), folder / "shards");
     shards.emplace(folder / "shards", Split::kTrain);
     shards->OpenLatents(config.vae.z_channels, config.vae.Stride());
   }
@@ -127,7 +128,8 @@ TEST(WriteImaginedLatents, StandWhereTrainingLooksForThem) {
   ShardSet imagined(to, Split::kTrain);
   imagined.OpenLatents(at.config.vae.z_channels, at.config.vae.Stride());
   EXPECT_EQ(imagined.codec(), "codec");
-  EXPECT_TRUE(IsEncoded(imagined.shards().front().path, {"codec", "shard", "imagined"}));
+  const std::filesystem::path shard = imagined.shards().front().path;
+  EXPECT_TRUE(IsEncoded(shard, {"codec", Sha256HexOfFile(shard), "imagined"}));
   const Clip& clip = imagined.clips().back();
   const Tensor found = imagined.shards().front().latents.narrow(0, clip.first, clip.frames).to(at::kFloat);
   EXPECT_TRUE(at::allclose(found, at.Imagined().back(), 1e-2, 1e-2)) << "halves";

@@ -7,7 +7,9 @@
 #include <cmath>
 #include <fstream>
 
+#include "core/hash.h"
 #include "worldmodel/train/dice.h"
+#include "worldmodel/train/encode_shards.h"
 
 namespace evac::train {
 namespace {
@@ -89,28 +91,38 @@ void Write(const std::filesystem::path& path, const Tensors& t, const TensorMeta
 
 void WriteSyntheticShards(const std::filesystem::path& folder, const SyntheticShards& options) {
   std::filesystem::create_directories(folder);
+  std::string list;
   for (const int index : {0, 1}) {
     Dice dice({options.seed, index, 0, 0}, 99);
     const Tensors tensors = Empty(options);
     Fill(options, tensors, dice);
-    Write(folder / ("shard_0000" + std::to_string(index) + ".safetensors"), tensors,
-          {{"format", "evac-shard"},
-           {"version", "1"},
-           {"split", index == 0 ? "train" : "holdout"},
-           {"period_s", "0.1"},
-           {"height_px", std::to_string(options.height_px)},
-           {"width_px", std::to_string(options.width_px)},
-           {"cameras", options.views == 1 ? "head" : "head,hand_right"},
-           {"arms", "right"},
-           {"tasks", options.tasks},
-           {"pose_map", "radius_px=2 thickness_px=1"},
-           {"delta_frames", "3"},
-           {"statistics", options.statistics},
-           {"recipe", std::to_string(options.seed)},
-           {"shard", std::to_string(index)},
-           {"shards", "2"}});
+    TensorMetadata metadata = {{"format", "evac-shard"},
+                               {"version", "1"},
+                               {"split", index == 0 ? "train" : "holdout"},
+                               {"period_s", "0.1"},
+                               {"height_px", std::to_string(options.height_px)},
+                               {"width_px", std::to_string(options.width_px)},
+                               {"cameras", options.views == 1 ? "head" : "head,hand_right"},
+                               {"arms", "right"},
+                               {"tasks", options.tasks},
+                               {"pose_map", "radius_px=50 thickness_px=8"},
+                               {"delta_frames", "3"},
+                               {"statistics", options.statistics},
+                               {"recipe", std::to_string(options.seed)},
+                               {"shard", std::to_string(index)},
+                               {"shards", "2"}};
+    if (*options.arms_read != '\0') metadata["arms_read"] = options.arms_read;
+    const std::string name = "shard_0000" + std::to_string(index) + ".safetensors";
+    Write(folder / name, tensors, metadata);
+    if (index > 0) list += ", ";
+    list += "{\"file\": \"" + name + "\", \"sha256\": \"" + Sha256HexOfFile(folder / name) + "\"}";
   }
-  std::ofstream(folder / "shards.json") << "{}\n";
+  std::ofstream(folder / "shards.json") << "{\"shards\": [" << list << "]}\n";
+}
+
+void EncodeSyntheticShards(const nn::Vae& vae, const std::filesystem::path& folder, const std::string& products) {
+  for (const std::filesystem::path& shard : ShardPaths(folder))
+    EncodeShard(vae, shard, {"codec", Sha256HexOfFile(shard), products});
 }
 
 }  // namespace evac::train

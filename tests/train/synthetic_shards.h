@@ -1,8 +1,9 @@
 #pragma once
 
 #include <filesystem>
+#include <string>
 
-#include "core/tensor_file.h"
+#include "worldmodel/nn/vae.h"
 
 namespace evac::train {
 
@@ -23,9 +24,14 @@ struct SyntheticShards {
   const char* statistics = "synthetic";
   const char* tasks = "follow";  ///< with commas between them
   int task = 0;                  ///< of these, that of all clips
+  const char* arms_read = "";    ///< told or measured; empty: they do not say it, as those of earlier versions
 };
 
 /// Writes shard_00000 (train), shard_00001 (hold-out) and shards.json, as docs/formats/shards.md says.
 void WriteSyntheticShards(const std::filesystem::path& folder, const SyntheticShards& options);
+
+/// The latents of every shard of a folder, as `evac encode` makes them, of a codec named "codec".
+void EncodeSyntheticShards(const nn::Vae& vae, const std::filesystem::path& folder,
+                           const std::string& products = "float32");
 
 }  // namespace evac::train

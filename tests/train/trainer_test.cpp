@@ -302,5 +302,84 @@ TEST(Trainer, CountsTheStepsThatFitIntoTheMinutesOnceAndKeepsThem) {
   EXPECT_TRUE(at::equal(first.All(), again.All()));
 }
 
+TEST(Trainer, OtherMinutesThanItIsPlannedForAreRefusedAndMoreStepsGoOn) {
+  const TempFolder folder, by_steps;
+  TrainerOptions options = Quick(100000);
+  options.minutes = 0.01;
+  const auto train = [](const TrainerOptions& given, const TempFolder& at) {
+    Regression regression;
+    return Trainer(regression.Parameters(), given, at.path()).Run({.loss = [&](const StepPlace& place) {
+      return regression.Loss(place);
+    }});
+  };
+  const TrainerSummary first = train(options, folder);
+  EXPECT_EQ(first.steps_now, first.steps);
+  EXPECT_EQ(train(options, folder).steps_now, 0);
+  const std::string steps = std::to_string(first.steps), planned = "is planned for " + steps + " steps and has done " + steps;
+  options.minutes = 0.02;
+  EXPECT_THAT([&] { train(options, folder); }, testing::ThrowsMessage<TensorError>(testing::HasSubstr(planned)));
+  options.minutes = 0;
+  options.steps = first.steps + 3;
+  EXPECT_EQ(train(options, folder).steps_now, 3);
+
+  train(Quick(5), by_steps);
+  options.minutes = 0.01;
+  EXPECT_THAT([&] { train(options, by_steps); },
+              testing::ThrowsMessage<TensorError>(testing::HasSubstr("is planned for 5 steps and has done 5")));
+}
+
+TEST(Trainer, AStepThatIsToBeKeptIsNotBehindTheLast) {
+  const auto kept = [](const TrainerOptions& options, const std::vector<std::int64_t>& steps) {
+    const TempFolder folder;
+    Regression regression;
+    std::vector<std::int64_t> found;
+    Trainer(regression.Parameters(), options, folder.path())
+        .Run({.loss = [&](const StepPlace& place) { return regression.Loss(place); },
+              .keep_steps = steps,
+              .keep = [&](std::int64_t step) { found.push_back(step); }});
+    return found;
+  };
+  EXPECT_THAT(kept(Quick(10), {4, 10}), testing::ElementsAre(4, 10));
+  EXPECT_THAT([&] { kept(Quick(10), {4, 11}); },
+              testing::ThrowsMessage<TensorError>(testing::HasSubstr("step 11 is to be kept, wanted 1 to 10")));
+  EXPECT_THROW(kept(Quick(10), {0}), TensorError);
+  TrainerOptions by_minutes = Quick(10);
+  by_minutes.minutes = 0.01;
+  EXPECT_THROW(kept(by_minutes, {1'000'000'000}), TensorError) << "as soon as it is planned";
+}
+
+TEST(Trainer, TheSmoothedLossOutlivesStepsWhoseLossIsNotFinite) {
+  const TempFolder folder;
+  Regression regression;
+  std::vector<double> said;
+  Trainer(regression.Parameters(), Quick(6), folder.path())
+      .Run({.loss =
+                [&](const StepPlace& place) {
+                  const Tensor loss = regression.Loss(place);
+                  return place.step == 0 || place.step == 3 ? loss / 0.0 : loss;
+                },
+            .on_progress = [&](const TrainerProgress& progress) { said.push_back(progress.loss); }});
+  ASSERT_EQ(said.size(), 6U);
+  EXPECT_FALSE(std::isfinite(said[0])) << "there is no other yet";
+  for (std::size_t i = 1; i < said.size(); ++i) EXPECT_TRUE(std::isfinite(said[i])) << i;
+  EXPECT_EQ(said[3], said[2]);
+  EXPECT_NE(said[4], said[3]);
+}
+
+TEST(Trainer, AFiniteHoldoutIsBetterThanOneThatIsNone) {
+  const TempFolder folder;
+  Regression regression;
+  TrainerOptions options = Quick(4);
+  options.holdout_every = 1;
+  std::vector<double> scores = {std::nan(""), 5, std::nan(""), 7};
+  std::size_t asked = 0;
+  const TrainerSummary summary =
+      Trainer(regression.Parameters(), options, folder.path())
+          .Run({.loss = [&](const StepPlace& place) { return regression.Loss(place); },
+                .holdout = [&] { return scores.at(asked++); }});
+  EXPECT_EQ(summary.best, 5);
+  EXPECT_EQ(summary.best_step, 2);
+}
+
 }  // namespace
 }  // namespace evac::train

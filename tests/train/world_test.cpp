@@ -9,6 +9,7 @@
 
 #include "tests/nn/support.h"
 #include "tests/support/temp_folder.h"
+#include "tests/train/prepared_world.h"
 #include "tests/train/synthetic_shards.h"
 #include "worldmodel/frame_memory.h"
 #include "worldmodel/nn/dpm_solver.h"
@@ -22,37 +23,6 @@
 
 namespace evac::train {
 namespace {
-
-nn::ModelConfig SmallConfig(std::int64_t views) {
-  nn::ModelConfig config = nn::TinyConfig();
-  config.vae.channel_mult = {1, 1, 1};
-  config.vae.patch_px = 1;
-  config.unet.channel_mult = {1, 1};
-  config.vae.scale_factor = 1;
-  config.views = views;
-  return config;
-}
-
-/// Shards, a codec and its latents: where the training of a world model begins.
-struct Prepared {
-  explicit Prepared(std::int64_t views, std::int64_t frames = 9)
-      : Prepared(SyntheticShards{.frames = frames, .views = views}) {}
-  explicit Prepared(const SyntheticShards& shards) : config(SmallConfig(shards.views)) {
-    WriteSyntheticShards(folder / "shards", shards);
-    CodecOptions options;
-    options.job.trainer.steps = 2;
-    options.job.trainer.learning_rate = 1e-3;
-    options.codec.batch = 4;
-    TrainCodec({{folder / "shards"}, folder / "codec", config}, options);
-    CheckpointWeights weights(codec());
-    const nn::Vae vae(nn::Scope(weights, kCodecPrefix), config.vae);
-    for (const auto& shard : ShardPaths(folder / "shards")) EncodeShard(vae, shard, {"codec", "shard"});
-  }
-  std::filesystem::path codec() const { return folder / "codec" / "codec.safetensors"; }
-
-  TempFolder folder;
-  nn::ModelConfig config;
-};
 
 TEST(TrainCodec, GoesOnFromACodecThatIsGiven) {
   Prepared at(1);
@@ -73,18 +43,6 @@ TEST(TrainCodec, GoesOnFromACodecThatIsGiven) {
   at.config.vae.channels *= 2;
   EXPECT_THAT([&] { psnr("other", 1, 1e-9, first); },
               testing::ThrowsMessage<TensorError>(testing::HasSubstr("first_stage_model")));
-}
-
-WorldOptions Quick(std::int64_t steps) {
-  WorldOptions options;
-  options.job.trainer.steps = steps;
-  options.job.trainer.learning_rate = 3e-3;
-  options.job.trainer.clip_norm = 1;
-  options.job.holdout_size = 6;
-  options.world.batch = 4;
-  options.world.windows.history = 6;
-  options.world.drop = 0;
-  return options;
 }
 
 /// The loss on the training's own windows, before and after some steps.

@@ -35,7 +35,7 @@ Arms ArmAt(int step) {
 ClipSource Source(const Eigen::Vector2d& dot_px) {
   ClipSource source;
   source.cameras = {Head()};
-  source.truth.views = 1;
+  source.truth.cameras = {"head"};
   for (int step = 0; step < kSteps; ++step) {
     source.arms.push_back(ArmAt(step));
     cv::Mat picture(kHeight_px, kWidth_px, CV_8UC3, cv::Scalar::all(0));

@@ -9,9 +9,11 @@
 
 #include "core/error.h"
 #include "worldmodel/action_delta.h"
+#include "worldmodel/evac_config.h"
 #include "worldmodel/frame_memory.h"
 #include "worldmodel/pose_map.h"
 #include "worldmodel/ray_map.h"
+#include "worldmodel/shard_writer.h"
 
 namespace evac {
 namespace {
@@ -129,6 +131,25 @@ TEST(PoseMap, SizesGrowWithThePictureOnlyWhenAsked) {
   EXPECT_EQ(PoseMapOptions::ForHeight(320).radius_px, 50);
   EXPECT_EQ(PoseMapOptions::ForHeight(64).radius_px, 10);
   EXPECT_EQ(PoseMapOptions::ForHeight(64).thickness_px, 2);
+}
+
+/// Shards have the one, a training and a world the other.
+TEST(PoseMap, AreSaidAlikeByThePageAndByWhatIsDrawn) {
+  const auto words = [](const nn::ModelConfig& config) {
+    EXPECT_EQ(PoseMapWords(PoseMapOptions::Of(config)), config.pose_map.Words(config.image_height_px));
+    return config.pose_map.Words(config.image_height_px);
+  };
+  nn::ModelConfig config;
+  EXPECT_EQ(words(config), "radius_px=50 thickness_px=8");
+  config.pose_map.scaled = true;
+  EXPECT_EQ(words(config), "radius_px=50 thickness_px=8") << "of the published height";
+  config.image_height_px = 96;
+  EXPECT_EQ(words(config), "radius_px=15 thickness_px=2");
+  config.pose_map.scaled = false;
+  config.pose_map.tool_length_m = 0.1;
+  EXPECT_EQ(words(config), "radius_px=50 thickness_px=8 tool_length_m=0.1");
+  EXPECT_EQ(words(ReadEvacConfig(EVAC_SOURCE_DIR "/apps/configs/desk_model.yaml")),
+            "radius_px=10 thickness_px=2 drop_line_m=0 tool_length_m=0 lag_frames=0.5");
 }
 
 TEST(RayMap, EachRayIsTheOneThatAnIndependentProjectionSendsBack) {

@@ -7,6 +7,7 @@ namespace evac::nn {
 namespace {
 
 const std::set<std::string> kOfEach = {"recipe", "seed", "steps"};
+constexpr const char* kWhatFor[] = {"period_s", "cameras", "arms", "arms_read", "pose_map", "statistics"};
 
 /// What all files say under a name; nothing where they differ or one says nothing.
 std::optional<std::string> InCommon(const std::vector<std::unique_ptr<FileWeights>>& files, const std::string& name) {
@@ -21,6 +22,22 @@ std::optional<std::string> InCommon(const std::vector<std::unique_ptr<FileWeight
   return wanted->second;
 }
 
+/// What those say that say it; empty: none does. @throws TensorError if two say different things
+std::string WhatAllSay(const std::vector<std::unique_ptr<FileWeights>>& files, const std::string& name) {
+  const TensorFile* first = nullptr;
+  for (const auto& each : files) {
+    const TensorFile& file = each->file();
+    const auto found = file.metadata().find(name);
+    if (found == file.metadata().end()) continue;
+    if (first == nullptr) first = &file;
+    const std::string& wanted = first->metadata().at(name);
+    if (found->second != wanted)
+      throw TensorError("the mean of weights: " + name + " is '" + wanted + "' in " + first->name() + " and '" +
+                        found->second + "' in " + file.name() + ": they were trained for different things");
+  }
+  return first == nullptr ? "" : first->metadata().at(name);
+}
+
 }  // namespace
 
 MeanWeights::MeanWeights(const std::vector<std::filesystem::path>& paths, const ModelConfig& config) {
@@ -31,6 +48,7 @@ MeanWeights::MeanWeights(const std::vector<std::filesystem::path>& paths, const 
   for (const auto& each : files_) any_codec = any_codec || each->file().metadata().contains("codec");
   if (any_codec && !InCommon(files_, "codec"))
     throw TensorError("the mean of weights: their cards name different codecs, or only some name one: latents would mean different things");
+  for (const char* key : kWhatFor) WhatAllSay(files_, key);
 }
 
 Tensor MeanWeights::Take(const std::string& key, at::IntArrayRef shape) {
@@ -57,6 +75,9 @@ TensorMetadata MeanWeights::Metadata() const {
       }
       metadata.emplace(name, all);
     }
+  }
+  for (const char* key : kWhatFor) {
+    if (const std::string said = WhatAllSay(files_, key); !said.empty()) metadata[key] = said;
   }
   metadata.erase("holdout");  // of one of them, even where two are equal
   return metadata;

@@ -1,5 +1,6 @@
 #include "worldmodel/nn/model_config.h"
 
+#include <algorithm>
 #include <cmath>
 #include <cstdio>
 #include <utility>
@@ -77,6 +78,21 @@ std::string PoseMapConfig::Differences() const {
   return (drop_line_m ? Field("drop_line_m", *drop_line_m) : "") +
          (std::fabs(tool_length_m - published.tool_length_m) > 1e-6 ? Field("tool_length_m", tool_length_m) : "") +
          (lag_frames > 0 ? Field("lag_frames", lag_frames) : "");
+}
+
+PoseMapSizes PoseMapConfig::Sizes(std::int64_t height_px) const {
+  const PoseMapSizes published;
+  if (!scaled) return published;
+  const auto in_parts = [&](int size_px) {
+    return std::max(1, static_cast<int>(std::lround(size_px * static_cast<double>(height_px) / 320)));
+  };
+  return {in_parts(published.radius_px), in_parts(published.thickness_px)};
+}
+
+std::string PoseMapConfig::Words(std::int64_t height_px) const {
+  const PoseMapSizes sizes = Sizes(height_px);
+  return "radius_px=" + std::to_string(sizes.radius_px) + " thickness_px=" + std::to_string(sizes.thickness_px) +
+         Differences();
 }
 
 void ModelConfig::Check() const {

@@ -103,6 +103,12 @@ struct ScheduleConfig {
 };
 
 /// How pose maps are drawn (spec 2).
+/// What a pose map draws with, pixels.
+struct PoseMapSizes {
+  int radius_px = 50;    ///< of the disc that shows the closure
+  int thickness_px = 8;  ///< of the axes
+};
+
 struct PoseMapConfig {
   bool scaled =
       false;  ///< radius and thickness in parts of the picture's height: 50 and 8 of 320. Published: in pixels
@@ -119,6 +125,10 @@ struct PoseMapConfig {
 
   /// What is not as published, for files that were drawn so: " drop_line_m=0 tool_length_m=0", or nothing.
   std::string Differences() const;
+  /// In a picture of this height: the published ones, or those in parts of it.
+  PoseMapSizes Sizes(std::int64_t height_px) const;
+  /// How maps of this height are drawn, for files that hold some: "radius_px=10 thickness_px=2", then the differences.
+  std::string Words(std::int64_t height_px) const;
 };
 
 struct ModelConfig {

@@ -2,14 +2,37 @@
 
 #include <cstdlib>
 #include <fstream>
+#include <iterator>
+#include <sstream>
+#include <system_error>
 
 #include "core/tensor_file.h"
 
 namespace evac::train {
+namespace {
+
+std::string TextOf(const std::filesystem::path& path) {
+  std::ifstream file(path, std::ios::binary);
+  return {std::istreambuf_iterator<char>(file), {}};
+}
+
+/// The table is there at every moment, as it was or as it is now.
+void Replace(const std::filesystem::path& path, const std::string& text) {
+  const std::filesystem::path part = path.string() + ".part";
+  std::ofstream written(part, std::ios::binary | std::ios::trunc);
+  if (!(written << text).flush()) throw TensorError(part.string() + ": cannot be written");
+  written.close();
+  std::error_code error;
+  std::filesystem::rename(part, path, error);
+  if (error) throw TensorError(path.string() + ": cannot be written: " + error.message());
+}
+
+}  // namespace
 
 void CsvLog::Trim(const std::filesystem::path& path, const std::string& header, std::int64_t from) {
+  const std::string before = TextOf(path);
   std::string kept = header + "\n";
-  std::ifstream rows(path);
+  std::istringstream rows(before);
   std::string row;
   std::getline(rows, row);  // the header
   while (std::getline(rows, row)) {
@@ -17,9 +40,7 @@ void CsvLog::Trim(const std::filesystem::path& path, const std::string& header, 
     const std::int64_t step = std::strtoll(row.c_str(), &end, 10);
     if (end != row.c_str() && *end == ',' && step < from) kept += row + "\n";
   }
-  rows.close();
-  std::ofstream written(path, std::ios::trunc);
-  if (!(written << kept).flush()) throw TensorError(path.string() + ": cannot be written");
+  if (kept != before) Replace(path, kept);
 }
 
 void CsvLog::Add(const std::filesystem::path& path, const std::string& row) {

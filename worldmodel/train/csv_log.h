@@ -10,6 +10,7 @@ namespace evac::train {
 /// training goes on: they are done again.
 class CsvLog {
  public:
+  /// The file is written only where it changes, and replaced at once.
   /// @param from  rows of this step and later are dropped
   static void Trim(const std::filesystem::path& path, const std::string& header, std::int64_t from);
   /// Adds a row. @throws TensorError with the system's reason.

@@ -9,9 +9,10 @@
 namespace evac::train {
 namespace {
 
+void Add(Settings& settings, const Settings& more) { settings.insert(settings.end(), more.begin(), more.end()); }
+
 void AddJob(Settings& settings, JobOptions& job) {
-  const Settings shared = SettingsOf(job.trainer);
-  settings.insert(settings.end(), shared.begin(), shared.end());
+  Add(settings, SettingsOf(job.trainer));
   settings.push_back({"bf16", &job.bf16});
   settings.push_back({"holdout_size", &job.holdout_size});
 }
@@ -102,7 +103,7 @@ Settings SettingsOf(ForecastOptions& options) {
                        {"picture_noise", &f.picture_noise},
                        {"success_weight", &f.success_weight},
                        {"finder_weight", &f.finder_weight}};
-  AddJob(settings, options.job);
+  Add(settings, SettingsOf(options.job.trainer));
   return settings;
 }
 

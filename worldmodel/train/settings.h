@@ -33,7 +33,7 @@ struct CodecOptions {
 };
 
 struct ForecastOptions {
-  JobOptions job;
+  JobOptions job;  ///< of it the trainer's alone: floats, and all of the hold-out is measured
   ForecastTrainingOptions forecast;
 };
 

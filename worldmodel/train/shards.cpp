@@ -1,12 +1,20 @@
 #include "worldmodel/train/shards.h"
 
 #include <algorithm>
+#include <charconv>
+#include <cstdio>
+#include <fstream>
+#include <iterator>
+#include <map>
+#include <set>
 #include <sstream>
+#include <string_view>
 
 namespace evac::train {
 namespace {
 
-constexpr const char* kCommon[] = {"period_s", "cameras", "arms", "pose_map", "delta_frames", "statistics"};
+constexpr const char* kArmsRead = "arms_read";  // shards of earlier versions do not say it
+constexpr const char* kCommon[] = {"period_s", "cameras", "arms", kArmsRead, "pose_map", "delta_frames", "statistics"};
 
 std::string Text(const TensorFile& file, const std::string& key) {
   const auto found = file.metadata().find(key);
@@ -63,6 +71,73 @@ std::filesystem::path Beside(const std::filesystem::path& shard, const std::stri
   return shard.parent_path() / name;
 }
 
+std::string ShardName(std::int64_t number) {
+  char name[48];
+  std::snprintf(name, sizeof name, "shard_%05lld.safetensors", static_cast<long long>(number));
+  return name;
+}
+
+/// How many shards the packing of one has.
+std::int64_t ShardCount(const std::filesystem::path& shard) {
+  const TensorFile file = TensorFile::Open(shard);
+  const std::string text = Text(file, "shards");
+  std::int64_t count = 0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), count);
+  if (error != std::errc() || end != text.data() + text.size() || count < 1)
+    throw TensorError(file.name() + ": shards is '" + text + "', wanted how many its packing has");
+  return count;
+}
+
+/// @param found  names of shards; the packing has numbers 0 … count - 1
+void RequireAllShards(const std::filesystem::path& folder, const std::set<std::string>& found, std::int64_t count) {
+  constexpr int kMostNamed = 10;
+  std::string missing;
+  std::set<std::string> others = found;
+  for (std::int64_t number = 0, named = 0; number < count && named <= kMostNamed; ++number) {
+    if (others.erase(ShardName(number)) > 0) continue;
+    missing += (named == 0 ? "" : ", ") + (named < kMostNamed ? ShardName(number) : "…");
+    ++named;
+  }
+  const std::string of = folder.string() + ": its packing has " + std::to_string(count) + " shards";
+  if (!missing.empty())
+    throw TensorError(of + ", missing are " + missing +
+                      ": wanted all, `evac pack` with the same options makes them again");
+  if (!others.empty())
+    throw TensorError(of + ", " + *others.begin() + " is none of them: wanted a folder for each packing");
+}
+
+std::string ReadText(const std::filesystem::path& path) {
+  std::ifstream file(path, std::ios::binary);
+  return {std::istreambuf_iterator<char>(file), {}};
+}
+
+/// The SHA-256 that shards.json has of one of its shards, found by the words around it: nothing here reads JSON.
+/// @returns nothing if it does not say it
+std::string Sha256Said(const std::string& page, const std::string& shard) {
+  const std::size_t entry = page.rfind('"' + shard + '"');  // recordings come before the shards
+  if (entry == std::string::npos) return "";
+  constexpr std::string_view kKey = "\"sha256\"";
+  const std::size_t end = page.find('}', entry), key = page.find(kKey, entry);
+  if (key >= end) return "";
+  const std::size_t from = page.find('"', key + kKey.size()), to = page.find('"', from + 1);
+  return to < end ? page.substr(from + 1, to - from - 1) : "";
+}
+
+/// Latents are of the very file that their shard is.
+/// @param page  the text of the shard's shards.json
+void RequireSameShard(const TensorFile& latents, const std::filesystem::path& shard, const std::string& page) {
+  const std::string found = Text(latents, "shard_sha256"), wanted = Sha256Said(page, shard.filename().string());
+  if (found == wanted && !wanted.empty()) return;
+  throw TensorError(latents.name() + " was made of another packing than " + shard.string() + ": shard_sha256 is '" +
+                    found + "', shards.json says '" + wanted + "': wanted `evac encode` again");
+}
+
+/// FNV-1a, from what was hashed before.
+std::uint64_t Hashed(std::uint64_t hash, std::span<const std::byte> bytes) {
+  for (const std::byte byte : bytes) hash = (hash ^ std::to_integer<std::uint64_t>(byte)) * 0x100000001b3;
+  return hash;
+}
+
 /// @param tasks  of this shard's numbers, what they are in the set
 std::vector<Clip> ClipsOf(const Shard& shard, std::size_t index, const std::vector<std::int32_t>& tasks) {
   std::vector<Clip> clips;
@@ -97,12 +172,16 @@ bool HasSplit(const std::filesystem::path& folder, Split split) {
 std::vector<std::filesystem::path> ShardPaths(const std::filesystem::path& folder) {
   if (!std::filesystem::exists(folder / "shards.json"))
     throw TensorError(folder.string() + " has no shards.json: wanted a folder that `evac pack` has finished");
-  std::vector<std::filesystem::path> paths;
+  std::set<std::string> found;
   for (const auto& entry : std::filesystem::directory_iterator(folder)) {
     const std::string name = entry.path().filename().string();
-    if (name.starts_with("shard_") && name.ends_with(".safetensors")) paths.push_back(entry.path());
+    if (name.starts_with("shard_") && name.ends_with(".safetensors")) found.insert(name);
   }
-  std::sort(paths.begin(), paths.end());
+  if (found.empty()) throw TensorError(folder.string() + " has shards.json and no shard: wanted those that it lists");
+  const std::int64_t count = ShardCount(folder / *found.begin());
+  RequireAllShards(folder, found, count);
+  std::vector<std::filesystem::path> paths;
+  for (std::int64_t number = 0; number < count; ++number) paths.push_back(folder / ShardName(number));
   return paths;
 }
 
@@ -115,7 +194,6 @@ ShardSet::ShardSet(const ShardFolders& folders, Split split) {
   for (const std::filesystem::path& folder : folders) {
     const std::vector<std::filesystem::path> paths = ShardPaths(folder);
     append(names, ", ", folder.string());
-    if (paths.empty()) continue;
     const TensorFile first = TensorFile::Open(paths.front());
     append(recipes, ",", Text(first, "recipe"));
     for (const std::string& task : TasksOf(first)) {  // whether this split has clips of it or not
@@ -139,6 +217,8 @@ void ShardSet::Add(const std::filesystem::path& path, Split split) {
   if (!shards_.empty()) nn::CheckShape(path.string() + ": frames", shard.frames, {-1, views(), height_px(), width_px(), 3});
   if (shards_.empty()) metadata_ = file.file().metadata();
   CheckSame(path.string(), file.file().metadata());
+  const auto arms_read = file.file().metadata().find(kArmsRead);
+  if (arms_read != file.file().metadata().end()) metadata_.insert(*arms_read);
   std::vector<std::int32_t> tasks;
   for (const std::string& task : TasksOf(file.file())) {
     const auto found = std::find(tasks_.begin(), tasks_.end(), task);
@@ -151,19 +231,24 @@ void ShardSet::Add(const std::filesystem::path& path, Split split) {
 }
 
 void ShardSet::CheckSame(const std::string& name, const TensorMetadata& metadata) const {
-  for (const char* key : kCommon) {
+  for (const std::string key : kCommon) {
     const auto found = metadata.find(key);
     const TensorMetadata::const_iterator wanted = metadata_.find(key);
+    if (key == kArmsRead && (found == metadata.end() || wanted == metadata_.end())) continue;
     const bool same = (found == metadata.end()) == (wanted == metadata_.end()) &&
                       (found == metadata.end() || found->second == wanted->second);
     if (same) continue;
     std::string what = name + ": " + key + " differs from that of " + shards_.front().path.string();
-    if (std::string_view(key) == "statistics") what += ": wanted `evac pack --statistics` with the former's";
+    if (key == "statistics") what += ": wanted `evac pack --statistics` with the former's";
+    if (key == kArmsRead)
+      what += " ('" + found->second + "', '" + wanted->second + "'): wanted `evac pack --arms` alike";
     throw TensorError(what);
   }
 }
 
 void ShardSet::OpenLatents(std::int64_t z, std::int64_t stride) {
+  std::map<std::filesystem::path, std::string> pages;  // of each folder
+  products_.clear();
   for (Shard& shard : shards_) {
     const std::filesystem::path path = LatentsPath(shard.path);
     if (!std::filesystem::exists(path))
@@ -176,11 +261,17 @@ void ShardSet::OpenLatents(std::int64_t z, std::int64_t stride) {
     shard.map_latents = Checked(file, "map_latents", at::kHalf, shape);
     if (codec_.empty()) codec_ = Text(file.file(), "codec");
     RequireText(file.file(), "codec", codec_);
+    const std::filesystem::path folder = shard.path.parent_path();
+    if (!pages.contains(folder)) pages[folder] = ReadText(folder / "shards.json");
+    RequireSameShard(file.file(), shard.path, pages[folder]);
+    products_.push_back(Text(file.file(), "products"));
   }
+  if (std::set<std::string>(products_.begin(), products_.end()).size() == 1) products_.resize(1);
 }
 
 void ShardSet::OpenVariants() {
   variants_.clear();
+  variants_hash_ = 0;
   for (std::size_t index = 0; index < shards_.size(); ++index) {
     Shard& shard = shards_[index];
     const std::filesystem::path path = VariantsPath(shard.path);
@@ -189,6 +280,7 @@ void ShardSet::OpenVariants() {
     RequireText(file.file(), "format", "evac-variants");
     RequireText(file.file(), "version", "1");
     RequireText(file.file(), "recipe", Text(TensorFile::Open(shard.path), "recipe"));
+    variants_hash_ = Hashed(variants_hash_ == 0 ? 0xcbf29ce484222325 : variants_hash_, file.file().bytes());
     const Tensor clip = Checked(file, "clip", at::kLong, {-1});
     const std::int64_t count = clip.size(0), clips = shard.clip_start.size(0) - 1;
     const Tensor start = Checked(file, "start", at::kLong, {count + 1}), outcome = Checked(file, "outcome", at::kChar, {count});

@@ -51,14 +51,16 @@ using ShardFolders = std::vector<std::filesystem::path>;
 
 class ShardSet {
  public:
-  /// @throws TensorError naming the file and what was found and wanted: packing not done, no shard of this split, a
-  ///   tensor that is missing or misshapen, another version, shards of different pictures, periods, cameras or statistics
+  /// @throws TensorError naming the file and what was found and wanted: packing not done, shards that are missing, none of
+  ///   this split, a tensor that is missing or misshapen, another version, shards of different pictures, periods, cameras,
+  ///   statistics or kinds of arms
   ShardSet(const ShardFolders& folders, Split split);
   ShardSet(const std::filesystem::path& folder, Split split) : ShardSet(ShardFolders{folder}, split) {}
 
   /// @param z  latent channels
   /// @param stride  of the codec, pixels
-  /// @throws TensorError if a shard has no latents yet, they are of another size, or of different codecs
+  /// @throws TensorError if a shard has no latents yet, they are of another size, of different codecs, or were made of
+  ///   another file than shards.json says the shard is
   void OpenLatents(std::int64_t z, std::int64_t stride);
 
   /// Reads the variants of those shards that have some.
@@ -68,8 +70,8 @@ class ShardSet {
   const std::vector<Variant>& variants() const { return variants_; }
   const std::vector<Shard>& shards() const { return shards_; }
   const std::vector<Clip>& clips() const { return clips_; }
-  /// Of all its shards: period_s, cameras, arms, pose_map, delta_frames, statistics; and those of the folders with
-  /// commas between them: recipe, tasks.
+  /// Of all its shards: period_s, cameras, arms, arms_read (where one says it), pose_map, delta_frames, statistics; and
+  /// those of the folders with commas between them: recipe, tasks.
   const TensorMetadata& metadata() const { return metadata_; }
   std::int64_t views() const { return shards_.front().frames.size(1); }
   std::int64_t height_px() const { return shards_.front().frames.size(2); }
@@ -77,6 +79,10 @@ class ShardSet {
   std::int64_t frame_count() const;
   /// SHA-256 of the codec whose latents are open.
   const std::string& codec() const { return codec_; }
+  /// What the open latents were computed with, of each shard; once where that is the same of all.
+  const std::vector<std::string>& products() const { return products_; }
+  /// Of all bytes of the open variants' files: other variants have another. 0: there are none.
+  std::uint64_t variants_hash() const { return variants_hash_; }
 
  private:
   void Add(const std::filesystem::path& path, Split split);
@@ -88,15 +94,18 @@ class ShardSet {
   std::vector<std::string> tasks_;
   TensorMetadata metadata_;
   std::string codec_;
+  std::vector<std::string> products_;
+  std::uint64_t variants_hash_ = 0;
 };
 
 /// The file of the latents that belong to a shard.
 std::filesystem::path LatentsPath(const std::filesystem::path& shard);
 /// The file of its variants.
 std::filesystem::path VariantsPath(const std::filesystem::path& shard);
-/// Whether a packing has shards of a split. @throws TensorError if it is not done.
+/// Whether a packing has shards of a split. @throws TensorError as ShardPaths
 bool HasSplit(const std::filesystem::path& folder, Split split);
-/// Every shard of a folder, in order. @throws TensorError if the packing is not done.
+/// Every shard of a folder, in order.
+/// @throws TensorError if the packing is not done, naming shards that it should have and lacks, or one that is not its own
 std::vector<std::filesystem::path> ShardPaths(const std::filesystem::path& folder);
 
 /// Bytes [N, H, W, 3] → [N, 3, H, W] in [-1, 1].

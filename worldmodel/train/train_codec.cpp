@@ -53,8 +53,20 @@ std::int64_t Workers(const JobPlace& place, const JobOptions& options) {
   return std::clamp<std::int64_t>(place.threads, 1, options.trainer.accumulate);
 }
 
+std::string IdentityOf(const JobPlace& place, const JobOptions& options) {
+  const std::int64_t workers = Workers(place, options);
+  return " workers " + std::to_string(workers) + (workers > 1 ? "" : " threads " + std::to_string(place.threads)) +
+         place.begun_with;
+}
+
+void CheckHoldoutSize(const JobOptions& options) {
+  if (options.holdout_size < 1)
+    throw TensorError("training: holdout_size is " + std::to_string(options.holdout_size) + ", wanted at least 1");
+}
+
 TrainerSummary TrainCodec(const JobPlace& place, const CodecOptions& given, const std::filesystem::path& init) {
   CodecOptions options = given;
+  CheckHoldoutSize(options.job);
   const ShardSet shards(place.shards, Split::kTrain), holdout(place.shards, Split::kHoldout);
   CheckSizes(shards, place.config);
   nn::RandomWeights random(options.job.trainer.seed);
@@ -67,7 +79,7 @@ TrainerSummary TrainCodec(const JobPlace& place, const CodecOptions& given, cons
   const TrainableWeights& weights = workers.front().weights;
   const nn::Vae& vae = workers.front().vae;
   options.job.trainer.identity =
-      IdentityOf(SettingsOf(options)) + shards.metadata().at("recipe") + " workers " + std::to_string(workers.size());
+      IdentityOf(SettingsOf(options)) + shards.metadata().at("recipe") + IdentityOf(place, options.job);
   Trainer trainer(weights.all(), options.job.trainer, place.out);
   for (std::size_t i = 1; i < workers.size(); ++i)
     trainer.AddReplica(

@@ -10,14 +10,20 @@ struct JobPlace {
   ShardFolders shards;
   std::filesystem::path out;     ///< see Trainer; and the weights when it ends
   nn::ModelConfig config;
-  int threads = 1;  ///< parts of a step (`accumulate`) that are computed side by side, each on one core
+  int threads = 1;  ///< parts of a step (`accumulate`) that are computed side by side, each on one core; or libtorch's
+                    ///< own, where no parts are
   std::function<bool()> interrupted = {};
   std::function<void(const TrainerProgress&)> on_progress = {};
   std::function<void(const std::string& sentence)> say = {};
+  std::string begun_with = {};  ///< page of sizes and files of first weights, by hash: with others it is another training
 };
 
 /// How many threads share the parts of a step; what the sums' last digits depend on.
 std::int64_t Workers(const JobPlace& place, const JobOptions& options);
+/// What of a place decides the numbers of each step: its threads, and what it was begun with.
+std::string IdentityOf(const JobPlace& place, const JobOptions& options);
+/// @throws TensorError if a hold-out of no picture or window is wanted
+void CheckHoldoutSize(const JobOptions& options);
 
 /// Trains the codec and writes OUT/codec.safetensors: its parameters alone, latents normalised, what they are worth in
 /// the metadata (psnr, psnr_object, psnr_maps: dB, hold-out). An interrupted training writes none.

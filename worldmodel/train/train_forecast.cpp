@@ -46,8 +46,9 @@ TrainerSummary TrainForecast(const JobPlace& place, const ForecastOptions& given
   const TrainableWeights& weights = workers.front().weights;
   const ForecastTraining measuring(holdout, place.config, options.forecast);
   options.job.trainer.identity =
-      IdentityOf(SettingsOf(options)) + shards.metadata().at("recipe") + " workers " + std::to_string(workers.size()) +
-      (shards.variants().empty() ? "" : " variants " + std::to_string(shards.variants().size()));
+      IdentityOf(SettingsOf(options)) + shards.metadata().at("recipe") + IdentityOf(place, options.job) +
+      (shards.variants().empty() ? "" : " variants " + std::to_string(shards.variants().size()) + " " +
+                                            std::to_string(shards.variants_hash()));
   if (place.say && !shards.variants().empty())
     place.say(std::to_string(shards.variants().size()) + " variants beside " + std::to_string(shards.clips().size()) + " clips");
   Trainer trainer(weights.all(), options.job.trainer, place.out);

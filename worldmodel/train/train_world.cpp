@@ -15,10 +15,10 @@ constexpr std::int64_t kStripWindows = 6;
 
 /// The sources of a start, kept together.
 struct Sources {
-  Sources(const WorldStart& start, std::uint64_t seed)
-      : random(seed, nn::RandomWeights::LastLayers::kZero), codec(start.codec), routed(Routes(start)) {}
+  Sources(const WorldStart& start, const nn::ModelConfig& config, std::uint64_t seed)
+      : random(seed, nn::RandomWeights::LastLayers::kZero), codec(start.codec), routed(Routes(start, config)) {}
 
-  std::vector<RoutedWeights::Route> Routes(const WorldStart& start) {
+  std::vector<RoutedWeights::Route> Routes(const WorldStart& start, const nn::ModelConfig& config) {
     std::vector<RoutedWeights::Route> routes = {{kCodecPrefix, &codec}};
     if (!start.forecast.empty()) {
       forecast = std::make_unique<CheckpointWeights>(start.forecast);
@@ -29,7 +29,7 @@ struct Sources {
       return routes;
     }
     if (start.init_widen)
-      init = std::make_unique<WidenedWeights>(start.init);
+      init = std::make_unique<WidenedWeights>(start.init, config.object_forecast);
     else
       init = std::make_unique<CheckpointWeights>(start.init);
     for (const std::string& prefix : start.init_except) routes.push_back({prefix, &random});
@@ -84,18 +84,43 @@ void Save(const std::filesystem::path& path, const TrainableWeights& weights, co
   nn::SaveWeights(path, given, config, options);
 }
 
+/// What a training on these shards and their latents is a training on.
+std::string IdentityOf(const ShardSet& shards) {
+  std::string text = shards.metadata().at("recipe") + " " + shards.codec();
+  if (shards.products() == std::vector<std::string>{"float32"}) return text;
+  text += " products";
+  for (const std::string& products : shards.products()) text += " " + products;
+  return text;
+}
+
 void CheckShards(const ShardSet& shards, const nn::ModelConfig& config, const WorldStart& start) {
   nn::CheckShape("the shards' pictures", shards.shards().front().frames,
                  {-1, config.views, config.image_height_px, config.image_width_px, 3});
-  const std::string& drawn = shards.metadata().at("pose_map");
-  const std::size_t sizes_end = drawn.find(' ', drawn.find("thickness_px"));
-  const std::string differences = sizes_end == std::string::npos ? "" : drawn.substr(sizes_end);
-  if (differences != config.pose_map.Differences())
-    throw TensorError("the shards' pose maps were drawn with '" + drawn + "', the page's pose_map wants '" +
-                      config.pose_map.Differences() + "' behind the sizes: pack again with this page");
+  const std::string &drawn = shards.metadata().at("pose_map"), wanted = config.pose_map.Words(config.image_height_px);
+  if (drawn != wanted)
+    throw TensorError("the shards' pose maps were drawn with '" + drawn + "', the page's pose_map wants '" + wanted +
+                      "': pack again with this page, or say on it how they were drawn (pose_map.scaled)");
   if (!start.codec_sha256.empty() && shards.codec() != start.codec_sha256)
     throw TensorError(start.codec.string() + " did not make the shards' latents (they are of codec " + shards.codec() +
                       "): wanted `evac encode` with this codec");
+  for (const std::string& products : shards.products()) {
+    if (products.find("imagined by") != std::string::npos)
+      throw TensorError("the shards' latents are '" + products +
+                        "': a world model learns from what was seen, wanted a folder of `evac encode` without --imagined");
+  }
+}
+
+void CheckHoldout(const ShardSet& holdout, const ShardSet& shards) {
+  if (holdout.codec() != shards.codec())
+    throw TensorError("the hold-out's latents are of codec " + holdout.codec() + ", those to learn from of codec " +
+                      shards.codec() + ": wanted `evac encode` of all with one codec");
+}
+
+void CheckViewWeights(const WorldTrainingOptions& options, const nn::ModelConfig& config) {
+  const std::vector<double>& weights = options.view_weights;
+  if (!weights.empty() && weights.size() != static_cast<std::size_t>(config.views))
+    throw TensorError("view_weights has " + std::to_string(weights.size()) + " numbers, wanted " +
+                      std::to_string(config.views) + ": one per view");
 }
 
 std::string Number(double value) {
@@ -112,34 +137,43 @@ std::string Numbers(const std::vector<double>& values) {
 
 }  // namespace
 
+TensorMetadata WhatFor(const TensorMetadata& shards) {
+  TensorMetadata card;
+  for (const char* key : {"period_s", "cameras", "arms", "arms_read", "pose_map", "statistics", "tasks"}) {
+    const auto found = shards.find(key);
+    if (found != shards.end() && !found->second.empty()) card.insert(*found);
+  }
+  return card;
+}
+
 TrainerSummary TrainWorld(const JobPlace& place, const WorldOptions& given, const WorldStart& start,
                           const std::function<void(std::int64_t step, const Strips&)>& look) {
   WorldOptions options = given;
   options.Resolve();
   options.world.windows.chunk = place.config.chunk;
   options.world.windows.memory = place.config.memory;
+  CheckHoldoutSize(options.job);
+  CheckViewWeights(options.world, place.config);
+  CheckStart(place.config, start);
   ShardSet shards(place.shards, Split::kTrain), holdout(place.shards, Split::kHoldout);
-  shards.OpenLatents(place.config.vae.z_channels, place.config.vae.Stride());
-  holdout.OpenLatents(place.config.vae.z_channels, place.config.vae.Stride());
-  CheckShards(shards, place.config, start);
-  Sources sources(start, options.job.trainer.seed);
+  for (ShardSet* set : {&shards, &holdout}) {
+    set->OpenLatents(place.config.vae.z_channels, place.config.vae.Stride());
+    CheckShards(*set, place.config, start);
+  }
+  CheckHoldout(holdout, shards);
+  Sources sources(start, place.config, options.job.trainer.seed);
   OnlyRead read(sources.routed, place.config);
   std::deque<WorldWorker> workers;
   for (std::int64_t i = 0; i < Workers(place, options.job); ++i)
     workers.emplace_back(read, shards, place.config, options);
   const TrainableWeights& weights = workers.front().weights;
   const nn::EvacModel& model = workers.front().model;
-  if (!options.world.view_weights.empty() &&
-      options.world.view_weights.size() != static_cast<std::size_t>(place.config.views))
-    throw TensorError("view_weights has " + std::to_string(options.world.view_weights.size()) + " numbers, wanted " +
-                      std::to_string(place.config.views) + ": one per view");
   WorldTrainingOptions all = options.world;
   all.windows.successes_only = false;  // what is measured is the same, whatever was learned from
   const WorldTraining measuring(model, holdout, all);
   const std::vector<Window> windows = measuring.sampler().Spread(options.job.holdout_size),
                             drawn = measuring.sampler().Spread(kStripWindows);
-  options.job.trainer.identity = IdentityOf(SettingsOf(options)) + shards.metadata().at("recipe") + " " +
-                                 shards.codec() + " workers " + std::to_string(workers.size());
+  options.job.trainer.identity = IdentityOf(SettingsOf(options)) + IdentityOf(shards) + IdentityOf(place, options.job);
   Trainer trainer(TrainedParameters(weights, place.config, options.world), options.job.trainer, place.out);
   for (std::size_t i = 1; i < workers.size(); ++i)
     trainer.AddReplica({TrainedParameters(workers[i].weights, place.config, options.world),
@@ -160,12 +194,13 @@ TrainerSummary TrainWorld(const JobPlace& place, const WorldOptions& given, cons
                    .on_progress = place.on_progress});
   if (!summary.IsDone()) return summary;
   trainer.WithBest([&] {
-    Save(place.out / "weights.safetensors", weights, place.config,
-         {{"steps", std::to_string(summary.step)},
-          {"seed", std::to_string(options.job.trainer.seed)},
-          {"holdout", summary.best ? Number(*summary.best) : ""},
-          {"recipe", shards.metadata().at("recipe")},
-          {"codec", shards.codec()}});
+    TensorMetadata card = WhatFor(shards.metadata());
+    card.insert({{"steps", std::to_string(summary.step)},
+                 {"seed", std::to_string(options.job.trainer.seed)},
+                 {"holdout", summary.best ? Number(*summary.best) : ""},
+                 {"recipe", shards.metadata().at("recipe")},
+                 {"codec", shards.codec()}});
+    Save(place.out / "weights.safetensors", weights, place.config, card);
   });
   return summary;
 }

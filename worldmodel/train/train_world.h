@@ -9,12 +9,21 @@ namespace evac::train {
 struct WorldStart {
   std::filesystem::path codec;  ///< of OUT/codec.safetensors, or a whole checkpoint whose codec is meant
   std::filesystem::path init = {};  ///< a checkpoint to go on from, every key of which must fit; empty: random
-  /// Of `init`: keys that begin so are drawn anew ("model.diffusion_model.out." for another number of channels).
+  /// Of `init`: keys that begin so are drawn anew ("model.diffusion_model.out." for another number of channels). What
+  /// `codec` and `forecast` give is taken from them all the same.
   std::vector<std::string> init_except = {};
   bool init_widen = false;  ///< `init` is of a model that was shown less (WidenedWeights)
-  std::filesystem::path forecast = {};  ///< of OUT/forecast.safetensors; empty: `init` has one, or none is wanted
+  std::filesystem::path forecast = {};  ///< of OUT/forecast.safetensors; empty: `init` has one, or the sizes have none
   std::string codec_sha256 = {};  ///< what the latents must have been made with; empty: not asked
 };
+
+/// @throws TensorError if the sizes have an `object_forecast` and nothing gives one, or one is given that they have not;
+///   or if an exception begins no key that `init` gives.
+void CheckStart(const nn::ModelConfig& config, const WorldStart& start);
+
+/// What weights are for, as the shards that they learned from say, for the weights' metadata: period_s, cameras, arms,
+/// arms_read, pose_map, statistics, tasks. What they are asked for is compared with it (worldmodel/trained_for.h).
+TensorMetadata WhatFor(const TensorMetadata& shards);
 
 /// Trains the denoiser and its resamplers (EVAC's first stage of training is the codec) and writes
 /// OUT/weights.safetensors: the whole network, the codec included, averaged weights of the best hold-out.

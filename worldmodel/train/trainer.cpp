@@ -161,6 +161,15 @@ void Trainer::PlanSteps() {
   planned_ = true;
 }
 
+/// A checkpoint that is to be kept after the end would never be written.
+void Trainer::CheckKept(const TrainerCallbacks& callbacks) const {
+  for (const std::int64_t step : callbacks.keep_steps) {
+    if (step >= 1 && (!planned_ || step <= steps_)) continue;
+    throw TensorError("training: step " + std::to_string(step) + " is to be kept, wanted " +
+                      (planned_ ? "1 to " + std::to_string(steps_) + ", the last" : "at least 1"));
+  }
+}
+
 void Trainer::With(const Tensor& weights, const std::function<void()>& function) {
   const at::NoGradGuard no_gradients;
   if (weights.is_same(state_.values)) return function();
@@ -180,7 +189,7 @@ void Trainer::HoldOut(const TrainerCallbacks& callbacks) {
   With(Averaged(), [&] {
     last_score_ = callbacks.holdout();
     ++holdouts_since_best_;
-    if (!best_score_ || *last_score_ < *best_score_) {
+    if (!best_score_ || *last_score_ < *best_score_ || (std::isfinite(*last_score_) && !std::isfinite(*best_score_))) {
       best_score_ = last_score_;
       best_step_ = step_;
       best_ = state_.values.clone();
@@ -193,7 +202,10 @@ void Trainer::HoldOut(const TrainerCallbacks& callbacks) {
 }
 
 void Trainer::Record(const StepOutcome& outcome, double seconds) {
-  smooth_loss_ = step_ == 0 ? outcome.loss : smooth_loss_ + 0.02 * (outcome.loss - smooth_loss_);
+  if (!std::isfinite(smooth_loss_))
+    smooth_loss_ = outcome.loss;
+  else if (std::isfinite(outcome.loss))
+    smooth_loss_ += 0.02 * (outcome.loss - smooth_loss_);
   CsvLog::Add(folder_ / "metrics.csv", Text("%lld,%.9g,%.9g,%.9g,%.4f", static_cast<long long>(step_), outcome.loss,
                                             outcome.learning_rate, outcome.gradient_norm, seconds));
 }
@@ -215,6 +227,7 @@ std::string Trainer::WhyEnd(const TrainerCallbacks& callbacks) const {
 TrainerSummary Trainer::Run(const TrainerCallbacks& callbacks) {
   run_started_ = saved_ = Clock::now();
   run_steps_ = timed_from_ = 0;
+  CheckKept(callbacks);
   std::string why = WhyEnd(callbacks);
   while (why.empty()) {
     const Clock::time_point started = Clock::now();
@@ -222,7 +235,10 @@ TrainerSummary Trainer::Run(const TrainerCallbacks& callbacks) {
     Record(outcome, SecondsSince(started));
     ++step_;
     ++run_steps_;
-    if (!planned_) PlanSteps();
+    if (!planned_) {
+      PlanSteps();
+      CheckKept(callbacks);
+    }
     const bool last = planned_ && step_ >= steps_;
     if (callbacks.holdout && options_.holdout_every > 0 && (step_ % options_.holdout_every == 0 || last))
       HoldOut(callbacks);
@@ -236,7 +252,7 @@ TrainerSummary Trainer::Run(const TrainerCallbacks& callbacks) {
     }
   }
   WriteCurves(folder_);
-  return {step_, steps_, why, best_score_, best_step_};
+  return {step_, steps_, why, best_score_, best_step_, run_steps_};
 }
 
 }  // namespace evac::train

@@ -3,6 +3,7 @@
 #include <chrono>
 #include <filesystem>
 #include <functional>
+#include <limits>
 #include <optional>
 #include <string>
 #include <vector>
@@ -20,7 +21,7 @@ namespace evac::train {
 struct TrainerOptions {
   std::int64_t steps = 100'000;
   /// Above 0: as many steps as fit into so many minutes. Counted once, after the first steps, and written into the
-  /// checkpoint: a training that is killed and goes on does the same steps.
+  /// checkpoint: a training that is killed and goes on does the same steps. Other minutes are refused from then on.
   double minutes = 0;
   double learning_rate = 5e-5;
   std::int64_t warmup_steps = 0;  ///< the rate rises from 0
@@ -43,7 +44,7 @@ double LearningRateAt(const TrainerOptions& options, std::int64_t step, std::int
 
 struct TrainerProgress {
   std::int64_t step = 0, steps = 0;  ///< done, in all; 0 while minutes are not yet turned into steps
-  double loss = 0;                   ///< of the last steps, smoothed
+  double loss = 0;                   ///< of the last steps where it was finite, smoothed
   double steps_per_s = 0;
   std::optional<double> holdout, best;
   /// "1200/6000 steps, loss .0312, hold-out .0298 (best .0291), 2.4 steps/s, 33 min left"
@@ -76,6 +77,7 @@ struct TrainerSummary {
   std::string why;  ///< "done", "interrupted", "no better for 5 hold-outs"
   std::optional<double> best;
   std::int64_t best_step = 0;
+  std::int64_t steps_now = 0;  ///< those that this process did
   bool IsDone() const { return why != "interrupted"; }
 };
 
@@ -96,7 +98,7 @@ class Trainer {
   void AddReplica(Replica replica);
 
   /// Trains from the checkpoint's step, or from 0, to the end.
-  /// @throws TensorError if the loss is not finite for 100 steps in a row
+  /// @throws TensorError if the loss is not finite for 100 steps in a row, or a step to be kept is behind the last
   TrainerSummary Run(const TrainerCallbacks& callbacks);
 
   std::int64_t step() const { return step_; }
@@ -118,6 +120,7 @@ class Trainer {
   void HoldOut(const TrainerCallbacks& callbacks);
   std::string WhyEnd(const TrainerCallbacks& callbacks) const;
   void PlanSteps();
+  void CheckKept(const TrainerCallbacks& callbacks) const;
   void Report(const TrainerCallbacks& callbacks) const;
   void Record(const StepOutcome& outcome, double seconds);
   const Tensor& Averaged() const { return state_.average.defined() ? state_.average : state_.values; }
@@ -138,7 +141,7 @@ class Trainer {
   std::optional<double> best_score_, last_score_;
   std::int64_t best_step_ = 0, step_ = 0, steps_ = 0, holdouts_since_best_ = 0, not_finite_ = 0;
   bool planned_ = false;  ///< the number of steps stands
-  double smooth_loss_ = 0;
+  double smooth_loss_ = std::numeric_limits<double>::quiet_NaN();  ///< until there was one
   std::int64_t run_steps_ = 0, timed_from_ = 0;  ///< by this process; those after which time is taken
   Clock::time_point run_started_, saved_;
 };

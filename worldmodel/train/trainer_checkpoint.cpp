@@ -28,10 +28,22 @@ class Metadata {
   }
   std::int64_t Whole(const char* key) const { return std::strtoll(Text(key).c_str(), nullptr, 10); }
   double Number(const char* key) const { return std::strtod(Text(key).c_str(), nullptr); }
+  const std::string& file() const { return file_.name(); }
 
  private:
   const TensorFile& file_;
 };
+
+/// Minutes are counted once.
+void RequireSameMinutes(const Metadata& metadata, double minutes) {
+  const bool has_minutes = metadata.Has("minutes");
+  if (has_minutes && metadata.Number("minutes") == minutes) return;
+  char text[160];
+  std::snprintf(text, sizeof text, ", %.6g minutes were asked for now: wanted %s", minutes,
+                has_minutes ? "those of before, or more --steps to go on for longer" : "--steps, more go on for longer");
+  throw TensorError(metadata.file() + " is planned for " + metadata.Text("steps") + " steps and has done " +
+                    metadata.Text("step") + text);
+}
 
 void CopyFrom(const nn::MappedTensors& file, const char* name, const Tensor& to) {
   const Tensor found = file.Get(name);
@@ -77,6 +89,7 @@ void Trainer::Load() {
   if (options_.minutes > 0 && metadata.Text("planned") == "1") {
     planned_ = true;
     steps_ = metadata.Whole("steps");
+    RequireSameMinutes(metadata, options_.minutes);
   }
   if (!metadata.Has("best_score")) return;
   best_ = file.Get("best").clone().to(state_.values.device());
@@ -98,6 +111,7 @@ void Trainer::Save() const {
                              {"planned", planned_ ? "1" : "0"},
                              {"not_finite", std::to_string(not_finite_)},
                              {"smooth_loss", Exact(smooth_loss_)}};
+  if (planned_ && options_.minutes > 0) metadata["minutes"] = Exact(options_.minutes);
   if (best_score_) {
     tensors.push_back({"best", best_});
     metadata["best_score"] = Exact(*best_score_);

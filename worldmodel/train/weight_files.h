@@ -23,14 +23,18 @@ class CheckpointWeights final : public nn::ParameterSource {
 };
 
 /// The same, of a model that is shown more than the one in the file was: what the first layer's weights lack for the
-/// channels behind is 0, so that the new model begins as the old one was.
+/// channels that are new is 0, so that the new model begins as the old one was. New channels come last, but before that
+/// of the object's forecast, where the file's model has one (nn::DenoiserInput).
 class WidenedWeights final : public nn::ParameterSource {
  public:
-  explicit WidenedWeights(const std::filesystem::path& path);
+  /// @param object_forecast  whether the new model is shown one
+  /// @throws TensorError if it is not, and the file's model is: nothing is left out
+  WidenedWeights(const std::filesystem::path& path, bool object_forecast);
   Tensor Take(const std::string& key, at::IntArrayRef shape) override;
 
  private:
   nn::MappedTensors tensors_;
+  std::int64_t last_ = 0;  ///< of the file's channels, so many stay behind the new ones
 };
 
 /// Several sources, each for the keys that begin with its prefix; the first that fits is asked.

@@ -1,0 +1,149 @@
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <functional>
+#include <thread>
+
+#include "apps/networks/packed_clips.h"
+#include "apps/networks/train_arguments.h"
+#include "apps/networks/training_page.h"
+#include "core/file.h"
+#include "tests/apps/learning_shards.h"
+#include "tests/apps/printed.h"
+#include "tests/support/temp_folder.h"
+
+/// What `evac train` and `evac judge train` take and refuse, before and when they go on.
+namespace evac {
+namespace {
+
+using testing::AllOf;
+using testing::HasSubstr;
+using testing::ThrowsMessage;
+
+/// A network for LearningShards and their codec.
+constexpr const char* kPage = R"(
+chunk: 2
+memory: 2
+views: 2
+image_height_px: 16
+image_width_px: 24
+schedule: {steps: 1000}
+unet: {in_channels: 31, out_channels: 8, model_channels: 32, channel_mult: [1], num_res_blocks: 1,
+       attention_resolutions: [1], num_head_channels: 16, context_dim: 32, init_attention_heads: 2}
+vae: {channels: 32, channel_mult: [1, 1], num_res_blocks: 1, z_channels: 8, scale_factor: 1, patch_px: 2}
+action_resampler: {embedding_dim: 14, queries: 3, dim: 32, depth: 1, dim_head: 16, heads: 2, output_dim: 32}
+image_resampler: {embedding_dim: 32, queries: 4, dim: 32, depth: 1, dim_head: 16, heads: 2, output_dim: 32}
+image_encoder: {width: 32, layers: 1, head_width: 16, patch_px: 14, image_px: 28, embed_dim: 16, vocabulary: 8}
+)";
+
+class TrainCommand : public testing::Test {
+ protected:
+  TrainCommand() {
+    WriteLearningShards(folder_ / "shards", {.clips = 4, .frames = 6});
+    WriteFileAtomically(Path("page.yaml"), kPage);
+  }
+  std::string Path(const std::string& name) const { return (folder_ / name).string(); }
+  void Replace(const std::string& name, const std::string& old, const std::string& text) const {
+    std::string page = ReadFile(Path(name));
+    for (std::size_t at = page.find(old); at != std::string::npos; at = page.find(old, at + text.size()))
+      page.replace(at, old.size(), text);
+    WriteFileAtomically(Path(name), page);
+  }
+  /// What `evac train …` prints; its exceptions come through.
+  static std::string Train(const std::vector<std::string>& more) {
+    std::vector<std::string> words = {"train"};
+    words.insert(words.end(), more.begin(), more.end());
+    return Printed(AddTrain, words);
+  }
+  std::string TrainCodec(const std::vector<std::string>& more = {}) const {
+    std::vector<std::string> words = {"codec", Path("shards"), "--config", Path("page.yaml"), "--out", Path("codec"),
+                                      "--set", "batch=2",      "--steps",  "1"};
+    words.insert(words.end(), more.begin(), more.end());
+    return Train(words);
+  }
+
+  const TempFolder folder_;
+};
+
+TEST_F(TrainCommand, GoesOnWithTheSamePageAndFilesAlone) {
+  TrainCodec();
+  const std::string codec = Path("codec/codec.safetensors");
+  const auto refused = ThrowsMessage<TensorError>(HasSubstr("is a training with other options"));
+  EXPECT_THAT([&] { TrainCodec({"--init", codec}); }, refused);
+  const std::string more = std::to_string(std::thread::hardware_concurrency() + 1);
+  EXPECT_THAT([&] { TrainCodec({"--threads", more}); }, refused) << "they share what a step of one part computes";
+  Replace("page.yaml", "chunk: 2\n", "chunk: 2  # of frames\n");
+  testing::internal::CaptureStderr();
+  EXPECT_THAT(TrainCodec(), HasSubstr("done after 1 steps"));
+  EXPECT_THAT(testing::internal::GetCapturedStderr(),
+              HasSubstr("is planned for 1 steps and has done them; more --steps go on"));
+  Replace("page.yaml", "steps: 1000", "steps: 900");  // no shape depends on it
+  EXPECT_THAT([&] { TrainCodec(); }, refused);
+}
+
+TEST_F(TrainCommand, KnowsWhatEachTrainingIsBegunWith) {
+  const auto begun_with = [&](const std::function<void(TrainArguments&)>& change) {
+    TrainArguments arguments;
+    arguments.config = Path("page.yaml");
+    arguments.init = Path("shards/shard_00000.safetensors");
+    change(arguments);
+    TrainingProgress progress(stderr);
+    return PlaceOf(arguments, progress).begun_with;
+  };
+  const std::string other = Path("shards/shard_00001.safetensors"), plain = begun_with([](TrainArguments&) {});
+  EXPECT_EQ(plain, begun_with([](TrainArguments&) {}));
+  EXPECT_NE(plain, begun_with([&](TrainArguments& a) { a.init = other; }));
+  EXPECT_NE(plain, begun_with([&](TrainArguments& a) { a.forecast = other; }));
+  EXPECT_NE(plain, begun_with([](TrainArguments& a) { a.init_widen = true; }));
+  EXPECT_NE(plain, begun_with([](TrainArguments& a) { a.init_except = {"embedder."}; }));
+}
+
+TEST_F(TrainCommand, WhatOneFolderHoldsOutAnotherMayNotLearnFrom) {
+  WriteLearningShards(folder_ / "more", {.clips = 8, .frames = 6});
+  const train::ShardFolders folders = {folder_ / "shards", folder_ / "more"};
+  EXPECT_NO_THROW(CheckHoldouts(folders));
+  Replace("more/shards.json", "\"unseen-", "\"kept-");
+  Replace("more/shards.json", "\"seen-", "\"unseen-");  // more states than the other folder has
+  const std::string both = Path("more") + ": 2 of the 2 initial states that " + Path("shards") + " holds out";
+  const auto refused = ThrowsMessage<Error>(
+      AllOf(HasSubstr(both), HasSubstr("unseen-0"), HasSubstr("one --seed and one --holdout")));
+  EXPECT_THAT([&] { CheckHoldouts(folders); }, refused);
+  EXPECT_NO_THROW(CheckHoldouts({folder_ / "more", folder_ / "more"}));
+  EXPECT_THAT([&] { TrainCodec({Path("more")}); }, refused);
+  for (const char* learner : {"judge", "policy"}) {
+    const std::vector<std::string> words = {learner, Path("shards"), Path("more"), "--steps", "1", "--out", Path("out")};
+    EXPECT_THAT([&] { Train(words); }, refused) << learner;
+  }
+}
+
+TEST_F(TrainCommand, OptionsThatDoNothingAreRefused) {
+  const auto world = [&](std::vector<std::string> more) {
+    more.insert(more.begin(), {"world", Path("shards"), "--config", Path("page.yaml"), "--codec", Path("page.yaml"),
+                               "--out", Path("out")});
+    return Train(more);
+  };
+  EXPECT_THROW(world({"--init-except", "embedder."}), CLI::RequiresError);
+  EXPECT_THROW(world({"--init-widen"}), CLI::RequiresError);
+  EXPECT_THROW(world({"--steps", "3", "--minutes", "2"}), CLI::ExcludesError);
+  train::ForecastOptions options;
+  for (const char* option : {"bf16=true", "holdout_size=8"})
+    EXPECT_THAT([&] { ReadTrainingPage("", "forecast", {option}, SettingsOf(options)); },
+                ThrowsMessage<Error>(HasSubstr("there is no such option")))
+        << option;
+}
+
+TEST_F(TrainCommand, ASideThatIsNoMultipleOfEightIsSaidToBeNone) {
+  const auto judge = [&](const char* option, const char* side) {
+    const std::vector<std::string> words = {"train", Path("shards"), option, side, "--out", Path("out")};
+    return [words] { Printed(AddJudgeTrain, words); };
+  };
+  for (const char* option : {"--height-px", "--width-px"}) {
+    for (const char* side : {"abc", "60", "64px", "99999999999999999999"})
+      EXPECT_THAT(judge(option, side),
+                  ThrowsMessage<CLI::ValidationError>(
+                      AllOf(HasSubstr(option), HasSubstr("found " + std::string(side) + ", wanted a multiple of 8"))));
+  }
+}
+
+}  // namespace
+}  // namespace evac

@@ -1,0 +1,229 @@
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <functional>
+#include <map>
+
+#include "core/hash.h"
+#include "tests/nn/support.h"
+#include "tests/support/temp_folder.h"
+#include "tests/train/synthetic_shards.h"
+#include "worldmodel/train/encode_shards.h"
+#include "worldmodel/train/train_forecast.h"
+#include "worldmodel/train/train_world.h"
+#include "worldmodel/train/weight_files.h"
+
+/// What a training is begun with.
+namespace evac::train {
+namespace {
+
+using testing::HasSubstr;
+using testing::ThrowsMessage;
+
+nn::ModelConfig Config(bool object_forecast) {
+  nn::ModelConfig config = nn::TinyConfig();
+  config.vae.channel_mult = {1, 1, 1};
+  config.vae.scale_factor = 1;
+  config.unet.channel_mult = {1, 1};
+  config.schedule.from_last_frame = true;
+  config.schedule.carry_plane_m = 0;
+  config.unet.in_channels += config.vae.z_channels + 1;
+  config.object_forecast = object_forecast;
+  config.unet.in_channels += object_forecast ? 1 : 0;
+  return config;
+}
+
+WorldOptions Quick(std::int64_t steps) {
+  WorldOptions options;
+  options.job.trainer.steps = steps;
+  options.job.trainer.learning_rate = 3e-3;
+  options.job.trainer.clip_norm = 1;
+  options.job.holdout_size = 4;
+  options.world.batch = 2;
+  options.world.windows.history = 6;
+  options.world.windows.first_image = true;
+  options.world.drop = 0;
+  return options;
+}
+
+class WorldStartTest : public testing::Test {
+ protected:
+  WorldStartTest() {
+    WriteSyntheticShards(folder_ / "shards", {});
+    TrainCodec(Place("codec"), QuickCodec(1));
+    CheckpointWeights weights(Codec());
+    EncodeSyntheticShards(nn::Vae(nn::Scope(weights, kCodecPrefix), Config(true).vae), folder_ / "shards");
+  }
+
+  static CodecOptions QuickCodec(std::int64_t steps) {
+    CodecOptions options;
+    options.job.trainer.steps = steps;
+    options.job.holdout_size = 4;
+    options.codec.batch = 2;
+    return options;
+  }
+  static ForecastOptions QuickForecast(std::int64_t steps) {
+    ForecastOptions options;
+    options.job.trainer.steps = steps;
+    options.forecast.batch = 2;
+    return options;
+  }
+  JobPlace Place(const std::string& out, bool object_forecast = true) const {
+    return {{folder_ / "shards"}, folder_ / out, Config(object_forecast)};
+  }
+  std::filesystem::path Codec() const { return folder_ / "codec" / "codec.safetensors"; }
+  std::filesystem::path Forecast() const {
+    if (!std::filesystem::exists(folder_ / "forecast" / "forecast.safetensors"))
+      TrainForecast(Place("forecast"), QuickForecast(1));
+    return folder_ / "forecast" / "forecast.safetensors";
+  }
+  std::filesystem::path Weights(const std::string& out) const { return folder_ / out / "weights.safetensors"; }
+  static std::string Train(const JobPlace& place, const WorldStart& start) {
+    return TrainWorld(place, Quick(1), start, {}).why;
+  }
+
+  const TempFolder folder_;
+};
+
+TEST_F(WorldStartTest, AForecastIsGivenWhereThePageHasOneAndNowhereElse) {
+  WorldStart start{Codec()};
+  const auto train = [&] { return Train(Place("refused"), start); };
+  const auto none_given =
+      ThrowsMessage<TensorError>(HasSubstr("object_forecast: true and no forecast is given: wanted --forecast"));
+  EXPECT_THAT(train, none_given);
+  start.forecast = Forecast();
+  EXPECT_EQ(Train(Place("world"), start), "done");
+  EXPECT_THAT([&] { Train(Place("plain", false), start); },
+              ThrowsMessage<TensorError>(HasSubstr("object_forecast: false, wanted true, or no --forecast")));
+
+  start.forecast.clear();
+  EXPECT_EQ(Train(Place("plain", false), start), "done");
+  start.init = Weights("plain");
+  EXPECT_THAT(train, none_given) << "it holds none";
+  start.init = Weights("world");
+  EXPECT_EQ(Train(Place("again"), start), "done");
+  start.init_except = {"object_"};
+  EXPECT_THAT(train, none_given) << "it would be drawn anew, and stay so";
+}
+
+TEST_F(WorldStartTest, AnExceptionThatBeginsNoKeyIsRefused) {
+  WorldStart start{.codec = Codec(), .init = "init"};
+  const auto train = [&] { Train(Place("out", false), start); };
+  for (const char* prefix : {"model.difusion_model.", "first_stage_model", "object_forecast"}) {
+    start.init_except = {"model.diffusion_model.out.", prefix};
+    EXPECT_THAT(train, ThrowsMessage<TensorError>(
+                           HasSubstr("--init-except '" + std::string(prefix) + "' begins no key that --init gives")));
+  }
+  start.init_except = {"model.diffusion_model.out."};
+  EXPECT_NO_THROW(CheckStart(Config(false), start));
+}
+
+TEST_F(WorldStartTest, TheHoldoutsLatentsAreOfTheSameCodec) {
+  CheckpointWeights weights(Codec());
+  const nn::Vae vae(nn::Scope(weights, kCodecPrefix), Config(true).vae);
+  const std::filesystem::path holdout = ShardPaths(folder_ / "shards").at(1);
+  EncodeShard(vae, holdout, {"another", Sha256HexOfFile(holdout)});
+  EXPECT_THAT([&] { Train(Place("out", false), {.codec = Codec()}); },
+              ThrowsMessage<TensorError>(
+                  HasSubstr("the hold-out's latents are of codec another, those to learn from of codec codec")));
+}
+
+TEST_F(WorldStartTest, WhatIsNewBesideAForecastCountsNothingAtFirst) {
+  const auto end = [&](const char* out, const nn::ModelConfig& config, double rate, const WorldStart& start) {
+    WorldOptions options = Quick(rate > 1e-9 ? 20 : 1);
+    options.job.trainer.learning_rate = rate;
+    options.job.trainer.holdout_every = options.job.trainer.steps;
+    return TrainWorld({{folder_ / "shards"}, folder_ / out, config}, options, start, {}).best.value();
+  };
+  WorldStart start{Codec()};
+  start.forecast = Forecast();
+  const double before = end("first", Config(true), 3e-3, start);
+  start = {.codec = Codec(), .init = Weights("first"), .init_widen = true};
+  nn::ModelConfig more = Config(true);
+  more.schedule.carry_first = true;
+  more.unet.in_channels += more.vae.z_channels + 1;
+  EXPECT_NEAR(end("widened", more, 1e-12, start), before, 1e-5 * before);
+
+  nn::ModelConfig other = more;
+  other.object_forecast = false;
+  other.unet.in_channels -= 1;
+  EXPECT_THAT([&] { end("other", other, 1e-12, start); },
+              ThrowsMessage<TensorError>(HasSubstr("its model has an object_forecast, wanted object_forecast: true")));
+}
+
+TEST(WidenedWeights, NewColumnsComeBeforeThatOfTheObject) {
+  const TempFolder folder;
+  const std::string key = "model.diffusion_model.input_blocks.0.0.weight";
+  const auto widened = [&](bool has_forecast) {
+    const Tensor first = at::tensor({1.0F, 2.0F, 3.0F}).reshape({1, 3, 1, 1}), bias = at::zeros({1});
+    std::vector<TensorView> views = {nn::ViewOf(key, first)};
+    if (has_forecast) views.push_back(nn::ViewOf("object_forecast.eye.bias", bias));
+    WriteTensorFile(folder / "weights.safetensors", views, {});
+    return WidenedWeights(folder / "weights.safetensors", true).Take(key, {1, 5, 1, 1}).flatten();
+  };
+  EXPECT_TRUE(at::equal(widened(true), at::tensor({1.0F, 2.0F, 0.0F, 0.0F, 3.0F})));
+  EXPECT_TRUE(at::equal(widened(false), at::tensor({1.0F, 2.0F, 3.0F, 0.0F, 0.0F}))) << "the object is new too";
+}
+
+TEST_F(WorldStartTest, ATrainingGoesOnOnlyWithWhatItWasBegunWithAndAsManyThreads) {
+  const std::filesystem::path forecast = Forecast();
+  const std::map<std::string, std::function<std::string(const JobPlace&, std::int64_t parts)>> trainings = {
+      {"a codec",
+       [&](const JobPlace& place, std::int64_t parts) {
+         CodecOptions options = QuickCodec(3);
+         options.job.trainer.accumulate = parts;
+         return TrainCodec(place, options).why;
+       }},
+      {"a forecast",
+       [&](const JobPlace& place, std::int64_t parts) {
+         ForecastOptions options = QuickForecast(3);
+         options.job.trainer.accumulate = parts;
+         return TrainForecast(place, options).why;
+       }},
+      {"a world", [&](const JobPlace& place, std::int64_t parts) {
+         WorldOptions options = Quick(3);
+         options.job.trainer.accumulate = parts;
+         WorldStart start{Codec()};
+         start.forecast = forecast;
+         return TrainWorld(place, options, start, {}).why;
+       }}};
+  const auto refused = ThrowsMessage<TensorError>(HasSubstr("is a training with other options"));
+  for (const auto& [name, train] : trainings) {
+    SCOPED_TRACE(name);
+    int left = 1;
+    JobPlace place = Place("one part of " + name);
+    place.interrupted = [&] { return left-- == 0; };
+    place.begun_with = " page a";
+    EXPECT_EQ(train(place, 1), "interrupted");
+    left = 100;
+    JobPlace other = place;
+    other.begun_with = " page b";
+    EXPECT_THAT([&] { train(other, 1); }, refused);
+    other = place;
+    other.threads = 2;
+    EXPECT_THAT([&] { train(other, 1); }, refused) << "libtorch's own";
+    EXPECT_EQ(train(place, 1), "done");
+
+    left = 1;
+    place = Place("two parts of " + name);
+    place.interrupted = [&] { return left-- == 0; };
+    place.threads = 2;
+    EXPECT_EQ(train(place, 2), "interrupted");
+    left = 100;
+    place.threads = 5;
+    EXPECT_EQ(train(place, 2), "done") << "no more than two work";
+  }
+}
+
+TEST_F(WorldStartTest, AHoldoutOfNothingIsRefused) {
+  const auto refused = ThrowsMessage<TensorError>(HasSubstr("holdout_size is 0, wanted at least 1"));
+  WorldOptions world = Quick(1);
+  world.job.holdout_size = 0;
+  EXPECT_THAT([&] { TrainWorld(Place("world", false), world, {.codec = Codec()}, {}); }, refused);
+  CodecOptions codec = QuickCodec(1);
+  codec.job.holdout_size = 0;
+  EXPECT_THAT([&] { TrainCodec(Place("none"), codec); }, refused);
+}
+
+}  // namespace
+}  // namespace evac::train
