@@ -83,6 +83,8 @@ void MakeCorpus(const fs::path& corpus) {
   fs::remove_all(clip);
   MakeStoreSeeds(corpus / "store_fuzz");
   MakePageSeeds(corpus / "suite_fuzz");
+  evac::WriteText(corpus / "weights_card_fuzz/desk",
+                  "0.1\n" + evac::ReadFile(EVAC_SOURCE_DIR "/worldmodel/weights/desk/statistics.yaml"));
 }
 
 }  // namespace
