@@ -4,10 +4,10 @@
 #include <cstring>
 #include <nlohmann/json.hpp>
 #include <span>
-#include <sstream>
 
 #include "core/error.h"
 #include "core/file.h"
+#include "core/names.h"
 #include "core/tensor_file.h"
 
 namespace evac {
@@ -55,13 +55,6 @@ std::vector<T> Numbers(const TensorFile& file, const TensorDeclaration& wanted) 
   return numbers;
 }
 
-std::vector<std::string> SplitAtCommas(const std::string& text) {
-  std::vector<std::string> names;
-  std::istringstream parts(text);
-  for (std::string name; std::getline(parts, name, ',');) names.push_back(name);
-  return names;
-}
-
 /// The order of cameras in every task page that ships.
 bool IsInOrderOfPages(const std::vector<std::string>& cameras) {
   std::vector<std::string> ordered = {"head", "hand_left", "hand_right"};
@@ -72,7 +65,7 @@ bool IsInOrderOfPages(const std::vector<std::string>& cameras) {
 /// The names of the file's views, in their order.
 std::vector<std::string> CamerasOf(const TensorFile& file, const std::vector<std::string>& wanted) {
   const auto named = file.metadata().find("cameras");
-  if (named != file.metadata().end()) return SplitAtCommas(named->second);
+  if (named != file.metadata().end()) return NamesIn(named->second);
   const std::vector<std::int64_t>& shape = file.Get("object_px").shape;
   const std::int64_t views = shape.size() == 3 ? shape[1] : 0;
   if (views == std::ssize(wanted) && IsInOrderOfPages(wanted)) return wanted;
@@ -179,7 +172,7 @@ void WriteTruth(const fs::path& path, const EpisodeTruth& truth) {
                                 View("contact", TensorType::kU8, {frames}, truth.contact.data())};
   WriteTensorFile(path, tensors, {{"format", "evac-truth"},
                                   {"version", "1"},
-                                  {"cameras", fmt::format("{}", fmt::join(truth.cameras, ","))}});
+                                  {"cameras", Joined(truth.cameras)}});
 }
 
 EpisodeTruth ReadTruth(const fs::path& path, std::size_t frames, const std::vector<Camera>& cameras) try {

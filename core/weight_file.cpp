@@ -4,9 +4,9 @@
 
 #include <charconv>
 #include <cmath>
-#include <sstream>
 
 #include "core/error.h"
+#include "core/names.h"
 
 namespace evac {
 namespace {
@@ -50,9 +50,7 @@ int WeightFile::Whole(const std::string& field, int low, int high) const {
 }
 
 std::vector<std::string> WeightFile::Names(const std::string& field) const {
-  std::vector<std::string> names;
-  std::istringstream text(Text(field));
-  for (std::string part; std::getline(text, part, ',');) names.push_back(part);
+  std::vector<std::string> names = NamesIn(Text(field));
   for (const std::string& part : names) {
     if (part.empty()) names.clear();
   }

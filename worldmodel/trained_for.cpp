@@ -5,9 +5,9 @@
 
 #include <cmath>
 #include <cstdlib>
-#include <sstream>
 
 #include "core/config.h"
+#include "core/names.h"
 
 namespace evac {
 namespace {
@@ -21,13 +21,6 @@ constexpr const char* kNumbers[] = {"left x",     "left y",  "left z",  "left ro
 std::string Said(const TensorMetadata& metadata, const std::string& key) {
   const auto found = metadata.find(key);
   return found == metadata.end() ? std::string() : found->second;
-}
-
-std::vector<std::string> Names(const std::string& joined) {
-  std::vector<std::string> names;
-  std::istringstream list(joined);
-  for (std::string name; std::getline(list, name, ',');) names.push_back(name);
-  return names;
 }
 
 double Period(const std::string& weights, const std::string& text) {
@@ -60,7 +53,7 @@ TrainedFor TrainedFor::Of(const std::string& weights, const TensorMetadata& meta
   trained.weights = weights;
   if (const std::string period = Said(metadata, "period_s"); !period.empty())
     trained.period_s = Period(weights, period);
-  trained.cameras = Names(Said(metadata, "cameras"));
+  trained.cameras = NamesIn(Said(metadata, "cameras"));
   if (const std::string page = Said(metadata, "statistics"); !page.empty())
     trained.statistics = ParseActionStatistics(page, weights + ": metadata statistics");
   trained.pose_map = Said(metadata, "pose_map");

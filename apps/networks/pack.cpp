@@ -13,6 +13,7 @@
 #include "core/error.h"
 #include "core/file.h"
 #include "core/hash.h"
+#include "core/names.h"
 #include "core/seed.h"
 #include "core/store_lock.h"
 #include "worldmodel/clip.h"
@@ -241,12 +242,6 @@ Clip Make(const PlannedClip& planned, const PackArguments& arguments, const Pack
                                         packing.tasks.begin());
   clip.outcome = static_cast<std::int8_t>(!source.row ? -1 : source.row->success ? 1 : 0);
   return clip;
-}
-
-std::string Joined(const std::vector<std::string>& names) {
-  std::string text;
-  for (const std::string& name : names) text += (text.empty() ? "" : ",") + name;
-  return text;
 }
 
 TensorMetadata MetadataOf(std::size_t number, const PackArguments& arguments, const Packing& packing) {

@@ -5,10 +5,10 @@
 #include <map>
 #include <nlohmann/json.hpp>
 #include <set>
-#include <sstream>
 
 #include "core/error.h"
 #include "core/file.h"
+#include "core/names.h"
 
 namespace evac {
 namespace {
@@ -88,19 +88,6 @@ void CheckHoldouts(const train::ShardFolders& folders) {
     for (const auto& [keeper, keeps] : packings)
       CheckHoldout(learner.string(), learns.learned, keeper.string(), keeps.held_out);
   }
-}
-
-std::vector<std::string> NamesIn(const std::string& joined) {
-  std::vector<std::string> names;
-  std::istringstream text(joined);
-  for (std::string part; std::getline(text, part, ',');) names.push_back(part);
-  return names;
-}
-
-std::string Joined(const std::vector<std::string>& names) {
-  std::string text;
-  for (const std::string& name : names) text += (text.empty() ? "" : ",") + name;
-  return text;
 }
 
 PackedSet::PackedSet(const train::ShardFolders& folders, train::Split split) : shards(folders, split) {

@@ -32,8 +32,4 @@ struct PackedSet {
 ///   said of recordings, where there are several folders
 void CheckHoldouts(const train::ShardFolders& folders);
 
-/// Names with commas between them.
-std::vector<std::string> NamesIn(const std::string& joined);
-std::string Joined(const std::vector<std::string>& names);
-
 }  // namespace evac

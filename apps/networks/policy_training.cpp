@@ -8,6 +8,7 @@
 #include "apps/networks/shard_rows.h"
 #include "core/error.h"
 #include "core/geometry.h"
+#include "core/names.h"
 #include "policies/learned_input.h"
 
 namespace evac {

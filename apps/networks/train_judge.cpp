@@ -13,6 +13,7 @@
 #include "apps/work_share.h"
 #include "core/error.h"
 #include "core/file.h"
+#include "core/names.h"
 #include "core/weight_file.h"
 #include "judges/judge_card.h"
 

@@ -4,6 +4,7 @@
 
 #include "apps/networks/learners.h"
 #include "core/error.h"
+#include "core/names.h"
 #include "policies/learned_input.h"
 
 namespace evac {
