@@ -7,6 +7,7 @@
 #include "core/hash.h"
 #include "tests/nn/support.h"
 #include "tests/support/temp_folder.h"
+#include "tests/train/prepared_world.h"
 #include "tests/train/synthetic_shards.h"
 #include "worldmodel/train/encode_shards.h"
 #include "worldmodel/train/train_forecast.h"
@@ -33,16 +34,10 @@ nn::ModelConfig Config(bool object_forecast) {
   return config;
 }
 
-WorldOptions Quick(std::int64_t steps) {
-  WorldOptions options;
-  options.job.trainer.steps = steps;
-  options.job.trainer.learning_rate = 3e-3;
-  options.job.trainer.clip_norm = 1;
-  options.job.holdout_size = 4;
-  options.world.batch = 2;
-  options.world.windows.history = 6;
+/// The image encoder sees the oldest memory frame, as when imagining.
+WorldOptions ShownTheFirst(std::int64_t steps) {
+  WorldOptions options = Quick(steps);
   options.world.windows.first_image = true;
-  options.world.drop = 0;
   return options;
 }
 
@@ -79,7 +74,7 @@ class WorldStartTest : public testing::Test {
   }
   std::filesystem::path Weights(const std::string& out) const { return folder_ / out / "weights.safetensors"; }
   static std::string Train(const JobPlace& place, const WorldStart& start) {
-    return TrainWorld(place, Quick(1), start, {}).why;
+    return TrainWorld(place, ShownTheFirst(1), start, {}).why;
   }
 
   const TempFolder folder_;
@@ -130,7 +125,7 @@ TEST_F(WorldStartTest, TheHoldoutsLatentsAreOfTheSameCodec) {
 
 TEST_F(WorldStartTest, WhatIsNewBesideAForecastCountsNothingAtFirst) {
   const auto end = [&](const char* out, const nn::ModelConfig& config, double rate, const WorldStart& start) {
-    WorldOptions options = Quick(rate > 1e-9 ? 20 : 1);
+    WorldOptions options = ShownTheFirst(rate > 1e-9 ? 20 : 1);
     options.job.trainer.learning_rate = rate;
     options.job.trainer.holdout_every = options.job.trainer.steps;
     return TrainWorld({{folder_ / "shards"}, folder_ / out, config}, options, start, {}).best.value();
@@ -181,7 +176,7 @@ TEST_F(WorldStartTest, ATrainingGoesOnOnlyWithWhatItWasBegunWithAndAsManyThreads
          return TrainForecast(place, options).why;
        }},
       {"a world", [&](const JobPlace& place, std::int64_t parts) {
-         WorldOptions options = Quick(3);
+         WorldOptions options = ShownTheFirst(3);
          options.job.trainer.accumulate = parts;
          WorldStart start{Codec()};
          start.forecast = forecast;
@@ -217,7 +212,7 @@ TEST_F(WorldStartTest, ATrainingGoesOnOnlyWithWhatItWasBegunWithAndAsManyThreads
 
 TEST_F(WorldStartTest, AHoldoutOfNothingIsRefused) {
   const auto refused = ThrowsMessage<TensorError>(HasSubstr("holdout_size is 0, wanted at least 1"));
-  WorldOptions world = Quick(1);
+  WorldOptions world = ShownTheFirst(1);
   world.job.holdout_size = 0;
   EXPECT_THAT([&] { TrainWorld(Place("world", false), world, {.codec = Codec()}, {}); }, refused);
   CodecOptions codec = QuickCodec(1);
