@@ -31,6 +31,8 @@ class JudgeClipSource {
   virtual bool KnowsObjects() const { return true; }
   /// SHA-256 of the codec that `Reconstructed` shows; empty: there is none.
   virtual std::string Codec() const { return ""; }
+  /// What it made of these clips, in few letters, as `recipe` says what the clips are.
+  virtual std::string LatentsIdentity() const { return Codec(); }
   /// `Pictures` as the codec gives them back.
   virtual at::Tensor Reconstructed(const PackedClip&, const std::vector<std::int64_t>&) const {
     throw InternalError("these clips have no codec");

@@ -15,6 +15,7 @@ class ShardClips final : public JudgeClipSource {
   at::Tensor Pictures(const PackedClip& clip, const std::vector<std::int64_t>& rows) const override;
   at::Tensor Objects(const PackedClip& clip, const std::vector<std::int64_t>& rows) const override;
   std::string Codec() const override { return codec_ ? set_.shards.codec() : ""; }
+  std::string LatentsIdentity() const override { return set_.shards.LatentsIdentity(); }
   at::Tensor Reconstructed(const PackedClip& clip, const std::vector<std::int64_t>& rows) const override;
 
  private:

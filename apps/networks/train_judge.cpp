@@ -226,7 +226,7 @@ train::TrainerSummary TrainJudge(const train::JobPlace& place, const JudgeTraini
                                           BeginningOf(place, shape, options, data.init));
   const ClassifierNet& net = learners.net();
   const JudgeTraining training(data.learn, split.fit, options);
-  options.job.trainer.identity = IdentityOf(SettingsOf(options)) + data.learn.recipe + data.learn.Codec() +
+  options.job.trainer.identity = IdentityOf(SettingsOf(options)) + data.learn.recipe + data.learn.LatentsIdentity() +
                                  " workers " + std::to_string(learners.count()) + place.begun_with;
   train::Trainer trainer(learners.weights().all(), options.job.trainer, place.out);
   const auto loss = [&](const ClassifierNet& of, const train::StepPlace& at) { return training.Loss(of, at); };

@@ -30,6 +30,19 @@ TensorMetadata CardText(const PackedSet& set, const PolicyOptions& options, std:
   return card;
 }
 
+std::string KeptFile(std::int64_t step) { return fmt::format("policy_{:06}.safetensors", step); }
+
+/// A step that is done and was not kept then would never be.
+void CheckKept(const std::filesystem::path& folder, const std::vector<std::int64_t>& keep_steps, std::int64_t done) {
+  for (const std::int64_t step : keep_steps) {
+    if (step > done || std::filesystem::exists(folder / KeptFile(step))) continue;
+    throw InvalidInput(
+        "{}: step {} is to be kept, but the training has done {} and did not keep it: wanted a later step, or another "
+        "--out",
+        folder.string(), step, done);
+  }
+}
+
 }  // namespace
 
 train::TrainerSummary TrainPolicy(const train::JobPlace& place, const PolicyOptions& given, const ShardCodec* codec,
@@ -47,9 +60,10 @@ train::TrainerSummary TrainPolicy(const train::JobPlace& place, const PolicyOpti
   if (place.say) place.say(fmt::format("{} clips to imitate, {} to measure with", training.clips(), measuring.clips()));
   if (codec) card["codec"] = set.shards.codec();
   options.job.trainer.identity = IdentityOf(SettingsOf(options)) + set.shards.metadata().at("recipe") + " " +
-                                 (codec ? set.shards.codec() : "") + " workers " + std::to_string(learners.count()) +
+                                 set.shards.LatentsIdentity() + " workers " + std::to_string(learners.count()) +
                                  place.begun_with;
   train::Trainer trainer(learners.weights().all(), options.job.trainer, place.out);
+  CheckKept(place.out, keep_steps, trainer.step());
   const auto loss = [&](const LearnedNet& of, const train::StepPlace& at) { return training.Loss(of, at); };
   learners.Replicate(trainer, loss);
   const auto measure = [&] { return measuring.Measure(net, kMeasuredMoments); };
@@ -58,7 +72,7 @@ train::TrainerSummary TrainPolicy(const train::JobPlace& place, const PolicyOpti
     card["holdout"] = fmt::format("{:.6g}", measure());
     learners.Write(place.out / file, card);
   };
-  const auto keep = [&](std::int64_t step) { write(fmt::format("policy_{:06}.safetensors", step), step); };
+  const auto keep = [&](std::int64_t step) { write(KeptFile(step), step); };
   const train::TrainerSummary summary = trainer.Run({.loss = [&](const train::StepPlace& at) { return loss(net, at); },
                                                      .holdout = measure,
                                                      .keep_steps = keep_steps,

@@ -221,6 +221,18 @@ TEST_F(CodedJudgeTest, LatentsOfAnotherCodecAreRefused) {
               ThrowsMessage<TensorError>(HasSubstr("did not make the shards' latents")));
 }
 
+TEST_F(CodedJudgeTest, ATrainingGoesOnOnlyWithLatentsThatWereMadeAlike) {
+  const ShardCodec shard_codec(codec_, config_);
+  Train(Place("judge"), Quick(2), &shard_codec);
+  for (const auto& shard : train::ShardPaths(folder_ / "shards")) {
+    train::CheckpointWeights weights(codec_);
+    train::EncodeShard(nn::Vae(nn::Scope(weights, train::kCodecPrefix), config_), shard,
+                       {CodecSha256(codec_), Sha256HexOfFile(shard), "bfloat16"});
+  }
+  EXPECT_THAT([&] { Train(Place("judge"), Quick(2), &shard_codec); },
+              ThrowsMessage<TensorError>(HasSubstr("is a training with other options")));
+}
+
 TEST_F(CodedJudgeTest, AFileThatHoldsTheSameCodecAndMoreMadeTheSameLatents) {
   const TensorFile alone = TensorFile::Open(codec_);
   std::vector<TensorView> tensors = alone.tensors();

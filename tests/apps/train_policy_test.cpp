@@ -66,6 +66,14 @@ TEST_F(TrainPolicyTest, InterruptedAndGoneOnWithItEndsInTheSameBytes) {
     EXPECT_EQ(Sha256HexOfFile(folder_ / "parts" / file), Sha256HexOfFile(folder_ / "whole" / file)) << file;
 }
 
+TEST_F(TrainPolicyTest, AStepThatWasDoneWithoutBeingKeptIsRefused) {
+  TrainPolicy(Place("policy"), Quick(6), nullptr, {2});
+  EXPECT_TRUE(TrainPolicy(Place("policy"), Quick(6), nullptr, {2}).IsDone()) << "asked again";
+  for (const std::int64_t step : {4, 6})
+    EXPECT_THAT([&] { TrainPolicy(Place("policy"), Quick(6), nullptr, {2, step}); },
+                ThrowsMessage<Error>(HasSubstr("the training has done 6 and did not keep it"))) << step;
+}
+
 TEST_F(TrainPolicyTest, OnlySuccessesOfTheWantedBehavioursAreImitated) {
   const PackedSet set({folder_ / "shards"}, train::Split::kTrain);
   EXPECT_EQ(PolicyTraining(set, Quick(1), nullptr).clips(), set.clips.size() / 2);
@@ -150,10 +158,17 @@ TEST_F(TrainPolicyTest, ItIsShownWhatTheCodecGivesBackAndNoOtherCodecsLatents) {
   TrainPolicy(Place("policy"), Quick(2), &codec, {});
   EXPECT_EQ(WeightFile(folder_ / "policy" / "policy.safetensors", kLearnedFormat).Text("codec"),
             CodecSha256(weights));
-  for (const auto& shard : train::ShardPaths(folder_ / "shards")) {
-    train::CheckpointWeights again(weights);
-    train::EncodeShard(nn::Vae(nn::Scope(again, train::kCodecPrefix), LearningCodec()), shard, {"another", Sha256HexOfFile(shard)});
-  }
+  const auto encode = [&](const std::string& as, const std::string& products) {
+    for (const auto& shard : train::ShardPaths(folder_ / "shards")) {
+      train::CheckpointWeights again(weights);
+      train::EncodeShard(nn::Vae(nn::Scope(again, train::kCodecPrefix), LearningCodec()), shard,
+                         {as, Sha256HexOfFile(shard), products});
+    }
+  };
+  encode(CodecSha256(weights), "bfloat16");
+  EXPECT_THAT([&] { TrainPolicy(Place("policy"), Quick(2), &codec, {}); },
+              ThrowsMessage<TensorError>(HasSubstr("is a training with other options"))) << "latents made otherwise";
+  encode("another", "float32");
   EXPECT_THAT([&] { TrainPolicy(Place("refused"), Quick(2), &codec, {}); },
               ThrowsMessage<TensorError>(HasSubstr("did not make the shards' latents")));
 }

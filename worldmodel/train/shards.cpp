@@ -269,6 +269,14 @@ void ShardSet::OpenLatents(std::int64_t z, std::int64_t stride) {
   if (std::set<std::string>(products_.begin(), products_.end()).size() == 1) products_.resize(1);
 }
 
+std::string ShardSet::LatentsIdentity() const {
+  std::string text = codec_;
+  if (products_.empty() || products_ == std::vector<std::string>{"float32"}) return text;
+  text += " products";
+  for (const std::string& products : products_) text += " " + products;
+  return text;
+}
+
 void ShardSet::OpenVariants() {
   variants_.clear();
   variants_hash_ = 0;

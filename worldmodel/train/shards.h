@@ -81,6 +81,8 @@ class ShardSet {
   const std::string& codec() const { return codec_; }
   /// What the open latents were computed with, of each shard; once where that is the same of all.
   const std::vector<std::string>& products() const { return products_; }
+  /// The open latents in few letters: trainings on others are told apart by it. Empty: none are open.
+  std::string LatentsIdentity() const;
   /// Of all bytes of the open variants' files: other variants have another. 0: there are none.
   std::uint64_t variants_hash() const { return variants_hash_; }
 

@@ -84,15 +84,6 @@ void Save(const std::filesystem::path& path, const TrainableWeights& weights, co
   nn::SaveWeights(path, given, config, options);
 }
 
-/// What a training on these shards and their latents is a training on.
-std::string IdentityOf(const ShardSet& shards) {
-  std::string text = shards.metadata().at("recipe") + " " + shards.codec();
-  if (shards.products() == std::vector<std::string>{"float32"}) return text;
-  text += " products";
-  for (const std::string& products : shards.products()) text += " " + products;
-  return text;
-}
-
 void CheckShards(const ShardSet& shards, const nn::ModelConfig& config, const WorldStart& start) {
   nn::CheckShape("the shards' pictures", shards.shards().front().frames,
                  {-1, config.views, config.image_height_px, config.image_width_px, 3});
@@ -173,7 +164,8 @@ TrainerSummary TrainWorld(const JobPlace& place, const WorldOptions& given, cons
   const WorldTraining measuring(model, holdout, all);
   const std::vector<Window> windows = measuring.sampler().Spread(options.job.holdout_size),
                             drawn = measuring.sampler().Spread(kStripWindows);
-  options.job.trainer.identity = IdentityOf(SettingsOf(options)) + IdentityOf(shards) + IdentityOf(place, options.job);
+  options.job.trainer.identity = IdentityOf(SettingsOf(options)) + shards.metadata().at("recipe") + " " +
+                                 shards.LatentsIdentity() + IdentityOf(place, options.job);
   Trainer trainer(TrainedParameters(weights, place.config, options.world), options.job.trainer, place.out);
   for (std::size_t i = 1; i < workers.size(); ++i)
     trainer.AddReplica({TrainedParameters(workers[i].weights, place.config, options.world),
