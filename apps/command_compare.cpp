@@ -110,13 +110,26 @@ void Keep(const std::vector<SequentialLook>& looks, const std::string& run) {
   }
 }
 
-/// This look's bets, and what was kept of the looks before; only what has changed since is a new look.
-std::vector<BetState> Bet(const ComparedWorld& compared, const std::string& run) {
+/// What a look is kept under, in the first one's run. What was seen against one run is no evidence against another, so
+/// it names that one, by suite and folder: one suite is run more than once. Judges by their full names, of both runs
+/// where they differ.
+std::string NameOfLooks(const ComparedWorld& compared, const JudgedRun& first, const JudgedRun& second) {
   const PolicyComparison& comparison = compared.comparison;
+  const std::string &judge = first.summary.options.judge, &other_judge = second.summary.options.judge;
+  std::string other_run;
+  if (!std::filesystem::equivalent(first.folder, second.folder)) {
+    other_run = fmt::format(" of {:.16} at {}", second.summary.data.run.suite_hash,
+                            std::filesystem::canonical(second.folder).string());
+  }
+  return fmt::format("{} against {}{} in {}, judge {}{}", comparison.first, comparison.second, other_run,
+                     compared.world, judge, other_judge == judge ? "" : " and " + other_judge);
+}
+
+/// This look's bets, and what was kept under `name` of the looks before in `run`; only what has changed since is a new
+/// look.
+std::vector<BetState> Bet(const PolicyComparison& comparison, const std::string& name, const std::string& run) {
   std::vector<ComparisonRow> rows = comparison.tasks;
   if (rows.size() > 1) rows.push_back(comparison.all);
-  const std::string name =
-      fmt::format("{} against {} in {}, judge {}", comparison.first, comparison.second, compared.world, compared.judge);
   const std::vector<SequentialLook> before = Store::Open(run, Store::Mode::kReadOnly).Looks();
   std::vector<SequentialLook> added;
   std::vector<BetState> bets;
@@ -158,7 +171,7 @@ void Compare(const CompareArguments& arguments) {
       right.name = second.run + ":" + b;
     }
     ComparedWorld compared{world, arguments.judge, ComparePolicies(left, right, arguments.options), {}};
-    if (arguments.sequential) compared.bets = Bet(compared, first.run);
+    if (arguments.sequential) compared.bets = Bet(compared.comparison, NameOfLooks(compared, one, two), first.run);
     if (!arguments.json) fmt::print("{}{}", all["worlds"].empty() ? "" : "\n", ComparisonText(compared));
     all["worlds"].push_back(ComparisonJson(compared));
   }

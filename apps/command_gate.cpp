@@ -133,13 +133,17 @@ void AddGate(CLI::App& app, ExitCode& exit_code) {
       app.add_subcommand("gate", "Decide by rules whether a candidate is good enough: pass, fail or inconclusive.");
   command->require_subcommand(0, 1);
   command->add_option("RULES", arguments->rules, "the rules")->type_name("RULES.yaml");
-  command->add_option("RUN", arguments->run, "folder of the candidate's run; without: only how many episodes it takes");
+  CLI::Option* run = command->add_option("RUN", arguments->run,
+                                         "folder of the candidate's run; without: only how many episodes it takes");
   command->add_option("--baseline", arguments->baseline, "what to compare with: a run, or what `evac gate pin` wrote")
       ->type_name("RUN|PINNED.json");
   command->add_option("--out", arguments->out, "also junit.xml, summary.md, badge.svg and gate.json, into this folder")
+      ->needs(run)
       ->type_name("FOLDER");
-  command->add_option("--seed", arguments->options.bootstrap_seed, "of the bootstrap")->capture_default_str();
-  command->add_flag("--json", arguments->json, "for programs: docs/formats/gate_json.md");
+  command->add_option("--seed", arguments->options.bootstrap_seed, "of the bootstrap")
+      ->needs(run)
+      ->capture_default_str();
+  command->add_flag("--json", arguments->json, "for programs: docs/formats/gate_json.md")->needs(run);
   command->footer(
       "Examples:\n"
       "  evac gate pin out/main --out baseline.json\n"

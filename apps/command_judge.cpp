@@ -1,6 +1,7 @@
 #include <fmt/format.h>
 
 #include <memory>
+#include <utility>
 
 #include "apps/commands.h"
 #include "apps/interrupts.h"
@@ -25,6 +26,25 @@ struct JudgeArguments {
   VlmJudgeArguments vlm{};
 };
 
+/// An option that does nothing is a slip: who asks what a judgement would cost wants none given.
+void RefuseWhatMeansNothing(const JudgeArguments& arguments) {
+  const VlmJudgeArguments& vlm = arguments.vlm;
+  if (arguments.judge == "vlm") {
+    if (!arguments.weights.empty())
+      throw InvalidInput("--weights: a model server has its own, wanted --judge classifier");
+    return;
+  }
+  const std::pair<const char*, bool> given[] = {{"--config", !vlm.config.empty()},
+                                                {"--dry-run", vlm.dry_run},
+                                                {"--offline", vlm.offline},
+                                                {"--retest", vlm.retest}};
+  for (const auto& [option, is_given] : given) {
+    if (is_given)
+      throw InvalidInput("{}: is of a vision-language model alone; found --judge {}, wanted --judge vlm", option,
+                         arguments.judge);
+  }
+}
+
 ExitCode RateWithVlm(const JudgeArguments& arguments) {
   VlmJudgeArguments vlm = arguments.vlm;
   if (vlm.config.empty()) throw InvalidInput("--judge vlm: wanted --config PAGE.yaml as well (docs/vlm_judge.md)");
@@ -46,6 +66,7 @@ std::unique_ptr<Judge> MakeJudge(const JudgeArguments& arguments, const Store& s
 
 ExitCode Rate(const JudgeArguments& arguments) {
   if (arguments.run.empty()) throw InvalidInput("wanted the run's folder: evac judge RUN --judge NAME");
+  RefuseWhatMeansNothing(arguments);
   if (arguments.judge == "vlm") return RateWithVlm(arguments);
   if (arguments.judge == "classifier") NeedNetworks();
   Store store = Store::Open(arguments.run, Store::Mode::kReadWrite);

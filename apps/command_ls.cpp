@@ -9,6 +9,7 @@
 
 #include "apps/commands.h"
 #include "core/store.h"
+#include "reports/counted_judges.h"
 #include "reports/tally.h"
 #include "reports/text_table.h"
 #include "reports/wording.h"
@@ -24,6 +25,7 @@ struct LsArguments {
   bool failed = false;
   bool rates = false;
   std::string judge = "oracle";  ///< whose verdicts the rates count
+  bool names_judge = false;      ///< somebody asked for that one
   std::string world, task, policy;  ///< empty: all
 };
 
@@ -160,12 +162,26 @@ void PrintTable(const std::vector<Listed>& list) {
              counted(worlds.size(), "world", "worlds"), failed, judged);
 }
 
+/// The full name of the one judge whose verdicts are counted. Nobody need have judged a run that only just began; but
+/// who names a judge wants that one.
+std::string JudgeOf(const LsArguments& arguments, const Store& store) {
+  if (arguments.judge.find(',') != std::string::npos)
+    throw InvalidInput("--judge: found {}, wanted one judge; `evac report` counts the first of several who can tell",
+                       arguments.judge);
+  const std::vector<std::string> judges = store.Judges();
+  const std::string full = FullJudgeNames(arguments.judge, judges);
+  if (!arguments.names_judge) return full;
+  if (judges.empty()) throw InvalidInput("--judge: found '{}', but nobody has judged this run yet", arguments.judge);
+  DemandKnown("--judge", full, {judges.begin(), judges.end()});
+  return full;
+}
+
 /// Rates of a run of any length: counted while its rows are read.
 void PrintRates(const LsArguments& arguments) {
   const Store store = Store::Open(arguments.run, Store::Mode::kReadOnly);
   Check(arguments, store);
   std::vector<Row> rows = {{"TASK", "POLICY", "WORLD", "EPISODES", "RATE", "NOT COUNTED"}};
-  for (const RateCell& cell : TallyRates(store, arguments.judge, SummaryOptions().confidence)) {
+  for (const RateCell& cell : TallyRates(store, JudgeOf(arguments, store), SummaryOptions().confidence)) {
     const std::string policy = cell.policy.substr(0, cell.policy.find('@'));
     if ((!arguments.world.empty() && cell.world != arguments.world) ||
         (!arguments.task.empty() && cell.task != arguments.task) ||
@@ -190,7 +206,8 @@ void AddLs(CLI::App& app, ExitCode& exit_code) {
   command->add_flag("--json", arguments->json, "an array with one object per episode");
   command->add_flag("--failed", arguments->failed, "only episodes that failed (an error, not an unsuccessful attempt)");
   const auto rates = command->add_flag("--rates", arguments->rates, "success rates with 95 % intervals instead of episodes");
-  command->add_option("--judge", arguments->judge, "whose verdicts the rates count")->needs(rates)->capture_default_str();
+  const auto judge = command->add_option("--judge", arguments->judge, "whose verdicts the rates count: one judge's");
+  judge->needs(rates)->capture_default_str();
   command->add_option("--world", arguments->world, "only this world's");
   command->add_option("--task", arguments->task, "only this task's");
   command->add_option("--policy", arguments->policy, "only this policy's, with all its checkpoints");
@@ -201,7 +218,8 @@ void AddLs(CLI::App& app, ExitCode& exit_code) {
       "  evac ls out/demo --rates --task take_bottle\n"
       "  evac ls out/demo --json | jq '.[] | select(.verdicts.oracle == \"success\") | .video'");
   rates->excludes("--json", "--failed");
-  command->callback([arguments, &exit_code] {
+  command->callback([arguments, judge, &exit_code] {
+    arguments->names_judge = judge->count() > 0;
     exit_code = ExitCode::kOk;
     if (arguments->rates) return PrintRates(*arguments);
     const Listing list = List(*arguments);

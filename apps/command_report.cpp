@@ -91,10 +91,10 @@ void AddReport(CLI::App& app, ExitCode& exit_code) {
   CLI::App* command =
       app.add_subcommand("report", "Write what a run found: a page that opens from disk, and the same for programs.");
   command->add_option("RUN", arguments->run, "folder of a run");
-  command
-      ->add_option("--pairs", arguments->pairs,
-                   "instead of a run: a CSV of rates, group,task,policy,real_sr,sim_sr (docs/formats/pairs_csv.md)")
-      ->type_name("FILE.csv");
+  CLI::Option* pairs = command->add_option(
+      "--pairs", arguments->pairs,
+      "instead of a run: a CSV of rates, group,task,policy,real_sr,sim_sr (docs/formats/pairs_csv.md)");
+  pairs->type_name("FILE.csv");
   command->add_option("--judge", arguments->options.judge, "whose verdicts are counted; with commas, of each episode the first who can tell: oracle,classifier")->capture_default_str();
   command->add_option("--out", arguments->out, "into this folder (default: RUN/report)")->type_name("FOLDER");
   command
@@ -104,6 +104,7 @@ void AddReport(CLI::App& app, ExitCode& exit_code) {
   command->add_option("--seed", arguments->options.bootstrap_seed, "of the bootstrap")->capture_default_str();
   command->add_flag("--embed-thumbs", arguments->embed_thumbs,
                     "thumbnails inside the page: it can be sent alone, without the videos");
+  pairs->excludes("--judge", "--baseline", "--seed", "--embed-thumbs");  // a table has no episodes
   command->footer(
       "Examples:\n"
       "  evac report out/demo\n"

@@ -1,7 +1,10 @@
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <cctype>
 #include <cstdio>
 #include <memory>
+#include <string_view>
 
 #include "apps/commands.h"
 #include "apps/evaluate.h"
@@ -21,6 +24,7 @@ RunInfo InfoOf(const Suite& suite) {
 struct RunArguments {
   std::string suite, out;
   std::vector<std::string> assignments;
+  bool retry_failed = false;
   std::string shard = "1/1";
 };
 
@@ -40,27 +44,58 @@ Shard ShardNamed(const std::string& text) {
   throw InvalidInput("--shard: found '{}', wanted which of how many, such as 2/4", text);
 }
 
+/// As a shell reads it back: `judges=[oracle]` would else be a pattern.
+std::string ForShell(const std::string& word) {
+  const bool is_plain = !word.empty() && std::ranges::all_of(word, [](unsigned char c) {
+    return std::isalnum(c) || std::string_view("_-./=,:@+%").find(static_cast<char>(c)) != std::string_view::npos;
+  });
+  if (is_plain) return word;
+  std::string quoted = "'";
+  for (const char c : word) quoted += c == '\'' ? "'\\''" : std::string(1, c);
+  return quoted + "'";
+}
+
+/// What goes on with the run as it goes now. `evac resume` goes by the suite as the run began with it: a deadline that was
+/// changed since, which the hash leaves out, would be the old one again.
+std::string CommandAgain(const RunArguments& arguments, const Suite& suite, const Store& store) {
+  if (store.run().suite_text == suite.text) return "";
+  std::string command = fmt::format("evac run {} --out {}", ForShell(arguments.suite), ForShell(arguments.out));
+  for (const std::string& assignment : arguments.assignments) command += " --set " + ForShell(assignment);
+  return command;
+}
+
 ExitCode Run(const RunArguments& arguments) {
   Suite suite = ReadSuite(arguments.suite, arguments.assignments);
   const Shard shard = ShardNamed(arguments.shard);
   NeedNetworksFor(suite);
   Store store = Store::CreateOrContinue(arguments.out, InfoOf(suite));
   FillInRecordedTask(suite);
-  return Evaluate(suite, store, {.shard = shard});
+  return Evaluate(suite, store,
+                  {.shard = shard, .retry_failed = arguments.retry_failed, .go_on = CommandAgain(arguments, suite, store)});
+}
+
+/// @throws InvalidInput where lanes would measure each other, as in a suite that says so many.
+void TakeLanes(int lanes, Suite& suite) {
+  if (lanes > 1 && suite.latency.kind == PolicyLatency::Kind::kMeasured)
+    throw InvalidInput("--lanes: found {}, wanted 1 with the suite's `policy.latency: measured`: else one episode's thinking is "
+                       "another's waiting, and is measured too", lanes);
+  if (lanes > 0) suite.lanes = lanes;
 }
 
 ExitCode Resume(const ResumeArguments& arguments) {
+  const Shard shard = ShardNamed(arguments.shard);
   const RunInfo info = Store::Open(arguments.run, Store::Mode::kReadOnly).run();
   Suite suite = ParseSuite(info.suite_text, info.suite_path);
   if (suite.hash != info.suite_hash) {
     throw InvalidInput("{}: a file that the suite {} names has changed since the run began (suite hash {:.12}…, was {:.12}…); "
                        "start a new run with `evac run`", arguments.run, info.suite_path, suite.hash, info.suite_hash);
   }
+  TakeLanes(arguments.lanes, suite);
   NeedNetworksFor(suite);
-  if (arguments.lanes > 0) suite.lanes = arguments.lanes;
   Store store = Store::CreateOrContinue(arguments.run, info);
   FillInRecordedTask(suite);
-  return Evaluate(suite, store, {.shard = ShardNamed(arguments.shard), .retry_failed = arguments.retry_failed});
+  const std::string go_on = arguments.lanes > 0 ? fmt::format("evac resume {} --lanes {}", ForShell(arguments.run), arguments.lanes) : "";
+  return Evaluate(suite, store, {.shard = shard, .retry_failed = arguments.retry_failed, .go_on = go_on});
 }
 
 }  // namespace
@@ -71,6 +106,7 @@ void AddRun(CLI::App& app, ExitCode& exit_code) {
   command->add_option("suite", arguments->suite, "the suite's YAML file (docs/suite.md)")->required();
   command->add_option("-o,--out", arguments->out, "the run's folder; one that is there is continued")->required();
   command->add_option("--set", arguments->assignments, "override a field: path.to.field=VALUE (repeatable)")->expected(1)->take_all();
+  command->add_flag("--retry-failed", arguments->retry_failed, "run the failed episodes of a run that is there again");
   command->add_option("--shard", arguments->shard, "run only part I of N of the episodes: I/N (join the parts with evac merge)");
   command->footer("Examples:\n"
                   "  evac run apps/configs/demo.yaml --out out/demo\n"

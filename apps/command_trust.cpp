@@ -2,14 +2,12 @@
 
 #include <cstdio>
 #include <memory>
-#include <nlohmann/json.hpp>
 #include <string>
 #include <vector>
 
 #include "apps/commands.h"
 #include "core/store.h"
-#include "reports/trust_output.h"
-#include "reports/wording.h"
+#include "reports/trust_worlds.h"
 
 namespace evac {
 namespace {
@@ -36,18 +34,9 @@ void PrintTrust(const TrustArguments& arguments) {
   options.judge = arguments.judge;
   options.bootstrap_replicates = 1;  // its correlations are not shown
   const RunSummary summary = Summarise(ReadRun(store), options);
-  const std::vector<RealTrial> imported = store.RealTrials();
-  const std::string real = imported.empty()
-                               ? "the world " + summary.reference
-                               : Counted(static_cast<std::int64_t>(imported.size()), "imported real trial");
-  nlohmann::ordered_json all = {{"schema", 1}, {"worlds", nlohmann::ordered_json::array()}};
-  for (const std::string& world : ModelWorlds(summary, arguments.world)) {
-    const TrustReport report{world, real, arguments.judge, arguments.options,
-                             TrustOf(TrustInputOf(summary, imported, world), arguments.options)};
-    if (!arguments.json) fmt::print("{}{}", all["worlds"].empty() ? "" : "\n", TrustText(report));
-    all["worlds"].push_back(TrustJson(report));
-  }
-  if (arguments.json) fmt::print("{}\n", all.dump(2));
+  const WorldsTrust trust = TrustOfWorlds(summary, ModelWorlds(summary, arguments.world), arguments.options);
+  if (trust.worlds.empty()) throw InvalidInput("trust: {}", WhyNothingIsSaid(trust.unsaid));
+  fmt::print("{}", arguments.json ? TrustJson(trust).dump(2) + "\n" : TrustText(trust));
 }
 
 }  // namespace
@@ -71,7 +60,7 @@ void AddTrust(CLI::App& app, ExitCode& exit_code) {
       "Examples:\n"
       "  evac trust out/demo\n"
       "  evac trust out/demo --world sim --margin 0.15 --json\n"
-      "Unknown is an answer: the exit code is 0.");
+      "Unknown is an answer: the exit code is 0. A world that nobody could judge is named with the reason.");
   command->callback([arguments, &exit_code] {
     PrintTrust(*arguments);
     exit_code = ExitCode::kOk;

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cstdio>
 #include <memory>
 #include <set>
@@ -10,6 +11,7 @@
 #include "apps/interrupts.h"
 #include "apps/progress_display.h"
 #include "core/seed.h"
+#include "core/version.h"
 #include "harness/rollout.h"
 #include "harness/scheduler.h"
 #include "harness/start_probe.h"
@@ -57,15 +59,28 @@ Plan MakePlan(const Suite& suite, const Shard& shard, const Store& store) {
       plan.missing += static_cast<int>(MissingJobs(jobs, store).size());
     }
   }
-  for (const Episode& episode : store.Episodes()) plan.failed += IsFailure(episode.stop);
+  for (const Episode& episode : store.Episodes()) plan.failed += IsFailure(episode.stop) && shard.Holds(episode.key.pair);
   plan.allowed = static_cast<int>(suite.error_budget * plan.total);
   return plan;
 }
 
-void RetryFailed(Store& store) {
+void RetryFailed(const Shard& shard, Store& store) {
   for (const Episode& episode : store.Episodes()) {
-    if (IsFailure(episode.stop)) store.RemoveFailed(episode.key);
+    if (IsFailure(episode.stop) && shard.Holds(episode.key.pair)) store.RemoveFailed(episode.key);
   }
+}
+
+/// What whoever reads the run may want to know, and no reason to refuse it.
+void SayIfAnotherVersionBegan(const Store& store) {
+  const std::string began = store.run().evac_version;
+  if (began != EVAC_VERSION)
+    Tell("evac: note: {} was begun by evac {}; evac {} goes on with it\n", store.folder().string(), began, EVAC_VERSION);
+}
+
+/// What goes on with this run as it was asked for.
+std::string GoOn(const EvaluateOptions& options, const Store& store, bool retry_failed) {
+  const std::string command = options.go_on.empty() ? fmt::format("evac resume {}", store.folder().string()) : options.go_on;
+  return command + (retry_failed ? " --retry-failed" : "") + options.shard.Option();
 }
 
 /// Before whatever may take seconds: who waits at the keyboard is not to wait for it.
@@ -78,6 +93,19 @@ class Evaluation {
  public:
   Evaluation(const Suite& suite, const Shard& shard, Store& store)
       : suite_(suite), shard_(shard), store_(store), plan_(MakePlan(suite, shard, store)), display_(plan_.total, plan_.total - plan_.missing, stderr) {}
+
+  /// A policy that cannot be started or does not fit ends the run before its first episode: the suite that is mended is
+  /// another one, and begins anew. Whoever runs first is greeted then, before any episode too.
+  void GreetPolicies() const {
+    const std::vector<const SuitePolicy*> to_run = PoliciesToRun();
+    for (const SuitePolicy* policy : to_run) {
+      if (!policy->command.empty()) CommandLine(*policy, suite_);
+    }
+    for (std::size_t i = 1; i < to_run.size(); ++i) {
+      EndIfInterrupted();
+      const RunningPolicy greeted(*to_run[i], suite_, store_.folder(), IsInterrupted);
+    }
+  }
 
   /// One world under every policy. @returns false if the run must end.
   bool RunWorld(const SuiteWorld& suite_world) {
@@ -105,6 +133,18 @@ class Evaluation {
   const Plan& plan() const { return plan_; }
 
  private:
+  /// Those with an episode to do, whose turn comes first at the front.
+  std::vector<const SuitePolicy*> PoliciesToRun() const {
+    std::vector<const SuitePolicy*> policies;
+    for (const SuiteWorld& world : RealFirst(suite_.worlds)) {
+      for (const SuitePolicy& policy : suite_.policies) {
+        const bool is_there = std::ranges::find(policies, &policy) != policies.end();
+        if (!is_there && !MissingJobs(JobsOf(suite_, shard_, world, policy), store_).empty()) policies.push_back(&policy);
+      }
+    }
+    return policies;
+  }
+
   /// A task page that the world cannot start from ends the run here, once, and not in every episode.
   std::unique_ptr<World> MakeCheckedWorld(const SuiteWorld& suite_world, const SuitePolicy& policy) {
     std::unique_ptr<World> world = MakeWorld(suite_world, suite_, &store_);
@@ -167,17 +207,17 @@ class Evaluation {
   std::string why_ended_;
 };
 
+/// A suite names the oracle or nobody.
 void RunJudges(const Suite& suite, Store& store) {
-  for (const std::string& name : suite.judges) {
-    if (name != "oracle") throw InvalidInput("{}: field judges: found '{}', wanted oracle", suite.path.string(), name);
-    OracleJudge oracle(store);
-    JudgeEpisodes(oracle, store, {.interrupted = IsInterrupted});
-  }
+  if (suite.judges.empty()) return;
+  OracleJudge oracle(store);
+  JudgeEpisodes(oracle, store, {.interrupted = IsInterrupted});
 }
 
 /// @returns why it ended before its last episode, or nothing.
-std::string RunWorlds(const Suite& suite, const Shard& shard, Store& store) try {
-  Evaluation evaluation(suite, shard, store);
+std::string RunWorlds(const Suite& suite, const EvaluateOptions& options, Store& store) try {
+  Evaluation evaluation(suite, options.shard, store);
+  evaluation.GreetPolicies();
   for (const SuiteWorld& world : RealFirst(suite.worlds)) {
     if (!evaluation.RunWorld(world)) break;
   }
@@ -185,22 +225,25 @@ std::string RunWorlds(const Suite& suite, const Shard& shard, Store& store) try 
 } catch (const Error& error) {
   if (IsInterrupted()) return "interrupted";
   if (error.exit_code() != ExitCode::kInternal) throw;
-  throw InternalError("{}\n      what was stored is intact; once that is mended, go on with: evac resume {}", error.what(), store.folder().string());
+  throw InternalError("{}\n      what was stored is intact; once that is mended, go on with: {}", error.what(), GoOn(options, store, false));
 }
 
 }  // namespace
 
 bool Shard::Holds(const PairKey& pair) const {
-  const std::string name = fmt::format("{} {} {} {} {}", pair.task, pair.initial_state, pair.policy, pair.checkpoint, pair.seed);
+  const std::string name = fmt::format("{} {} {} {}", pair.task, pair.initial_state, pair.policy, pair.checkpoint);
   return SeedFor(0, name) % static_cast<std::uint64_t>(of) == static_cast<std::uint64_t>(number - 1);
 }
 
+std::string Shard::Option() const { return of == 1 ? std::string() : fmt::format(" --shard {}/{}", number, of); }
+
 ExitCode Evaluate(const Suite& suite, Store& store, const EvaluateOptions& options) {
   const CatchInterrupts catch_interrupts;
-  if (options.retry_failed) RetryFailed(store);
+  SayIfAnotherVersionBegan(store);
+  if (options.retry_failed) RetryFailed(options.shard, store);
   store.RemoveOrphans();
   Declare(suite, store);
-  std::string why_ended = RunWorlds(suite, options.shard, store);
+  std::string why_ended = RunWorlds(suite, options, store);
   if (!IsInterrupted()) RunJudges(suite, store);
   if (why_ended.empty() && IsInterrupted()) why_ended = "interrupted";
   const Plan now = MakePlan(suite, options.shard, store);
@@ -209,7 +252,7 @@ ExitCode Evaluate(const Suite& suite, Store& store, const EvaluateOptions& optio
     why_ended = fmt::format("{} episodes failed, {} of {} may (error_budget {})", now.failed, now.allowed, now.total, suite.error_budget);
   }
   if (why_ended.empty()) return ExitCode::kOk;
-  Tell("evac: {}\n      go on with: evac resume {}{}\n", why_ended, store.folder().string(), now.failed > 0 ? " --retry-failed" : "");
+  Tell("evac: {}\n      go on with: {}\n", why_ended, GoOn(options, store, now.failed > 0));
   return ExitCode::kInternal;
 }
 

@@ -9,21 +9,25 @@
 
 namespace evac {
 
-/// One part of a run's episodes. Which part an episode is in depends on its pair key alone, so that pairs stay together, and on
-/// nothing that could go with its difficulty.
+/// One part of a run's episodes. Which part an episode is in depends on its pair key without the seed: so pairs stay together,
+/// and so do a state's repeats, all of which are imagined from the first frame that the real world showed with the lowest
+/// seed; and on nothing that could go with its difficulty.
 struct Shard {
   int number = 1, of = 1;
   bool Holds(const PairKey& pair) const;
+  /// " --shard 2/4"; nothing where it is the whole.
+  std::string Option() const;
 };
 
 struct EvaluateOptions {
   Shard shard;
-  bool retry_failed = false;  ///< failed episodes are removed first, and so run again
+  bool retry_failed = false;  ///< the shard's failed episodes are removed first, and so run again
+  std::string go_on = "";     ///< the command that goes on with this run, without its shard; empty: `evac resume` alone does
 };
 
-/// Runs every episode of the suite that `store` does not have, judges them, and says on stderr what it does.
+/// Runs every episode of the suite's shard that `store` does not have, judges what is there, and says on stderr what it does.
 /// @returns kOk: every job has a row and the error budget holds; kInternal: interrupted, or the budget is spent.
-/// @throws InvalidInput before the first episode if a policy does not fit the suite.
+/// @throws InvalidInput before the first episode if a policy cannot be started or does not fit the suite.
 ExitCode Evaluate(const Suite& suite, Store& store, const EvaluateOptions& options);
 
 }  // namespace evac

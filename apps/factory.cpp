@@ -10,7 +10,6 @@
 
 #include "apps/network_parts.h"
 #include "core/config.h"
-#include "core/recording.h"
 #include "judges/oracle_judge.h"
 #include "worldmodel/echo_world.h"
 #include "worldmodel/sim/mujoco_world.h"
@@ -45,13 +44,22 @@ std::string Filled(std::string word, const Suite& suite) {
   return word.replace(at, variable.size(), fs::absolute(*suite.recording).lexically_normal().string());
 }
 
+/// EVAC_PERIOD_S is said where there is one task, a recording's: whoever replays it takes the same steps of it as the
+/// worlds do.
 PolicyProcessOptions ProcessOptions(const SuitePolicy& policy, const Suite& suite, const fs::path& run_folder, const LcmAddress& address) {
   const fs::path log = run_folder / "logs" / (policy.name + "@" + policy.checkpoint + ".log");
   fs::create_directories(log.parent_path());
-  return {.command = CommandLine(policy, suite),
-          .environment = {{"EVAC_LCM_URL", address.url}, {"EVAC_TOKEN", address.token}, {"EVAC_CHUNK_SIZE", std::to_string(suite.chunk_size)}},
-          .working_directory = fs::absolute(suite.path).parent_path(),
-          .log = log};
+  PolicyProcessOptions options{
+      .command = CommandLine(policy, suite),
+      .environment = {{"EVAC_LCM_URL", address.url}, {"EVAC_TOKEN", address.token}, {"EVAC_CHUNK_SIZE", std::to_string(suite.chunk_size)}},
+      .working_directory = fs::absolute(suite.path).parent_path(),
+      .log = log};
+  if (suite.recording) options.environment["EVAC_PERIOD_S"] = fmt::format("{}", suite.tasks.front().period_s);
+  return options;
+}
+
+bool HasNetwork(const Suite& suite) {
+  return std::ranges::any_of(suite.worlds, [](const SuiteWorld& world) { return world.evac.has_value(); });
 }
 
 /// One that nobody has ever used, so that no policy left over from yesterday listens there: in a container even process
@@ -73,9 +81,13 @@ void CheckAllTasks(const Suite& suite, const PolicySpec& declared) {
 
 }  // namespace
 
+Recording RecordingOf(const Suite& suite) {
+  return HasNetwork(suite) ? ReadAsTrained(suite) : ReadRecording(*suite.recording);
+}
+
 void FillInRecordedTask(Suite& suite) {
   if (!suite.recording || !suite.tasks.empty()) return;
-  suite.tasks = {TaskFromRecording(ReadRecording(*suite.recording))};
+  suite.tasks = {TaskFromRecording(RecordingOf(suite))};
 }
 
 void CheckRubrics(const Suite& suite) {
@@ -109,12 +121,12 @@ int Threads(const Suite& suite) {
 }
 
 void NeedNetworksFor(const Suite& suite) {
-  if (std::ranges::any_of(suite.worlds, [](const SuiteWorld& world) { return world.evac.has_value(); })) NeedNetworks();
+  if (HasNetwork(suite)) NeedNetworks();
 }
 
 std::unique_ptr<World> MakeWorld(const SuiteWorld& world, const Suite& suite, const Store* store) {
   if (world.type == "evac") return MakeEvacWorld(world, suite, store);
-  if (world.type == "echo") return std::make_unique<EchoWorld>(ReadRecording(*suite.recording));
+  if (world.type == "echo") return std::make_unique<EchoWorld>(RecordingOf(suite));
   return std::make_unique<sim::MujocoWorld>(
       sim::MujocoWorldOptions{.name = world.name, .profile = world.profile, .threads = Threads(suite), .film = world.film});
 }

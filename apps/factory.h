@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "core/recording.h"
 #include "core/store.h"
 #include "core/world.h"
 #include "harness/policy_process.h"
@@ -16,6 +17,11 @@
 namespace evac {
 
 /// Suite entries become things: this is where modules meet.
+
+/// The recording that a suite is about, as all its worlds take it: as their networks were trained to see it (one in so
+/// many steps, some of its cameras), and whole where no world is a network.
+/// @throws InvalidInput as ReadRecording and ReadAsTrained
+Recording RecordingOf(const Suite& suite);
 
 /// The task of a suite that replays a recording is made from it; other suites are left as they are.
 void FillInRecordedTask(Suite& suite);

@@ -10,11 +10,15 @@ namespace {
 std::atomic<bool> g_interrupted = false;
 static_assert(std::atomic<bool>::is_always_lock_free);
 
+/// How many are alive: one inside another is a part of its work.
+int g_catching = 0;
+
 constexpr int kInterrupts[] = {SIGINT, SIGTERM, SIGHUP};
 
 }  // namespace
 
 CatchInterrupts::CatchInterrupts() {
+  if (g_catching++ > 0) return;
   g_interrupted = false;
   for (const int signal : kInterrupts) {
     std::signal(signal, [](int caught) {
@@ -25,6 +29,7 @@ CatchInterrupts::CatchInterrupts() {
 }
 
 CatchInterrupts::~CatchInterrupts() {
+  if (--g_catching > 0) return;
   for (const int signal : kInterrupts) std::signal(signal, SIG_DFL);
 }
 

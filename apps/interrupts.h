@@ -3,7 +3,8 @@
 namespace evac {
 
 /// While it lives, the first Ctrl-C (or kill, or closed terminal) ends the work in order, the second at once. A closed
-/// terminal says so more than once (the kernel and the shell): that stays one.
+/// terminal says so more than once (the kernel and the shell): that stays one. One that is made while another lives changes
+/// nothing: what came before it stays so, and the outer one goes on catching. Of the main thread alone.
 class CatchInterrupts {
  public:
   CatchInterrupts();
@@ -12,7 +13,7 @@ class CatchInterrupts {
   CatchInterrupts& operator=(const CatchInterrupts&) = delete;
 };
 
-/// Whether one came since the last CatchInterrupts was made.
+/// Whether one came since the last CatchInterrupts was made that was inside no other.
 bool IsInterrupted();
 
 }  // namespace evac

@@ -26,16 +26,20 @@ bool IsProbed(const Episode& episode, double share) {
   return SplitMix64(SeedFor(0, "probe " + episode.key.Id())).Uniform() < share;
 }
 
+bool HasVerdict(const std::map<std::string, Verdict>& verdicts, const std::string& judge) {
+  return verdicts.contains(judge) || verdicts.contains(judge + kVlmSmall);
+}
+
 /// What the next call of the same judge would ask for.
-ExitCode SayWhatItWouldCost(const VlmConfig& config, Store& store) {
+ExitCode SayWhatItWouldCost(const VlmConfig& config, Store& store, bool again) {
   std::map<std::string, Task> tasks;
   for (Task& task : store.Tasks()) tasks.emplace(task.id, std::move(task));
   const auto current = store.CurrentVerdicts();
   long requests = 0, tokens = 0, clips = 0;
   for (const Episode& episode : store.Episodes()) {
     const auto verdicts = current.find(episode.key.Id());
-    const bool has_one = verdicts != current.end() && verdicts->second.contains(config.JudgeName());
-    if (IsFailure(episode.stop) || has_one || episode.video.empty()) continue;
+    const bool has_one = verdicts != current.end() && HasVerdict(verdicts->second, config.JudgeName());
+    if (IsFailure(episode.stop) || (has_one && !again) || episode.video.empty()) continue;
     const auto frames = ReadVlmFrames(store.folder() / episode.video, tasks.at(episode.key.pair.task), config.clip);
     const long asked = std::ssize(kVlmWordings) + (IsProbed(episode, config.probe_share) ? 1 : 0);
     ++clips;
@@ -82,7 +86,7 @@ void ShowProgress(const Verdict& verdict) {
 ExitCode JudgeWithVlm(const VlmJudgeArguments& arguments) {
   const VlmConfig config = VlmConfig::FromFile(arguments.config);
   Store store = Store::Open(arguments.run, Store::Mode::kReadWrite);
-  if (arguments.dry_run) return SayWhatItWouldCost(config, store);
+  if (arguments.dry_run) return SayWhatItWouldCost(config, store, arguments.again);
   CallCache cache(store.folder() / CallCache::kFile);
   VlmClient client(ClientOptions(config, arguments.offline));
   VlmJudgeOptions options{.run_folder = store.folder(), .offline = arguments.offline, .now = Now};
@@ -91,7 +95,8 @@ ExitCode JudgeWithVlm(const VlmJudgeArguments& arguments) {
     if (probe == VlmProbe::kRetest && !arguments.retest) continue;
     options.probe = probe;
     VlmJudge judge(config, options, client, cache);
-    JudgeOptions how{.again = arguments.again, .on_verdict = ShowProgress};
+    JudgeOptions how{
+        .again = arguments.again, .also_called = {judge.Name() + kVlmSmall}, .on_verdict = ShowProgress};
     if (probe != VlmProbe::kNone)
       how.wanted = [&](const Episode& episode) { return IsProbed(episode, config.probe_share); };
     const JudgeSummary summary = JudgeEpisodes(judge, store, how);

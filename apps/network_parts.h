@@ -5,6 +5,7 @@
 
 #include "core/judge.h"
 #include "core/policy.h"
+#include "core/recording.h"
 #include "core/store.h"
 #include "core/world.h"
 #include "harness/suite.h"
@@ -30,8 +31,14 @@ std::unique_ptr<World> MakeEvacWorld(const SuiteWorld& world, const Suite& suite
 
 /// The same without loading it: what is wrong with page and weights is known before the first episode of any world, and
 /// whether weights that say what they were trained for (worldmodel/trained_for.h) are asked for something else: another
-/// period, other cameras than `tasks` have, other statistics, other pose maps.
+/// period, other cameras or arms than `tasks` have, other statistics, other pose maps.
 void CheckNetwork(const SuiteWorld& world, const std::vector<Task>& tasks);
+
+/// The recording of a suite with a world of type `evac`, as its network was trained to see one: in steps of the world's
+/// period, by the cameras that the weights say, or by as many as the network has views, the head first.
+/// @throws InvalidInput if its steps are no whole part of that period; if a camera is missing; if two of the suite's
+///   networks want it otherwise: what each wants.
+Recording ReadAsTrained(const Suite& suite);
 
 /// The classifier judge of a run. @throws InvalidInput if the weights are none of its, or do not know the run's tasks.
 std::unique_ptr<Judge> MakeClassifier(const std::filesystem::path& weights, const Store& store);

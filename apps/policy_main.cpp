@@ -1,7 +1,10 @@
+#include <algorithm>
 #include <memory>
+#include <utility>
 
 #include "apps/policy_program.h"
 #include "apps/program_beside.h"
+#include "core/error.h"
 #include "core/recording.h"
 #include "core/version.h"
 #include "policies/hold_policy.h"
@@ -57,17 +60,41 @@ void AddHold(CLI::App& app, int& exit_code) {
   });
 }
 
+/// What is played.
+struct Replayed {
+  std::string folder;
+  int every_nth = 0;  ///< 0: as many as make the period, or all of them if that is any
+  bool told = false;
+};
+
+/// Of the cameras the head alone, which every recording has: no picture is looked at.
+Recording Read(const Replayed& replayed, double period_s) {
+  Recording recording = ReadRecording(replayed.folder, {.every_nth = std::max(1, replayed.every_nth),
+                                                        .cameras = {"head"},
+                                                        .count_video_frames = false,
+                                                        .read_told = replayed.told});
+  if (replayed.told && recording.told.empty())
+    throw InvalidInput("--told: {}: it does not say where the arms were told to be", replayed.folder);
+  if (replayed.every_nth > 0 || period_s == 0) return recording;
+  return Thinned(std::move(recording), period_s);
+}
+
 void AddReplay(CLI::App& app, int& exit_code) {
   const Command command = AddPolicy(app, "replay", "Plays a recorded trajectory.");
-  auto folder = std::make_shared<std::string>();
-  auto every_nth = std::make_shared<int>(1);
-  command.app->add_option("--recording", *folder, "folder of the recording (docs/formats/recording.md)")->required();
-  command.app->add_option("--every-nth", *every_nth, "keep every nth recorded step")
-      ->check(CLI::Range(1, 1000))
-      ->capture_default_str();
+  auto replayed = std::make_shared<Replayed>();
+  command.app->add_option("--recording", replayed->folder, "folder of the recording (docs/formats/recording.md)")
+      ->required();
+  command.app->get_option("--period-s")
+      ->description("seconds between two targets: one in so many recorded steps is kept; 0: all")
+      ->envname("EVAC_PERIOD_S");
+  command.app->add_option("--every-nth", replayed->every_nth, "keep every nth recorded step, whatever --period-s says")
+      ->check(CLI::Range(1, 1000));
+  command.app->add_flag("--told", replayed->told,
+                        "play where the arms were told to be, not where they were: for world models that learned from "
+                        "told arms");
   command.app->footer("Example:\n  evac-policy replay --recording agibot_examples/example0 --chunk-size 16");
-  command.app->callback([&exit_code, common = command.common, folder, every_nth] {
-    Recording recording = ReadRecording(*folder, {.every_nth = *every_nth, .cameras = {}, .count_video_frames = false});
+  command.app->callback([&exit_code, common = command.common, replayed] {
+    Recording recording = Read(*replayed, common->period_s);
     PolicySpec spec = common->Spec("replay");
     spec.arms = recording.arm_names;
     spec.period_s = recording.period_s;

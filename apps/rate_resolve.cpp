@@ -2,8 +2,10 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <map>
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <set>
 
 #include "core/error.h"
@@ -29,10 +31,25 @@ std::map<std::string, RubricFacts> FactsOf(const StudyStore& study) {
   return facts;
 }
 
+/// Raters by clip who ever voted there, whether it counts now or not.
+using Voters = std::map<std::int64_t, std::set<std::int64_t>>;
+
+Voters VotersOf(const StudyStore& study) {
+  Voters voters;
+  for (const StudyStore::Ballot& ballot : study.BallotsAfter(0)) {
+    const bool is_vote = ballot.showing == Showing::kCounted || ballot.showing == Showing::kGold ||
+                         ballot.showing == Showing::kImport;
+    if (is_vote) voters[ballot.clip].insert(ballot.rater);
+  }
+  return voters;
+}
+
+bool HasSomebodysWord(const RatedClip& clip) { return !clip.by_rater.empty() || clip.adjudicated; }
+
 void CheckRubrics(const std::vector<RatedClip>& clips) {
   std::map<std::string, std::set<std::string>> by_task;
   for (const RatedClip& clip : clips) {
-    if (!clip.by_rater.empty()) by_task[clip.clip.task].insert(clip.clip.rubric_hash);
+    if (HasSomebodysWord(clip)) by_task[clip.clip.task].insert(clip.clip.rubric_hash);
   }
   for (const auto& [task, hashes] : by_task) {
     if (hashes.size() > 1)
@@ -41,14 +58,24 @@ void CheckRubrics(const std::vector<RatedClip>& clips) {
   }
 }
 
-/// A stage counts as reached if more than half of the votes say so.
-std::map<std::string, bool> StagesOf(const RatedClip& clip, const RubricFacts& facts) {
+/// No stage marked is something said by who saw a failure, of a clip that is one. Sheets have no stages, and who saw a
+/// success without marking any has left them out.
+bool TellsStages(const StudyStore::Ballot& ballot, std::optional<Label> label) {
+  if (ballot.stages != 0) return true;
+  return ballot.showing != Showing::kImport && ballot.label == "failure" && label != Label::kSuccess;
+}
+
+/// A stage counts as reached if more than half of those say so who tell of stages; nothing if nobody does.
+std::map<std::string, bool> StagesOf(const std::vector<StudyStore::Ballot>& ballots, std::optional<Label> label,
+                                     const RubricFacts& facts) {
   std::map<std::string, bool> stages;
-  if (clip.by_rater.empty()) return stages;
+  const auto telling =
+      std::ranges::count_if(ballots, [&](const StudyStore::Ballot& ballot) { return TellsStages(ballot, label); });
+  if (telling == 0) return stages;
   for (std::size_t k = 0; k < facts.stages.size(); ++k) {
-    std::size_t reached = 0;
-    for (const auto& [rater, ballot] : clip.by_rater) reached += ballot.stages >> k & 1;
-    stages[facts.stages[k]] = 2 * reached > clip.by_rater.size();
+    const auto reached = std::ranges::count_if(
+        ballots, [k](const StudyStore::Ballot& ballot) { return (ballot.stages >> k & 1) != 0; });
+    stages[facts.stages[k]] = 2 * reached > telling;
   }
   return stages;
 }
@@ -59,44 +86,93 @@ std::string ReasonOf(const RatedClip& clip) {
                      majority.valid - majority.successes, majority.unsure);
 }
 
-std::vector<Verdict> VerdictsOf(const RatedClip& clip, const RubricFacts& facts, const std::string& study,
-                                const ResolveOptions& options) {
-  std::vector<Verdict> verdicts;
+/// What a run is to say of one clip.
+struct Told {
   Verdict verdict;
-  verdict.episode_id = clip.clip.episode;
-  verdict.judge = options.judge;
-  verdict.label = clip.resolution.label.value_or(Label::kCannotTell);
-  if (clip.resolution.majority.soft) verdict.probability = *clip.resolution.majority.soft;
-  verdict.stages = StagesOf(clip, facts);
-  verdict.reason = ReasonOf(clip);
-  verdict.rubric_version = facts.version;
-  verdicts.push_back(verdict);
-  for (const auto& [rater, ballot] : clip.by_rater) {
-    if (!options.each_rater) break;
-    verdict.judge = fmt::format("human:{}:r{}", study, rater);
-    verdict.label = LabelFromName(ballot.label);
-    verdict.probability = std::nullopt;
-    for (std::size_t k = 0; k < facts.stages.size(); ++k)
-      verdict.stages[facts.stages[k]] = (ballot.stages >> k & 1) != 0;
-    verdict.reason = "";
-    verdicts.push_back(verdict);
+  bool takes_back = false;  ///< only where the run says something by that judge: it was of votes that are gone
+};
+
+/// Gives the verdicts of one study, under the names that they have in runs.
+class Speaker {
+ public:
+  Speaker(const StudyStore& study, const ResolveOptions& options)
+      : study_(study.info().name), options_(options), facts_(FactsOf(study)), voters_(VotersOf(study)) {}
+
+  std::vector<Told> AllOf(const RatedClip& clip) const {
+    std::vector<Told> told;
+    const auto voters = voters_.find(clip.clip.id);
+    if (HasSomebodysWord(clip)) {
+      told.push_back({LabelOf(clip)});
+    } else if (voters != voters_.end()) {
+      told.push_back(TakenBack(clip, options_.judge));
+    }
+    if (options_.each_rater) {
+      for (const auto& [rater, ballot] : clip.by_rater) told.push_back({VoteOf(clip, ballot)});
+    }
+    if (voters == voters_.end()) return told;
+    for (const std::int64_t rater : voters->second) {
+      if (!clip.by_rater.contains(rater)) told.push_back(TakenBack(clip, NameOf(rater)));
+    }
+    return told;
   }
-  return verdicts;
-}
+
+ private:
+  std::string NameOf(std::int64_t rater) const { return fmt::format("human:{}:r{}", study_, rater); }
+
+  Verdict Begun(const RatedClip& clip, const std::string& judge) const {
+    Verdict verdict;
+    verdict.episode_id = clip.clip.episode;
+    verdict.judge = judge;
+    verdict.rubric_version = facts_.at(clip.clip.rubric_hash).version;
+    return verdict;
+  }
+
+  Verdict LabelOf(const RatedClip& clip) const {
+    std::vector<StudyStore::Ballot> ballots;
+    for (const auto& [rater, ballot] : clip.by_rater) ballots.push_back(ballot);
+    Verdict verdict = Begun(clip, options_.judge);
+    verdict.label = clip.resolution.label.value_or(Label::kCannotTell);
+    if (clip.resolution.majority.soft) verdict.probability = *clip.resolution.majority.soft;
+    verdict.stages = StagesOf(ballots, clip.resolution.label, facts_.at(clip.clip.rubric_hash));
+    verdict.reason = ReasonOf(clip);
+    return verdict;
+  }
+
+  Verdict VoteOf(const RatedClip& clip, const StudyStore::Ballot& ballot) const {
+    Verdict verdict = Begun(clip, NameOf(ballot.rater));
+    verdict.label = LabelFromName(ballot.label);
+    verdict.stages = StagesOf({ballot}, verdict.label, facts_.at(clip.clip.rubric_hash));
+    return verdict;
+  }
+
+  /// Verdicts are never removed: one that says nothing takes the old one's place.
+  Told TakenBack(const RatedClip& clip, const std::string& judge) const {
+    Told told{Begun(clip, judge), true};
+    told.verdict.label = Label::kCannotTell;
+    told.verdict.reason = "no vote counts";
+    return told;
+  }
+
+  std::string study_;
+  const ResolveOptions& options_;
+  std::map<std::string, RubricFacts> facts_;
+  Voters voters_;
+};
 
 bool IsSame(const Verdict& a, const Verdict& b) {
   return a.label == b.label && a.reason == b.reason && a.stages == b.stages && a.rubric_version == b.rubric_version;
 }
 
 /// Adds what a run does not say yet.
-std::int64_t WriteTo(const std::string& run, const std::vector<Verdict>& verdicts) {
+std::int64_t WriteTo(const std::string& run, const std::vector<Told>& all) {
   Store store = Store::Open(run, Store::Mode::kReadWrite);
   const auto current = store.CurrentVerdicts();
   std::vector<Verdict> wanted;
-  for (const Verdict& verdict : verdicts) {
+  for (const auto& [verdict, takes_back] : all) {
     const auto of_episode = current.find(verdict.episode_id);
     const bool is_known = of_episode != current.end() && of_episode->second.contains(verdict.judge);
-    if (!is_known || !IsSame(of_episode->second.at(verdict.judge), verdict)) wanted.push_back(verdict);
+    const bool is_news = is_known ? !IsSame(of_episode->second.at(verdict.judge), verdict) : !takes_back;
+    if (is_news) wanted.push_back(verdict);
   }
   store.AddVerdicts(wanted);
   return static_cast<std::int64_t>(wanted.size());
@@ -109,17 +185,14 @@ Resolved ResolveStudy(const StudyStore& study, const ResolveOptions& options) {
   tally.Read(study);
   const std::vector<RatedClip>& clips = tally.rated();
   if (!options.mix_rubrics) CheckRubrics(clips);
-  const auto facts = FactsOf(study);
-  const std::string name = study.info().name;
+  const Speaker speaker(study, options);
   Resolved resolved;
-  std::map<std::string, std::vector<Verdict>> by_run;
+  std::map<std::string, std::vector<Told>> by_run;
   for (const RatedClip& clip : clips) {
-    if (clip.by_rater.empty()) continue;
-    ++(clip.resolution.label ? resolved.decided : resolved.undecided);
-    for (Verdict& verdict : VerdictsOf(clip, facts.at(clip.clip.rubric_hash), name, options))
-      by_run[clip.clip.run].push_back(std::move(verdict));
+    if (HasSomebodysWord(clip)) ++(clip.resolution.label ? resolved.decided : resolved.undecided);
+    for (Told& told : speaker.AllOf(clip)) by_run[clip.clip.run].push_back(std::move(told));
   }
-  for (const auto& [run, verdicts] : by_run) resolved.written += WriteTo(run, verdicts);
+  for (const auto& [run, all] : by_run) resolved.written += WriteTo(run, all);
   std::int64_t excluded = 0;
   for (const StudyRater& rater : study.Raters()) excluded += rater.counts ? 0 : 1;
   if (excluded > 0) resolved.warnings.push_back(fmt::format("{} raters excluded", excluded));

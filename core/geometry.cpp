@@ -7,7 +7,10 @@ namespace evac {
 Eigen::Isometry3d BaseFromCamera(const Camera& camera, const Arms& arms) {
   if (camera.mount == Mount::kBase) return camera.mount_from_camera;
   if (arms.empty()) throw InternalError("camera {} is mounted on a gripper, but there are no arms", camera.name);
-  const ArmState& arm = camera.mount == Mount::kLeftGripper ? arms.front() : arms.back();
+  const bool is_left = camera.mount == Mount::kLeftGripper;
+  if (is_left && arms.size() == 1)
+    throw InvalidInput("camera {} is mounted on the left gripper, but the robot has one arm, the right", camera.name);
+  const ArmState& arm = is_left ? arms.front() : arms.back();
   return arm.base_from_gripper * camera.mount_from_camera;
 }
 

@@ -8,8 +8,9 @@
 namespace evac {
 
 /// Where the camera is now: its mount's pose times mount_from_camera, so a moving wrist camera needs no other code.
-/// `left_gripper` is the first of `arms`, `right_gripper` the last (one arm: the same).
+/// `left_gripper` is the first of two `arms`, `right_gripper` the last: a robot with one arm has the right.
 /// @param arms  not empty unless the camera is mounted on the base.
+/// @throws InvalidInput naming a camera on the left gripper of a robot that has none: the right hand would carry it.
 Eigen::Isometry3d BaseFromCamera(const Camera& camera, const Arms& arms);
 
 /// Pixel (u right, v down; the centre of the first pixel is .5, .5) of a point, or nothing if it is not in front.

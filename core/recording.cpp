@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <cctype>
+#include <cmath>
+#include <utility>
 
 #include "core/error.h"
 #include "core/recording_parts.h"
@@ -10,6 +12,8 @@ namespace evac {
 namespace {
 
 namespace fs = std::filesystem;
+
+constexpr double kRateTolerance = 0.02;  // periods are typed with few digits, time stamps rounded
 
 /// Safe in a path and in a URL.
 std::string SafeName(std::string name) {
@@ -65,9 +69,22 @@ Recording ReadRecording(const fs::path& folder, const RecordingOptions& options)
   Recording recording = ReadLayout(absolute, options);
   recording.id = SafeName(recording.id);
   recording.every_nth = options.every_nth;
-  recording.arm_names = {"left", "right"};
-  DropAbsentLeftArm(recording);
   recording.source += fmt::format(", {} steps of {:.4g} s", recording.arms.size(), recording.period_s);
+  return recording;
+}
+
+Recording Thinned(Recording recording, double period_s) {
+  const double steps = period_s / recording.period_s;
+  const int every_nth = static_cast<int>(std::lround(steps));
+  if (every_nth < 1 || std::abs(steps - every_nth) > kRateTolerance * every_nth)
+    throw InvalidInput("{}: wanted steps of {:.4g} s, or of a whole part of it", recording.source, period_s)
+        .Called("other_rate");
+  recording.period_s = period_s;
+  if (every_nth == 1) return recording;
+  recording.arms = EveryNth(std::move(recording.arms), every_nth);
+  recording.told = EveryNth(std::move(recording.told), every_nth);
+  recording.every_nth *= every_nth;
+  recording.source += fmt::format(", one in {} kept", every_nth);
   return recording;
 }
 

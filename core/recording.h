@@ -60,6 +60,11 @@ struct RecordingFiles {
 /// @throws InvalidInput as ReadRecording; also for a file of another ending.
 Recording ReadRecordingFiles(const RecordingFiles& files, const RecordingOptions& options = {});
 
+/// The same recording in steps `period_s` apart: every nth of its own, of the arms as of the videos. What is within 2 %
+/// of a whole number of them is meant exactly: the period is `period_s` then.
+/// @throws InvalidInput with both periods (kind `other_rate`) for any other.
+Recording Thinned(Recording recording, double period_s);
+
 /// One walk through a recording's images, front to back. Each has its own decoders: any number walk at once.
 class RecordedFrames {
  public:

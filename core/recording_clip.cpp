@@ -166,6 +166,8 @@ Recording ReadClipLayout(const ClipFolders& folders, const RecordingOptions& opt
   recording.period_s = (options.recorded_period_s > 0 ? options.recorded_period_s : found_period_s) * options.every_nth;
   recording.arms = EveryNth(std::move(arms), options.every_nth);
   recording.told = EveryNth(std::move(told), options.every_nth);
+  recording.arm_names = {"left", "right"};
+  DropAbsentLeftArm(recording);
   recording.source = fmt::format("{}: AgiBot World layout, {} cameras{}", folders.images.string(), names.size(),
                                  recording.videos.empty() ? ", first frame" : "");
   return recording;

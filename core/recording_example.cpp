@@ -116,6 +116,7 @@ Recording ReadRecordingFiles(const RecordingFiles& files, const RecordingOptions
   recording.every_nth = options.every_nth;
   recording.files = {files.frame, files.actions, files.extrinsics, files.intrinsics};
   recording.arm_names = {"left", "right"};
+  DropAbsentLeftArm(recording);
   return recording;
 }
 

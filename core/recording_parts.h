@@ -57,7 +57,8 @@ std::vector<Arms> ReadProprio(const std::filesystem::path& path);
 std::vector<Arms> ReadTold(const std::filesystem::path& path);
 /// HDF5 keeps state of its own, for the whole process: whoever calls it holds this.
 std::unique_lock<std::mutex> LockHdf5();
-/// A robot without a left arm: it lies at the base's origin, unturned, at every step, where no gripper can be.
+/// A robot without a left arm: it lies at the base's origin, unturned, at every step, where no gripper can be. A camera
+/// that was mounted on it is mounted on the base.
 void DropAbsentLeftArm(Recording& recording);
 
 /// The bytes of `proprio_stats.h5`: `arms` as state, `told` (unless empty) as action; a missing left arm at the base's

@@ -95,6 +95,9 @@ void DropAbsentLeftArm(Recording& recording) {
   for (std::vector<Arms>* track : {&recording.arms, &recording.told}) {
     for (Arms& arms : *track) arms.erase(arms.begin());
   }
+  for (Camera& camera : recording.cameras) {  // named after the left hand, fixed to where that lies: the base
+    if (camera.mount == Mount::kLeftGripper) camera.mount = Mount::kBase;
+  }
   recording.arm_names = {"right"};
 }
 

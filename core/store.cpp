@@ -218,6 +218,8 @@ void Store::AddVerdicts(std::span<const Verdict> verdicts) {
 
 std::vector<Verdict> Store::Verdicts() const { return database_->Read(rows::SelectVerdicts); }
 
+std::vector<std::string> Store::Judges() const { return database_->Read(rows::SelectJudges); }
+
 std::map<std::string, std::map<std::string, Verdict>> Store::CurrentVerdicts() const {
   std::map<std::string, std::map<std::string, Verdict>> current;
   for (Verdict& verdict : Verdicts()) {

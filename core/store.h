@@ -148,6 +148,8 @@ class Store {
   std::vector<Verdict> Verdicts() const;
   /// The current one per (episode id, judge): the last added.
   std::map<std::string, std::map<std::string, Verdict>> CurrentVerdicts() const;
+  /// Who gave verdicts, sorted; without reading these.
+  std::vector<std::string> Judges() const;
 
   /// All of them or none. @throws InternalError if one of the same task, state, policy, checkpoint and trial is there,
   /// or its task is not.

@@ -89,6 +89,13 @@ std::vector<Verdict> SelectVerdicts(sqlite::Connection& connection) {
   return verdicts;
 }
 
+std::vector<std::string> SelectJudges(sqlite::Connection& connection) {
+  std::vector<std::string> judges;
+  auto row = connection.Query("SELECT DISTINCT judge FROM verdicts ORDER BY judge");
+  while (row.Step()) judges.push_back(row.Text(0));
+  return judges;
+}
+
 void AddToCounters(sqlite::Connection& connection, const std::string& policy, const Counters& counters) {
   for (const auto& [name, value] : counters) {
     connection.Run(

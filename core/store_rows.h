@@ -46,6 +46,7 @@ std::vector<PairKey> SelectInitialScenePairs(sqlite::Connection& connection);
 
 void InsertVerdict(sqlite::Connection& connection, const Verdict& verdict);
 std::vector<Verdict> SelectVerdicts(sqlite::Connection& connection);
+std::vector<std::string> SelectJudges(sqlite::Connection& connection);
 
 void AddToCounters(sqlite::Connection& connection, const std::string& policy, const Counters& counters);
 std::map<std::string, Counters> SelectCounters(sqlite::Connection& connection);

@@ -38,6 +38,12 @@ constexpr const char* kClipColumns =
     "SELECT id, wave, run, episode, task, initial_state, policy, checkpoint, world, is_real, source_sha256, use, "
     "reference, reference_reason, rubric_hash, views, file, video_sha256, frames FROM clips ";
 
+std::string ClipQuery(const char* which) {
+  std::string query = kClipColumns;
+  query += which;
+  return query;
+}
+
 StudyClip ClipOf(const sqlite::Statement& row) {
   StudyClip clip;
   clip.id = row.Integer(0);
@@ -180,6 +186,17 @@ std::string StudyStore::AddWave(std::span<const StudyClip> clips, std::span<cons
   return hash;
 }
 
+/// Names and seeds are alike in many studies; the file of the first clip has a random name.
+std::string StudyStore::Id() const {
+  const StudyInfo begun = info();
+  std::string identity = "study\n" + begun.name + "\n" + std::to_string(begun.seed) + "\n";
+  sqlite::Statement row = database_->connection.Query("SELECT file FROM clips ORDER BY id LIMIT 1");
+  if (row.Step()) identity += row.Text(0);
+  std::string id = Sha256Hex(identity);
+  id.resize(12);
+  return id;
+}
+
 std::string StudyStore::Codec() const {
   sqlite::Connection& connection = database_->connection;
   if (Pragma(connection, "SELECT count(*) FROM sqlite_schema WHERE name = 'round_trips'") == 0) return {};
@@ -190,14 +207,14 @@ std::string StudyStore::Codec() const {
 int StudyStore::Waves() const { return static_cast<int>(Pragma(database_->connection, "SELECT count(*) FROM waves")); }
 
 std::vector<StudyClip> StudyStore::Clips() const {
-  sqlite::Statement row = database_->connection.Query((std::string(kClipColumns) + "ORDER BY id").c_str());
+  sqlite::Statement row = database_->connection.Query(ClipQuery("ORDER BY id").c_str());
   std::vector<StudyClip> clips;
   while (row.Step()) clips.push_back(ClipOf(row));
   return clips;
 }
 
 StudyClip StudyStore::Clip(std::int64_t id) const {
-  sqlite::Statement row = database_->connection.Query((std::string(kClipColumns) + "WHERE id = ?").c_str(), id);
+  sqlite::Statement row = database_->connection.Query(ClipQuery("WHERE id = ?").c_str(), id);
   if (!row.Step()) throw InternalError("the study is damaged: there is no clip {}", id);
   return ClipOf(row);
 }

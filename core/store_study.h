@@ -136,6 +136,8 @@ class StudyStore {
 
   const std::filesystem::path& folder() const;
   StudyInfo info() const;
+  /// 12 hex digits that no other study has, the same for as long as it lives: what browsers tell studies apart by.
+  std::string Id() const;
 
   /// Many changes with one wait for the disk: nothing is kept before Commit.
   void Begin();
@@ -238,7 +240,7 @@ class StudyStore {
   /// Rows of any kind but undone ones, by the server's clock.
   std::int64_t VerdictsSince(std::int64_t from_ms) const;
   /// Clips with all their votes that somebody must decide: split, nobody could tell, against the reference, or flagged
-  /// by two; those that an adjudicator decided not.
+  /// by two. Not those that an adjudicator decided; one who left and counts no more has decided none.
   std::vector<std::int64_t> Disputes() const;
   /// Clips that a browser could not play, with the reason, newest first.
   struct Unplayable {

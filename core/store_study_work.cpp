@@ -258,7 +258,8 @@ std::vector<std::int64_t> StudyStore::Disputes() const {
       "AND (t.s > 0 AND t.f > 0 OR t.s + t.f < min(2, (SELECT raters_per_clip FROM study)) OR t.flagged >= 2 "
       "OR c.reference = 'failure' AND t.s > t.f OR c.reference = 'success' AND t.f > t.s) "
       "AND NOT EXISTS (SELECT 1 FROM current_verdicts v JOIN presentations p ON p.id = v.presentation "
-      "WHERE v.clip = t.clip AND p.showing = 'adjudication' AND v.is_final = 1) ORDER BY t.clip");
+      "JOIN raters r ON r.id = v.rater WHERE v.clip = t.clip AND p.showing = 'adjudication' AND v.is_final = 1 "
+      "AND r.counts = 1) ORDER BY t.clip");
   std::vector<std::int64_t> clips;
   while (row.Step()) clips.push_back(row.Integer(0));
   return clips;

@@ -183,6 +183,9 @@ Task ReadTask(const Config& page) {
   task.instruction = ReadText(page, "instruction");
   task.arms = ReadArms(page);
   task.cameras = ReadCameras(page);
+  for (const Camera& camera : task.cameras)
+    page.Require(task.arms.size() == 2 || camera.mount != Mount::kLeftGripper, "arms",
+                 "[left, right]: camera " + camera.name + " is mounted on the left gripper");
   task.period_s = page.Get<double>("period_s");
   page.Require(task.period_s >= 0.001 && task.period_s <= 10, "period_s", "seconds, 0.001 … 10");
   task.max_chunks = page.Get<int>("max_chunks");

@@ -4,6 +4,7 @@
 
 #include <charconv>
 #include <cmath>
+#include <cstring>
 
 #include "core/error.h"
 #include "core/names.h"
@@ -15,6 +16,17 @@ TensorFile Open(const std::filesystem::path& path) try {
   return TensorFile::Open(path);
 } catch (const TensorError& error) {
   throw InvalidInput("{}", error.what());
+}
+
+/// @throws InvalidInput for the first number that is none: whatever is computed with it is none either, and compares
+/// with nothing.
+void RequireFinite(const TensorView& view, const std::string& file) {
+  for (std::size_t at = 0; at + sizeof(float) <= view.bytes.size(); at += sizeof(float)) {
+    float number = 0;
+    std::memcpy(&number, &view.bytes[at], sizeof number);
+    if (!std::isfinite(number))
+      throw InvalidInput("{}: {}: number {} is {}, wanted a finite one", file, view.name, at / sizeof number, number);
+  }
 }
 
 }  // namespace
@@ -66,6 +78,7 @@ const TensorView& WeightFile::Take(const std::string& tensor, const std::vector<
   if (view.type != TensorType::kF32 || view.shape != shape)
     throw InvalidInput("{}: {} is {} [{}], wanted F32 [{}]", name(), tensor, evac::Name(view.type),
                        fmt::join(view.shape, ", "), fmt::join(shape, ", "));
+  RequireFinite(view, name());
   taken_.insert(tensor);
   return view;
 }

@@ -29,8 +29,8 @@ class WeightFile {
   /// A field that lists names with commas between them; never empty.
   std::vector<std::string> Names(const std::string& field) const;
 
-  /// The numbers of a tensor of floats; the bytes live as long as this.
-  /// @throws InvalidInput naming file and tensor: missing, of another type or shape (found, wanted).
+  /// The numbers of a tensor of floats, all finite; the bytes live as long as this.
+  /// @throws InvalidInput naming file and tensor: missing, of another type or shape (found, wanted), not finite.
   const TensorView& Take(const std::string& tensor, const std::vector<std::int64_t>& shape);
   /// @throws InvalidInput naming a tensor that nobody took.
   void RequireAllTaken() const;

@@ -45,39 +45,44 @@ std::string Fingerprint(const Store& store, Episode episode) {
   return text;
 }
 
-/// Which shard each episode is taken from.
+/// What comes from which shard; the lists are by shard.
 struct Choice {
-  std::map<EpisodeKey, std::size_t> shard;
+  std::vector<std::vector<Episode>> episodes;      ///< that are taken from it
+  std::vector<std::set<std::string>> judged = {};  ///< ids: those, and its copies that are the same as a taken one
   int duplicates = 0;
 };
 
+/// Reads each shard's list once: one that is still being written may be longer when it is copied.
 Choice Choose(const std::vector<Store>& stores, const std::vector<fs::path>& shards) {
-  Choice choice;
-  std::map<EpisodeKey, Episode> chosen;
+  struct Copy {
+    std::size_t shard;
+    Episode episode;
+  };
+  Choice choice{std::vector<std::vector<Episode>>(stores.size()), std::vector<std::set<std::string>>(stores.size())};
+  std::map<EpisodeKey, Copy> chosen;
   std::vector<std::string> disagreements;
   for (std::size_t s = 0; s < stores.size(); ++s) {
     for (const Episode& episode : stores[s].Episodes()) {
-      const auto [found, is_new] = chosen.try_emplace(episode.key, episode);
-      if (is_new) {
-        choice.shard[episode.key] = s;
-        continue;
-      }
+      const auto [found, is_new] = chosen.try_emplace(episode.key, Copy{s, episode});
+      Copy& known = found->second;
+      const bool known_failed = IsFailure(known.episode.stop), this_failed = IsFailure(episode.stop);
+      if (!this_failed) choice.judged[s].insert(episode.key.Id());
+      if (known_failed && !this_failed) known = {s, episode};
+      if (is_new || known_failed || this_failed) continue;
       ++choice.duplicates;
-      const bool known_failed = IsFailure(found->second.stop), this_failed = IsFailure(episode.stop);
-      if (known_failed && !this_failed) {
-        found->second = episode;
-        choice.shard[episode.key] = s;
-      }
-      if (known_failed || this_failed) continue;
-      const std::size_t before = choice.shard[episode.key];
-      if (Fingerprint(stores[before], found->second) != Fingerprint(stores[s], episode))
+      if (Fingerprint(stores[known.shard], known.episode) != Fingerprint(stores[s], episode))
         disagreements.push_back(
-            fmt::format("{} in {} and {}", episode.key.Id(), shards[before].string(), shards[s].string()));
+            fmt::format("{} in {} and {}", episode.key.Id(), shards[known.shard].string(), shards[s].string()));
     }
   }
-  if (disagreements.empty()) return choice;
-  throw InvalidInput("{} episodes are not the same in all shards that hold them; nothing was merged:\n  {}",
-                     disagreements.size(), fmt::join(disagreements, "\n  "));
+  if (!disagreements.empty())
+    throw InvalidInput("{} episodes are not the same in all shards that hold them; nothing was merged:\n  {}",
+                       disagreements.size(), fmt::join(disagreements, "\n  "));
+  for (auto& [key, copy] : chosen) {
+    choice.judged[copy.shard].insert(key.Id());
+    choice.episodes[copy.shard].push_back(std::move(copy.episode));
+  }
+  return choice;
 }
 
 void CopyDeclarations(const Store& from, Store& to) {
@@ -121,10 +126,21 @@ void CopyEpisodes(const std::vector<Episode>& episodes, const Store& from, Store
   to.AddAll(batch);
 }
 
-/// What the shards say of the episodes taken from them, in their order; what two say alike is said once.
-void CopyVerdicts(const Store& from, const std::set<std::string>& taken, Store& to) {
-  std::vector<Verdict> verdicts = from.Verdicts();
-  std::erase_if(verdicts, [&](const Verdict& verdict) { return !taken.contains(verdict.episode_id); });
+std::vector<Verdict> VerdictsOf(const Store& store, const std::set<std::string>& episodes) {
+  std::vector<Verdict> verdicts = store.Verdicts();
+  std::erase_if(verdicts, [&](const Verdict& verdict) { return !episodes.contains(verdict.episode_id); });
+  return verdicts;
+}
+
+/// What was said of those episodes, in its order, and after what others said; what another said alike is said once.
+void AddWhatWasNotSaid(const Store& from, const std::set<std::string>& episodes, Store& to) {
+  const auto words = [](const Verdict& v) {
+    return std::tuple(v.episode_id, v.judge, v.label, v.probability, v.stages, v.reason, v.rubric_version);
+  };
+  std::set<decltype(words(Verdict{}))> said;
+  for (const Verdict& verdict : to.Verdicts()) said.insert(words(verdict));
+  std::vector<Verdict> verdicts = VerdictsOf(from, episodes);
+  std::erase_if(verdicts, [&](const Verdict& verdict) { return said.contains(words(verdict)); });
   to.AddVerdicts(verdicts);
 }
 
@@ -157,10 +173,18 @@ void TakeInitialScenes(const Store& from, const std::vector<Episode>& episodes, 
   }
 }
 
+/// "out/demo/" is out/demo: beside it is where the merged run is made.
+fs::path WithoutSlash(const fs::path& folder) {
+  const fs::path normal = folder.lexically_normal();
+  return normal.has_filename() ? normal : normal.parent_path();
+}
+
 }  // namespace
 
-MergeSummary MergeRuns(const std::vector<fs::path>& shards, const fs::path& out) {
+MergeSummary MergeRuns(const std::vector<fs::path>& shards, const fs::path& wanted_out) {
+  const fs::path out = WithoutSlash(wanted_out);
   if (shards.empty()) throw InvalidInput("merge: found no shard, wanted at least one run's folder");
+  if (out.empty()) throw InvalidInput("merge: found no name, wanted a new folder for the merged run");
   if (fs::exists(out)) throw InvalidInput("{}: is there already, wanted a new folder for the merged run", out.string());
   const std::vector<Store> stores = OpenAll(shards);
   const Choice choice = Choose(stores, shards);
@@ -170,17 +194,15 @@ MergeSummary MergeRuns(const std::vector<fs::path>& shards, const fs::path& out)
     Store merged = Store::CreateOrContinue(part, stores.front().run());
     for (std::size_t s = 0; s < stores.size(); ++s) {
       CopyDeclarations(stores[s], merged);
-      std::vector<Episode> episodes = stores[s].Episodes();
-      std::erase_if(episodes, [&](const Episode& episode) { return choice.shard.at(episode.key) != s; });
-      std::set<std::string> taken;
-      for (const Episode& episode : episodes) taken.insert(episode.key.Id());
-      CopyEpisodes(episodes, stores[s], merged);
-      CopyVerdicts(stores[s], taken, merged);
+      CopyEpisodes(choice.episodes[s], stores[s], merged);
       CopyRealTrials(stores[s], merged);
     }
+    for (std::size_t s = 0; s < stores.size(); ++s) AddWhatWasNotSaid(stores[s], choice.judged[s], merged);
   }
   fs::rename(part, out);
-  return {.episodes = static_cast<int>(choice.shard.size()), .duplicates = choice.duplicates};
+  std::size_t count = 0;
+  for (const std::vector<Episode>& taken : choice.episodes) count += taken.size();
+  return {.episodes = static_cast<int>(count), .duplicates = choice.duplicates};
 }
 
 int TakeEpisodes(const Store& from, const std::function<bool(const EpisodeKey&)>& wanted, Store& to) {
@@ -191,7 +213,7 @@ int TakeEpisodes(const Store& from, const std::function<bool(const EpisodeKey&)>
   std::set<std::string> taken;
   for (const Episode& episode : episodes) taken.insert(episode.key.Id());
   CopyEpisodes(episodes, from, to);
-  CopyVerdicts(from, taken, to);
+  to.AddVerdicts(VerdictsOf(from, taken));
   return static_cast<int>(episodes.size());
 }
 

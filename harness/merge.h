@@ -10,7 +10,7 @@ namespace evac {
 
 struct MergeSummary {
   int episodes = 0;    ///< in the merged run
-  int duplicates = 0;  ///< that several shards held, and agreed about
+  int duplicates = 0;  ///< copies that did not fail beside the one that was taken, and the same as it
 };
 
 /// Joins runs of one suite, such as the shards of `evac run --shard`, into a new one with everything they hold:
@@ -18,7 +18,8 @@ struct MergeSummary {
 /// counters. Sequential looks stay behind: they were looks at a part, and are none at the whole.
 ///
 /// An episode that several shards hold must be the same in all, to the bytes of its video; a failed one yields to one
-/// that did not fail. `out` is there whole or not at all.
+/// that did not fail, with what was said of it. Verdicts on every other copy are kept, those of a later shard after those
+/// of an earlier, and what two say alike once. `out` is there whole or not at all.
 /// @throws InvalidInput if `out` exists, a shard is of another suite, or duplicates disagree (all are named).
 MergeSummary MergeRuns(const std::vector<std::filesystem::path>& shards, const std::filesystem::path& out);
 

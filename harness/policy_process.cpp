@@ -23,10 +23,11 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-std::string LastLine(const std::filesystem::path& log) {
+/// @param from  what stands before it was said by an earlier process
+std::string LastLine(const std::filesystem::path& log, std::streamoff from) {
   constexpr std::streamoff kTail = 4096;
   std::ifstream file(log, std::ios::ate);
-  file.seekg(std::max<std::streamoff>(0, file.tellg() - kTail));
+  file.seekg(std::max<std::streamoff>(from, file.tellg() - kTail));
   std::string line, last;
   while (std::getline(file, line)) {
     if (!line.empty()) last = line;
@@ -143,6 +144,7 @@ int PolicyProcess::RunOnce() {
   const std::vector<char*> arguments = Pointers(words), environment = Pointers(entries);
   int alive[2];
   const int log = OpenLog(options_.log);
+  log_before_ = ::lseek(log, 0, SEEK_END);
   if (::pipe2(alive, O_CLOEXEC) != 0) throw InternalError("cannot make a pipe: {}", std::strerror(errno));
   const GuardianOptions guardian{
       .arguments = arguments.data(),
@@ -176,7 +178,7 @@ int PolicyProcess::RunOnce() {
 void PolicyProcess::GiveUp(int deaths, int status) {
   why_gone_ = fmt::format("its process ended {} within {} s, at last with {}: {} ({})",
                           deaths == 1 ? "once" : fmt::format("{} times", deaths), options_.window_s, HowItEnded(status),
-                          LastLine(options_.log), options_.log.string());
+                          LastLine(options_.log, log_before_), options_.log.string());
 }
 
 }  // namespace evac

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <condition_variable>
+#include <cstdint>
 #include <filesystem>
 #include <map>
 #include <mutex>
@@ -47,7 +48,7 @@ class PolicyProcess {
   /// Ends it, as Stop does, to be started again after the usual back-off: it hangs. Returns at once. Thread-safe.
   void Restart();
 
-  /// Why it is not coming back: "its process ended 6 times within 60 s, at last with exit code 3: <log's last line>
+  /// Why it is not coming back: "its process ended 6 times within 60 s, at last with exit code 3: <its last line>
   /// (policy.log)". Nothing while it runs or is about to be restarted, and after Stop. Thread-safe.
   std::optional<std::string> WhyGone() const;
 
@@ -64,6 +65,7 @@ class PolicyProcess {
   bool stopping_ = false;
   int alive_pipe_ = -1;  ///< closing it asks the guardian to end
   int restarts_ = 0;
+  std::int64_t log_before_ = 0;  ///< bytes that the log had when the process was last started
   std::optional<std::string> why_gone_;
   std::thread supervisor_;
 };

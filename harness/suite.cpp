@@ -4,6 +4,7 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
+#include <cmath>
 #include <cstdlib>
 #include <set>
 
@@ -172,11 +173,11 @@ VideoOptions ReadVideo(const Config& suite) {
 
 template <typename Item, typename NameOf>
 void RequireDistinct(const std::vector<Item>& items, const Config& suite, const std::string& field,
-                     const NameOf& name_of) {
+                     const NameOf& name_of, const char* what = "names") {
   std::set<std::string> names;
   for (const Item& item : items) {
     if (!names.insert(name_of(item)).second)
-      throw InvalidInput("{}: '{}' is there twice, wanted distinct names", suite.Where(field), name_of(item));
+      throw InvalidInput("{}: '{}' is there twice, wanted distinct {}", suite.Where(field), name_of(item), what);
   }
 }
 
@@ -197,6 +198,19 @@ void CheckStates(const Suite& suite, const Config& page) {
   }
 }
 
+/// What the world would refuse anyway, but only when the real world's episodes are there.
+void CheckPeriods(const Suite& suite, const Config& page) {
+  const std::vector<Config> fields = page.List("worlds");
+  for (std::size_t i = 0; i < fields.size(); ++i) {
+    const auto& evac = suite.worlds[i].evac;
+    for (const Task& task : suite.tasks) {
+      if (!evac || std::abs(task.period_s - evac->period_s) <= 1e-6) continue;
+      throw InvalidInput("{}: frames are {:.4g} s apart, those of task {} {:.4g} s: wanted tasks of the world's period",
+                         fields[i].Where("period_s"), evac->period_s, task.id, task.period_s);
+    }
+  }
+}
+
 void CheckWhole(const Suite& suite, const Config& page) {
   page.Require(!suite.worlds.empty(), "worlds", "at least one world");
   page.Require(!suite.policies.empty(), "policies", "at least one policy");
@@ -209,10 +223,14 @@ void CheckWhole(const Suite& suite, const Config& page) {
   RequireDistinct(suite.tasks, page, "tasks", [](const Task& task) { return task.id; });
   RequireDistinct(suite.policies, page, "policies",
                   [](const SuitePolicy& policy) { return policy.name + "@" + policy.checkpoint; });
+  RequireDistinct(suite.seeds, page, "seeds", [](std::uint64_t seed) { return std::to_string(seed); }, "seeds");
+  page.Require(std::ranges::all_of(suite.judges, [](const std::string& judge) { return judge == "oracle"; }), "judges",
+               "[oracle] or none: others judge a run that is there, `evac judge`");
   const auto reals =
       std::count_if(suite.worlds.begin(), suite.worlds.end(), [](const SuiteWorld& world) { return world.is_real; });
   page.Require(reals <= 1, "worlds", "at most one world with role: real");
   CheckStates(suite, page);
+  CheckPeriods(suite, page);
   for (const SuiteWorld& world : suite.worlds) {
     if (world.type == "evac") {
       page.Require(

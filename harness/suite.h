@@ -58,7 +58,7 @@ struct Suite {
   int lanes = 4;
   int threads = 0;           ///< 0: one per core
   double error_budget = .1;  ///< share of episodes that may fail before the run gives up
-  std::vector<std::string> judges;
+  std::vector<std::string> judges;  ///< oracle, or nobody
   VideoOptions video;
   Transport transport;
   PolicyLatency latency;

@@ -127,7 +127,10 @@ double ClassifierJudge::Probability(const Task& task, const std::filesystem::pat
     }
   }
   clip.pictures = bytes.to(at::kFloat) / 127.5 - 1;
-  return 1 / (1 + std::exp((card_.offset - network_->net(clip).logit.item<double>()) / card_.temperature));
+  const auto logit = network_->net(clip).logit.item<double>();
+  if (!std::isfinite(logit))  // it would be below any threshold: an error is not a failure
+    throw InvalidInput("{}: {}: its network answers {}, wanted a finite number", video.string(), name_, logit);
+  return 1 / (1 + std::exp((card_.offset - logit) / card_.temperature));
 }
 
 Verdict ClassifierJudge::Rate(const Task& task, const Episode& episode) {

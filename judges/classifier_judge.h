@@ -28,8 +28,8 @@ Label LabelOf(double probability, const ClassifierCard& card);
 /// threshold.
 ///
 /// Verdicts: `success`, `failure`, or `cannot_tell` near the threshold, with the probability. A clip that is missing or
-/// cannot be read, one longer than any it learned from, a task or camera it does not know, and a clip that it learned
-/// from, throw: JudgeEpisodes makes them `invalid`, never a failure.
+/// cannot be read, one longer than any it learned from, a task or camera it does not know, a clip that it learned from,
+/// and an answer that is not finite throw: JudgeEpisodes makes them `invalid`, never a failure.
 class ClassifierJudge : public Judge {
  public:
   /// @param weights  of `evac train judge`

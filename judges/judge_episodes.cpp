@@ -2,8 +2,8 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <string_view>
-#include <vector>
 
 #include "core/error.h"
 
@@ -32,21 +32,24 @@ std::optional<Verdict> RateSafely(Judge& judge, const Task& task, const Episode&
 }
 
 bool HasVerdict(const std::map<std::string, std::map<std::string, Verdict>>& current, const std::string& episode,
-                const std::string& judge) {
+                const std::vector<std::string>& names) {
   const auto found = current.find(episode);
-  return found != current.end() && found->second.contains(judge);
+  return found != current.end() &&
+         std::ranges::any_of(names, [&](const std::string& name) { return found->second.contains(name); });
 }
 
 /// In their order; the summary counts the others.
 std::vector<Episode> ToBeAskedAbout(const Store& store, const std::string& judge, const JudgeOptions& options,
                                     JudgeSummary& summary) {
   const auto current = store.CurrentVerdicts();
+  std::vector<std::string> names = options.also_called;
+  names.push_back(judge);
   std::vector<Episode> asked;
   for (Episode& episode : store.Episodes()) {
     if (!options.wanted(episode)) continue;
     if (IsFailure(episode.stop)) {
       ++summary.failed;
-    } else if (!options.again && HasVerdict(current, episode.key.Id(), judge)) {
+    } else if (!options.again && HasVerdict(current, episode.key.Id(), names)) {
       ++summary.already;
     } else {
       asked.push_back(std::move(episode));

@@ -2,6 +2,8 @@
 
 #include <functional>
 #include <map>
+#include <string>
+#include <vector>
 
 #include "core/judge.h"
 #include "core/store.h"
@@ -10,6 +12,7 @@ namespace evac {
 
 struct JudgeOptions {
   bool again = false;  ///< rate also the episodes that have a verdict by this judge
+  std::vector<std::string> also_called = {};  ///< other names under which this judge gives verdicts of episodes
   std::function<bool(const Episode&)> wanted = [](const Episode&) { return true; };  ///< others are left alone
   std::function<bool()> interrupted = [] {
     return false;
@@ -21,7 +24,7 @@ struct JudgeOptions {
 
 struct JudgeSummary {
   int rated = 0;
-  int already = 0;              ///< had a current verdict by this judge
+  int already = 0;              ///< had a current verdict by this judge, under any of its names
   int failed = 0;               ///< failed episodes: errors, which nobody judges
   int left_out = 0;             ///< the judge had nothing to judge by (an Error called not_judged)
   std::map<Label, int> labels;  ///< of those rated

@@ -21,7 +21,9 @@ namespace {
 using Json = nlohmann::ordered_json;
 
 constexpr std::size_t kBoardRows = 200;  // a page; a large study has tens of thousands
-constexpr const char* kCookie = "evac_rating";
+/// With the study's id behind it: browsers send a host's cookies to all its ports, and studies share hosts.
+constexpr const char* kCookie = "evac_rating_";
+constexpr const char* kOldCookie = "evac_rating";  // of sessions that began before; sent by who has one yet
 constexpr const char* kPolicy =
     "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' data: blob:; media-src 'self' blob:; "
     "connect-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'";
@@ -61,6 +63,7 @@ struct RatingServer::Impl {
   explicit Impl(RatingServerOptions given)
       : options(std::move(given)),
         lock(options.study / "lock"),
+        study_id(StudyStore::Open(options.study, StudyStore::Mode::kReadWrite).Id()),
         writer(StudyStore::Open(options.study, StudyStore::Mode::kReadWrite), true),
         player(StudyStore::Open(options.study, StudyStore::Mode::kReadOnly), false),
         reader(StudyStore::Open(options.study, StudyStore::Mode::kReadOnly), false),
@@ -141,10 +144,13 @@ struct RatingServer::Impl {
     std::optional<StudyRater> rater;
   };
 
-  static Caller CallerOf(const HttpAsked& asked, const StudyStore& store) {
+  Caller CallerOf(const HttpAsked& asked, const StudyStore& store) const {
     Caller caller;
-    caller.session = std::string(CookieOf(asked.cookie, kCookie));
-    if (IsSecret(caller.session)) caller.rater = store.RaterOfSession(caller.session);
+    for (const std::string& name : {kCookie + study_id, std::string(kOldCookie)}) {
+      caller.session = std::string(CookieOf(asked.cookie, name));
+      if (IsSecret(caller.session)) caller.rater = store.RaterOfSession(caller.session);
+      if (caller.rater) break;
+    }
     return caller;
   }
 
@@ -175,6 +181,7 @@ struct RatingServer::Impl {
     if (asked.path == "/api/me") {
       DeskAnswer answer = desk.Me(*caller.rater, now_ms);
       answer.body["csrf"] = CsrfOf(caller.session);
+      answer.body["study_id"] = study_id;
       return Said(answer);
     }
     if (asked.path == "/api/examples") return Said(desk.Examples(*caller.rater));
@@ -225,8 +232,9 @@ struct RatingServer::Impl {
     HttpAnswer said = Said(answer);
     if (!answer.session.empty()) {
       const bool is_secure = options.public_url.starts_with("https://");
-      said.headers.emplace_back("Set-Cookie", fmt::format("{}={}; Path=/; HttpOnly; SameSite=Lax; Max-Age=7776000{}",
-                                                          kCookie, answer.session, is_secure ? "; Secure" : ""));
+      said.headers.emplace_back("Set-Cookie",
+                                fmt::format("{}{}={}; Path=/; HttpOnly; SameSite=Lax; Max-Age=7776000{}", kCookie,
+                                            study_id, answer.session, is_secure ? "; Secure" : ""));
     }
     return said;
   }
@@ -258,6 +266,7 @@ struct RatingServer::Impl {
 
   RatingServerOptions options;
   RunLock lock;
+  const std::string study_id;
   std::mutex limits_mutex;
   RateLimiter strangers{{.burst = 30, .per_s = 0.5}}, raters{{.burst = 120, .per_s = 30}};
   RatingTally tally;  // the reader's thread's

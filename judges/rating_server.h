@@ -19,9 +19,9 @@ struct RatingServerOptions {
 };
 
 /// A study's rating session over HTTP: pages, clips and verdicts for whoever came in by an invitation, and nobody else.
-/// Sessions are HttpOnly, SameSite cookies; whatever changes something needs the session's token in a header and comes
-/// from this site; clips are given out under a name of each rater's own. No TLS: a reverse proxy does that
-/// (docs/rating_session.md).
+/// Sessions are HttpOnly, SameSite cookies with the study's id in their name; whatever changes something needs the
+/// session's token in a header and comes from this site; clips are given out under a name of each rater's own. No TLS:
+/// a reverse proxy does that (docs/rating_session.md).
 class RatingServer {
  public:
   /// Listens from here on. @throws InvalidInput if there is no study, another server has it, or the address is taken.

@@ -113,7 +113,7 @@ Verdict VlmJudge::Rate(const Task& task, const Episode& episode) {
   if (clip.is_too_large) {
     const Clip small{task, ReadVlmFrames(video, task, kSmall)};
     answers = AllWordings(small);
-    name += ":small";
+    name += kVlmSmall;
   }
   Verdict verdict = VerdictOf(answers);
   verdict.episode_id = episode.key.Id();

@@ -11,6 +11,9 @@
 
 namespace evac {
 
+/// Behind the name of a judge that was shown fewer, smaller images, because the server takes no more.
+inline constexpr const char* kVlmSmall = ":small";
+
 /// Judges that are not the verdict of record but tell how far it can be trusted; each is a judge of its own name.
 enum class VlmProbe {
   kNone,
@@ -31,7 +34,7 @@ struct VlmJudgeOptions {
 /// of any wording is `invalid` with its class as the reason's first word, never a failure.
 ///
 /// A server that finds the images too many or too large is asked with 8 frames of 336 px, and the verdict is given in
-/// the name "NAME:small": another judge.
+/// the name "NAME:small": another judge, whose verdict says all the same that the episode was asked about.
 /// Rate throws an Error called `not_judged` (nothing in the cache) or `judge_over` (VlmClient::WhyOver): JudgeEpisodes
 /// stores nothing then.
 class VlmJudge : public Judge {

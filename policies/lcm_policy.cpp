@@ -73,7 +73,7 @@ struct LcmPolicy::Impl {
     if (lane.sendings > 0) ++counters["repeats"];
     if (lane.has_started) {
       lane.header.attempt = lane.sendings;
-      lane.header.deadline_s = options.deadline_s - Seconds(Clock::now() - lane.answerable_at).count();
+      lane.header.deadline_s = options.deadline_s - Waited_s(lane);
       link.Publish(options.address.Channel("observation"), lane.header);
       for (const image_t& image : lane.images) link.Publish(options.address.Channel("image"), image);
     } else {
@@ -107,9 +107,15 @@ struct LcmPolicy::Impl {
       if (lane->answer) continue;
       if (why_gone) lane->answer = Failure{StopReason::kPolicyError, "the policy is gone: " + *why_gone};
       if (interrupted) lane->answer = Failure{StopReason::kPolicyError, "interrupted"};
-      const double waited_s = Seconds(Clock::now() - lane->answerable_at).count();
+      const double waited_s = Waited_s(*lane);
       if (!lane->answer && waited_s > Deadline_s(*lane)) TimeOut(*lane, waited_s);
     }
+  }
+
+  /// Since the policy could have begun with this one: while it answers others, whoever comes last is not late. So how many
+  /// lanes ask at a time changes no result.
+  double Waited_s(const LcmLane& lane) const {
+    return Seconds(Clock::now() - std::max(lane.answerable_at, last_answer)).count();
   }
 
   double Deadline_s(const LcmLane& lane) const {
@@ -150,6 +156,7 @@ struct LcmPolicy::Impl {
     LcmLane* lane = Find(started.episode);
     if (lane == nullptr || lane->has_started) return;  // the answer to a repeated start
     lane->Started(started.server, options.repeat_after_s);
+    last_answer = lane->answerable_at;
     if (!started.error.empty() && !lane->answer)
       lane->answer = PolicyError("the policy refuses the task: " + started.error, "error_replies");
   }
@@ -167,6 +174,7 @@ struct LcmPolicy::Impl {
     if (lane->answer) return void(++counters[lane->gave_up ? "late_replies" : "duplicate_replies"]);
     if (!reply.unknown_episode && reply.server != lane->server) return void(++counters["foreign_replies"]);
     lane->answer = AnswerOf(reply, *lane);
+    last_answer = Clock::now();
     if (auto* chunk = std::get_if<ActionChunk>(&*lane->answer))
       chunk->thinking_s = Seconds(Clock::now() - lane->answerable_at).count();
   }
@@ -216,6 +224,7 @@ struct LcmPolicy::Impl {
   std::set<std::int64_t> gave_up;                     ///< episodes that ended by timeout
   std::map<std::string, std::int64_t> last_sequence;  ///< by server
   std::optional<Clock::time_point> last_heard;
+  Clock::time_point last_answer;  ///< to a start or a request of this Act, or when it began
   int noise = 0;  ///< undecodable replies since the last Act
   Counters counters;
 };
@@ -257,6 +266,7 @@ std::vector<Acted> LcmPolicy::Act(std::span<const SceneObservation> batch) {
   const auto jpeg_quality = impl_->options.raw_images ? std::nullopt : std::optional(impl_->options.jpeg_quality);
   std::vector<LcmLane*> asked;
   impl_->noise = 0;
+  impl_->last_answer = Clock::now();
   for (const SceneObservation& scene : batch) {
     const auto lane = impl_->lanes.find(scene.scene);
     if (lane == impl_->lanes.end()) throw InternalError("scene {} was asked to act before its Reset", scene.scene);

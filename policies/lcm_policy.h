@@ -15,7 +15,8 @@ namespace evac {
 
 struct LcmPolicyOptions {
   LcmAddress address{};
-  double deadline_s = 20;  ///< from a request's first sending to giving it up as policy_timeout
+  double deadline_s = 20;  ///< from a request's first sending, or the last answer to another of the same Act, to giving
+                           ///< it up as policy_timeout: one that answers in turn is given its time for each
   double start_s = 0;      ///< for an episode's start, if longer: a process that was restarted may have much to load
   double repeat_after_s =
       0.5;                  ///< before the first repeat of what was not answered; doubles with each, up to eightfold

@@ -22,7 +22,7 @@
 namespace evac {
 namespace {
 
-constexpr double kGrasps = 0.5;  ///< a hand told to close further than this has grasped
+constexpr double kGrasps = 0.5;  ///< a hand told to close further than this, or found so, has grasped
 constexpr double kFocalTolerance = 0.05, kMountTolerance_m = 0.03, kMountTolerance_rad = 0.09;
 
 LearnedShape ShapeOf(const WeightFile& file) {
@@ -57,6 +57,8 @@ std::string Difference(const Camera& trained, const Camera& asked) {
                        between.translation().norm(), turn_rad * 180 / M_PI);
   return "";
 }
+
+bool Grasps(const ArmState& arm) { return arm.closure > kGrasps; }
 
 std::string Stem(const std::filesystem::path& path) { return path.stem().string(); }
 
@@ -113,7 +115,6 @@ void LearnedPolicy::Reset(SceneId scene, const Task& task, std::uint64_t) {
   Episode episode;
   episode.task = task;
   episode.task_index = known - shape.tasks.begin();
-  episode.grasped.assign(shape.arms.size(), false);
   for (const Camera& trained : network_->cameras) {
     const auto found =
         std::find_if(task.cameras.begin(), task.cameras.end(), [&](const Camera& c) { return c.name == trained.name; });
@@ -137,12 +138,17 @@ std::vector<Acted> LearnedPolicy::Act(std::span<const SceneObservation> batch) {
   return answers;
 }
 
+void LearnedPolicy::Begin(const Arms& arms, Episode& episode) {
+  episode.told = arms;
+  for (const ArmState& arm : arms) episode.grasped.push_back(Grasps(arm));
+}
+
 ActionChunk LearnedPolicy::Answer(Episode& episode, const Observation& observation) const {
   const at::NoGradGuard no_gradients;
   const LearnedShape& shape = network_->shape;
   const auto views = static_cast<std::int64_t>(episode.views.size()),
              arms = static_cast<std::int64_t>(shape.arms.size());
-  if (episode.told.empty()) episode.told = observation.arms;
+  if (episode.told.empty()) Begin(observation.arms, episode);
   at::Tensor bytes = at::empty({1, views, shape.height_px, shape.width_px, 3}, at::kByte);
   LearnedInput input{{},
                      at::empty({1, views, 3, 3}),
@@ -173,7 +179,7 @@ ActionChunk LearnedPolicy::Answer(Episode& episode, const Observation& observati
       ArmState arm = ArmFrom(targets[0][k][a].data_ptr<float>());
       arm.base_from_gripper = Inside(arm.base_from_gripper, episode.task.workspace_m);
       target.push_back(arm);
-      if (arm.closure > kGrasps) episode.grasped[static_cast<std::size_t>(a)] = true;
+      if (Grasps(arm)) episode.grasped[static_cast<std::size_t>(a)] = true;
     }
   }
   episode.told = chunk.targets.back();

@@ -40,8 +40,10 @@ class LearnedPolicy : public Policy {
     std::int64_t task_index = 0;
     std::vector<std::size_t> views;  ///< where each camera of the network is in the observation
     Arms told;                       ///< last targets; empty before the first observation
-    std::vector<bool> grasped;       ///< per arm: the hand was told to close
+    std::vector<bool> grasped;       ///< per arm: the hand was told to close, or began closed; empty as `told`
   };
+  /// The first moment: as in training, where a recording's first frame counts.
+  static void Begin(const Arms& arms, Episode& episode);
   ActionChunk Answer(Episode& episode, const Observation& observation) const;
 
   std::unique_ptr<const Network> network_;

@@ -38,7 +38,7 @@ std::vector<Acted> ReplayPolicy::Act(std::span<const SceneObservation> batch) {
 
 Acted ReplayPolicy::Next(SceneId scene) {
   std::size_t& row = next_row_.at(scene);
-  const auto& rows = recording_.arms;
+  const auto& rows = recording_.told.empty() ? recording_.arms : recording_.told;
   if (row >= rows.size())
     return Failure{StopReason::kPolicyError,
                    fmt::format("recording {} is over: it has {} steps", recording_.id, rows.size())};

@@ -7,8 +7,9 @@
 
 namespace evac {
 
-/// Plays a recorded trajectory: after the start (row 0), rows 1, 2, … in chunks, whatever it observes. The last chunk
-/// may be shorter and ends the recording. Every target must be executed, so its declaration needs whole_chunks.
+/// Plays a recorded trajectory: after the start (row 0), rows 1, 2, … in chunks, whatever it observes: where the arms
+/// were told to be, if the recording was read with that (`Recording::told`), else where they were. The last chunk may
+/// be shorter and ends the recording. Every target must be executed, so its declaration needs whole_chunks.
 class ReplayPolicy : public Policy {
  public:
   /// @param recording   at least two steps.

@@ -4,6 +4,7 @@
 #include <set>
 #include <utility>
 
+#include "core/statistics/rate_difference.h"
 #include "core/statistics/rates.h"
 
 namespace evac {
@@ -58,6 +59,25 @@ Estimate ClusteredRate(const std::map<Cell, Count>& clusters, double confidence)
   return ClusteredWilsonInterval(counts, confidence);
 }
 
+/// The test of a table, on what its pairs tell as much as.
+void Test(const std::vector<JudgedEpisode>& episodes, PairTable& table) {
+  std::map<std::string, PairedOutcomes> states;
+  for (const EpisodePair& pair : table.pairs) {
+    const JudgedEpisode& real = episodes[pair.real];
+    const JudgedEpisode& other = episodes[pair.other];
+    if (!real.Counts() || !other.Counts()) continue;
+    PairedOutcomes& state = states[real.episode.key.pair.initial_state];
+    ++state.pairs;
+    if (real.outcome != other.outcome)
+      ++(real.outcome == Outcome::kSuccess ? state.flips.only_first : state.flips.only_second);
+  }
+  std::vector<PairedOutcomes> clusters;
+  for (const auto& [state, outcomes] : states) clusters.push_back(outcomes);
+  const PairedOutcomes effective = EffectivePairs(clusters);
+  table.effective_pairs = effective.pairs;
+  table.test = McNemarExact(effective.flips);
+}
+
 PairTable TableOf(const std::vector<JudgedEpisode>& episodes, const Cell& cell, const Indices& real,
                   const Indices& other) {
   PairTable table;
@@ -76,7 +96,7 @@ PairTable TableOf(const std::vector<JudgedEpisode>& episodes, const Cell& cell, 
     partners.erase(partner);
   }
   table.unpaired += static_cast<std::int64_t>(partners.size());
-  table.test = McNemarExact({table.real_only, table.other_only});
+  Test(episodes, table);
   return table;
 }
 
@@ -96,15 +116,6 @@ StateCounts CountsByState(const std::vector<JudgedEpisode>& episodes, const Pair
     in_other.successes += other.outcome == Outcome::kSuccess;
   }
   return states;
-}
-
-Count Total(const std::vector<Count>& counts) {
-  Count total;
-  for (const Count& count : counts) {
-    total.successes += count.successes;
-    total.trials += count.trials;
-  }
-  return total;
 }
 
 std::vector<Count> Reals(const StateCounts& states) {
@@ -137,8 +148,8 @@ TaskPoints PointsOf(TaskCounts counts) {
     CorrelationPoint& point = result.points.emplace_back();
     point.task = counts.task;
     point.policy = policy;
-    point.real = Total(outcomes.real);
-    point.sim = Total(outcomes.sim);
+    point.real = SumOf(outcomes.real);
+    point.sim = SumOf(outcomes.sim);
     point.real_sr = static_cast<double>(point.real->successes) / static_cast<double>(point.real->trials);
     point.sim_sr = static_cast<double>(point.sim->successes) / static_cast<double>(point.sim->trials);
   }

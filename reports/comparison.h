@@ -25,8 +25,9 @@ struct PairTable {
   std::int64_t both_succeed = 0, real_only = 0, other_only = 0, both_fail = 0;  ///< of the pairs where both count
   std::int64_t uncounted = 0;  ///< pairs where one of the two is an error, or has no verdict of success or failure
   std::int64_t unpaired = 0;   ///< episodes of either world without their partner
-  McNemar test;                ///< of "the two worlds succeed equally often"
-  Estimate agreement;          ///< (both succeed + both fail) / counted pairs
+  std::int64_t effective_pairs = 0;  ///< what the counted pairs tell as much as: repeats of a state are not new
+  McNemar test;                      ///< of "the two worlds succeed equally often", on the effective pairs
+  Estimate agreement;                ///< (both succeed + both fail) / counted pairs
   std::int64_t Counted() const { return both_succeed + real_only + other_only + both_fail; }
 };
 

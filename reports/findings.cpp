@@ -6,6 +6,7 @@
 #include <map>
 
 #include "core/statistics/mcnemar.h"
+#include "core/statistics/rate_difference.h"
 #include "reports/counted_judges.h"
 #include "reports/wording.h"
 
@@ -77,31 +78,29 @@ std::vector<const RateCell*> Ranked(const RunSummary& summary, const std::string
   return cells;
 }
 
-struct PolicyPairs {
-  Flips flips;
-  std::int64_t pairs = 0;
-};
-
-/// Two policies in the real world, paired by initial state and seed.
-PolicyPairs PairsOf(const RunSummary& summary, const RateCell& first, const RateCell& second) {
+/// Two policies in the real world, paired by initial state and seed: the pairs of each initial state.
+std::vector<PairedOutcomes> PairsByState(const RunSummary& summary, const RateCell& first, const RateCell& second) {
   std::map<std::pair<std::string, std::uint64_t>, bool> in_first;
-  PolicyPairs result;
+  std::map<std::string, PairedOutcomes> states;
   for (const std::string& policy : {first.policy, second.policy}) {
     for (const JudgedEpisode& judged : summary.episodes) {
       const EpisodeKey& key = judged.episode.key;
       if (!judged.Counts() || key.world != first.world || key.pair.task != first.task) continue;
       if (PolicyLabel(key.pair.policy, key.pair.checkpoint) != policy) continue;
-      const std::pair state{key.pair.initial_state, key.pair.seed};
+      const std::pair where{key.pair.initial_state, key.pair.seed};
       const bool success = judged.outcome == Outcome::kSuccess;
       if (policy == first.policy) {
-        in_first[state] = success;
-      } else if (const auto same = in_first.find(state); same != in_first.end()) {
-        ++result.pairs;
-        if (same->second != success) ++(success ? result.flips.only_second : result.flips.only_first);
+        in_first[where] = success;
+      } else if (const auto same = in_first.find(where); same != in_first.end()) {
+        PairedOutcomes& state = states[key.pair.initial_state];
+        ++state.pairs;
+        if (same->second != success) ++(success ? state.flips.only_second : state.flips.only_first);
       }
     }
   }
-  return result;
+  std::vector<PairedOutcomes> pairs;
+  for (const auto& [name, state] : states) pairs.push_back(state);
+  return pairs;
 }
 
 std::string RateInWords(const RateCell& cell) {
@@ -119,15 +118,17 @@ Finding Best(const RunSummary& summary, const std::string& task) {
         ranked.empty() ? "No episode has been judged." : RateInWords(*ranked[0]) + "; no other policy to compare.";
     return finding;
   }
-  const PolicyPairs paired = PairsOf(summary, *ranked[0], *ranked[1]);
-  const Flips& flips = paired.flips;
-  const double p = McNemarExact(flips).p_exact;
-  const bool decided = p < kAlpha && flips.only_first > flips.only_second;
+  const std::vector<PairedOutcomes> states = PairsByState(summary, *ranked[0], *ranked[1]);
+  const PairedOutcomes all = SumOf(states), effective = EffectivePairs(states);
+  const bool has_repeats = all.pairs > static_cast<std::int64_t>(states.size());
+  const double p = McNemarExact(effective.flips).p_exact;
+  const bool decided = p < kAlpha && all.flips.only_first > all.flips.only_second;
   finding.decision = decided ? Decision::kYes : Decision::kNotDecided;
   finding.answer = fmt::format(
-      "{}{} {}. In {}, {} to {} where only one of the two succeeds: exact McNemar {}.", decided ? "" : "Between ",
+      "{}{} {}. In {}, {} to {} where only one of the two succeeds: {} {}.", decided ? "" : "Between ",
       RateInWords(*ranked[0]) + (decided ? "," : ""), (decided ? "ahead of " : "and ") + RateInWords(*ranked[1]),
-      Counted(paired.pairs, "shared initial state"), flips.only_first, flips.only_second, PValue(p));
+      Counted(all.pairs, has_repeats ? "shared pair" : "shared initial state"), all.flips.only_first,
+      all.flips.only_second, OnPairs("exact McNemar", {all.pairs, effective.pairs}), PValue(p));
   return finding;
 }
 

@@ -20,37 +20,21 @@ constexpr double kPower = 0.8;                   // of the sizes that "more" pro
 constexpr double kShownConfidence = 0.95;        // of the two rates
 constexpr std::int64_t kMostExactTrials = 1000;  // above, Newcombe's interval says nearly the same and at once
 
-Count SumOf(const std::vector<Count>& counts) {
-  Count sum;
-  for (const Count& count : counts) {
-    sum.successes += count.successes;
-    sum.trials += count.trials;
-  }
-  return sum;
-}
-
-/// Repeats of a state as the number of trials that would tell as much.
-Count Effective(const std::vector<Count>& counts) {
-  const ClusterStatistics statistics = StatisticsOfClusters(counts);
-  if (!statistics.effective_trials || !statistics.rate) return SumOf(counts);
-  const auto trials = std::max<std::int64_t>(1, std::llround(*statistics.effective_trials));
-  return {std::llround(*statistics.rate * static_cast<double>(trials)), trials};
-}
-
 std::string Margin(const GateRule& rule) { return fmt::format("{:g} points", 100 * rule.margin); }
 
 double PassConfidence(const GateRule& rule) { return 1 - 2 * rule.alpha; }
 
 /// Pairs of which the lower end of the difference would clear -margin, and those that would show it worse, both if the
-/// flips stay as seen.
-std::string MorePairs(const GateRule& rule, const GatePairs& pairs) {
-  const double n = static_cast<double>(pairs.all.pairs) + 1,
-               better = static_cast<double>(pairs.all.flips.only_first) + 0.5,
-               worse = static_cast<double>(pairs.all.flips.only_second) + 0.5, d = (better - worse) / n;
+/// flips stay as seen and further pairs repeat states as these do.
+std::string MorePairs(const GateRule& rule, const PairedOutcomes& seen, std::int64_t effective) {
+  const Repeated have{seen.pairs, effective};
+  const double each = seen.pairs > 0 ? static_cast<double>(effective) / static_cast<double>(seen.pairs) : 1;
+  const double n = static_cast<double>(effective) + 1,
+               better = static_cast<double>(seen.flips.only_first) * each + 0.5,
+               worse = static_cast<double>(seen.flips.only_second) * each + 0.5, d = (better - worse) / n;
   std::vector<std::string> parts;
   const auto add = [&](double wanted, const std::string& what) {
-    const auto further = static_cast<std::int64_t>(std::ceil(wanted)) - pairs.all.pairs;
-    parts.push_back(fmt::format("about {} more pairs to show it {}", std::max<std::int64_t>(1, further), what));
+    parts.push_back(fmt::format("about {} more pairs to show it {}", FurtherWanted(wanted, have), what));
   };
   if (const double room = rule.margin + d; room > 0.005) {
     const double z = NormalQuantile(1 - rule.alpha) + NormalQuantile(kPower);
@@ -62,18 +46,25 @@ std::string MorePairs(const GateRule& rule, const GatePairs& pairs) {
   return "If the flips stay as seen: " + parts.front() + (parts.size() > 1 ? ", " + parts.back() : "") + ".";
 }
 
-std::string MoreTrials(const GateRule& rule, const Count& candidate, const Count& baseline) {
-  if (candidate.trials == 0 || baseline.trials == 0) return "";
+/// One policy's trials: all of them, and what they tell as much as where states repeat.
+struct Trials {
+  explicit Trials(const std::vector<Count>& states) : all(SumOf(states)), effective(EffectiveCount(states)) {}
+  Repeated Number() const { return {all.trials, effective.trials}; }
+  Count all, effective;
+};
+
+std::string MoreTrials(const GateRule& rule, const Trials& candidate, const Trials& baseline) {
+  if (candidate.all.trials == 0 || baseline.all.trials == 0) return "";
   const auto rate = [](const Count& c) {
     return (static_cast<double>(c.successes) + 0.5) / (static_cast<double>(c.trials) + 1);
   };
-  const double p = rate(candidate), q = rate(baseline), room = rule.margin + p - q;
+  const double p = rate(candidate.effective), q = rate(baseline.effective), room = rule.margin + p - q;
   if (room <= 0.005) return "";
   const double z = NormalQuantile(1 - rule.alpha) + NormalQuantile(kPower);
   const double wanted = std::ceil(z * z * (p * (1 - p) + q * (1 - q)) / (room * room));
-  const auto have = std::min(candidate.trials, baseline.trials);
-  return fmt::format("If the rates stay as seen: about {} more episodes of each to show it not worse by {}.",
-                     std::max<std::int64_t>(1, static_cast<std::int64_t>(wanted) - have), Margin(rule));
+  const auto further = std::max(FurtherWanted(wanted, candidate.Number()), FurtherWanted(wanted, baseline.Number()));
+  return fmt::format("If the rates stay as seen: about {} more episodes of each to show it not worse by {}.", further,
+                     Margin(rule));
 }
 
 /// Rates, difference, flips: what every comparison shows.
@@ -95,18 +86,20 @@ Estimate DifferenceOf(const GatePairs& pairs, double confidence) {
   Estimate difference = TangoDifference(pairs.effective, confidence);
   difference.value = TangoDifference(pairs.all, confidence).value;
   difference.n = pairs.all.pairs;
-  if (pairs.effective.pairs < pairs.all.pairs)
-    difference.method = fmt::format("Tango on {} effective pairs", pairs.effective.pairs);
+  difference.method = OnPairs("Tango", {pairs.all.pairs, pairs.effective.pairs});
   return difference;
 }
 
-/// Everything of an anytime-valid test but the looks before: both kinds of flips within their confidence sequences.
+/// Everything of an anytime-valid test but the looks before: both kinds of flips within their confidence sequences. One
+/// pair of each state: no design effect is known ahead, and what is bet must be.
 Estimate SequentialDifference(const GatePairs& pairs, double alpha) {
+  const PairedOutcomes& bet = pairs.one_each;
   const double confidence = 1 - alpha / 2;  // two sequences share alpha
-  const auto sequence = [&](std::int64_t flips) { return ConfidenceSequence({flips, pairs.all.pairs}, confidence); };
+  const auto sequence = [&](std::int64_t flips) { return ConfidenceSequence({flips, bet.pairs}, confidence); };
   Estimate difference = DifferenceOf(pairs, 1 - alpha);
+  difference.n = bet.pairs;
   difference.method = "two Beta-binomial confidence sequences";
-  const Estimate better = sequence(pairs.all.flips.only_first), worse = sequence(pairs.all.flips.only_second);
+  const Estimate better = sequence(bet.flips.only_first), worse = sequence(bet.flips.only_second);
   difference.interval = Undefined{"no pairs"};
   if (better.value && worse.value)
     difference.interval =
@@ -117,12 +110,13 @@ Estimate SequentialDifference(const GatePairs& pairs, double alpha) {
 /// This look's bet and the largest of all looks that leaned towards "worse".
 void Bet(const GateInput& input, const GatePairs& pairs, Evidence& evidence) {
   RuleDecision& decision = evidence.decision;
-  const auto [better, worse] = pairs.all.flips;
-  const SequentialLook look{fmt::format("gate {}, rule {}: {} against {} of {:.16} in {}, judge {}", input.gate,
-                                        decision.name, decision.policy, decision.baseline_policy,
+  const auto [better, worse] = pairs.one_each.flips;
+  const std::int64_t n = pairs.one_each.pairs;
+  const SequentialLook look{fmt::format("gate {}, rule {}: {} against {} of {:.16} in {}, judge {}, one pair a state",
+                                        input.gate, decision.name, decision.policy, decision.baseline_policy,
                                         input.data.baseline->sha256, decision.world, input.data.candidate.judge),
                             decision.task,
-                            pairs.all.pairs,
+                            n,
                             better,
                             worse,
                             FlipsEValue(better, worse)};
@@ -139,8 +133,9 @@ void Bet(const GateInput& input, const GatePairs& pairs, Evidence& evidence) {
   if (is_new) evidence.look = look;
   decision.p = std::min(1.0, 1 / largest);
   decision.statement +=
-      fmt::format("{} pairs, {} better / {} worse; e-value {:.3g}, largest of {} {:.3g}, {}", pairs.all.pairs, better,
-                  worse, look.e_value, Counted(looks, "look"), largest, PValue(*decision.p));
+      fmt::format("{}{}, {} better / {} worse; e-value {:.3g}, largest of {} {:.3g}, {}", Counted(n, "pair"),
+                  n < pairs.all.pairs ? ", one of each state" : "", better, worse, look.e_value,
+                  Counted(looks, "look"), largest, PValue(*decision.p));
 }
 
 void ComparePairs(const GateRule& rule, const GateInput& input, const GateSides& sides, Evidence& evidence) {
@@ -148,12 +143,13 @@ void ComparePairs(const GateRule& rule, const GateInput& input, const GateSides&
   GatePairs pairs = PairUp(sides, input.data);
   decision.value = ClusteredWilsonInterval(pairs.candidate, kShownConfidence);
   decision.baseline = ClusteredWilsonInterval(pairs.baseline, kShownConfidence);
-  const auto [better, worse] = pairs.all.flips;
+  const bool is_bet = rule.test == GateTest::kSavi;
+  const PairedOutcomes& counted = is_bet ? pairs.one_each : pairs.all;
+  const auto [better, worse] = counted.flips;
   decision.flips_better = better;
   decision.flips_worse = worse;
-  const bool is_bet = rule.test == GateTest::kSavi;
   Describe(rule, is_bet ? SequentialDifference(pairs, rule.alpha) : DifferenceOf(pairs, PassConfidence(rule)),
-           pairs.all.pairs, evidence);
+           counted.pairs, evidence);
   if (is_bet) {
     Bet(input, pairs, evidence);
   } else {
@@ -162,10 +158,12 @@ void ComparePairs(const GateRule& rule, const GateInput& input, const GateSides&
                      ? PBelow([&](double c) { return TangoDifference(pairs.effective, c).interval; }, -rule.margin)
                  : worse > better ? McNemarExact(pairs.effective.flips).p_exact
                                   : 1.0;
-    decision.statement += fmt::format("{} pairs, {} better / {} worse, {} ({})", pairs.all.pairs, better, worse,
-                                      PValue(*decision.p), by_margin ? "Tango against the margin" : "exact McNemar");
+    decision.statement +=
+        fmt::format("{} pairs, {} better / {} worse, {} ({})", counted.pairs, better, worse, PValue(*decision.p),
+                    OnPairs(by_margin ? "Tango against the margin" : "exact McNemar",
+                            {counted.pairs, pairs.effective.pairs}));
   }
-  evidence.more = MorePairs(rule, pairs);
+  evidence.more = MorePairs(rule, counted, is_bet ? counted.pairs : pairs.effective.pairs);
   decision.counter_examples = std::move(pairs.counter_examples);
 }
 
@@ -174,10 +172,15 @@ void CompareUnpaired(const GateRule& rule, const GateSides& sides, Evidence& evi
   const std::vector<Count> candidate = CountsOf(sides.candidate), baseline = CountsOf(sides.baseline);
   decision.value = ClusteredWilsonInterval(candidate, kShownConfidence);
   decision.baseline = ClusteredWilsonInterval(baseline, kShownConfidence);
-  const Count one = Effective(candidate), two = Effective(baseline);
-  Describe(rule, NewcombeDifference(one, two, PassConfidence(rule)), SumOf(candidate).trials, evidence);
+  const auto difference = [&](double confidence) {
+    return NewcombeOfRates(ClusteredWilsonInterval(candidate, confidence),
+                           ClusteredWilsonInterval(baseline, confidence));
+  };
+  const Trials here(candidate), there(baseline);
+  Describe(rule, difference(PassConfidence(rule)), here.all.trials, evidence);
+  const Count &one = here.effective, &two = there.effective;
   const bool by_margin = rule.test == GateTest::kNonInferiority, is_large = one.trials + two.trials > kMostExactTrials;
-  const auto interval = [&](double confidence) { return NewcombeDifference(one, two, confidence).interval; };
+  const auto interval = [&](double confidence) { return difference(confidence).interval; };
   if (one.trials == 0 || two.trials == 0) {
     decision.p = Undefined{"one of the two has no episode that counts"};
   } else if (by_margin) {
@@ -187,10 +190,11 @@ void CompareUnpaired(const GateRule& rule, const GateSides& sides, Evidence& evi
   } else {
     decision.p = std::min(1.0, 2 * BoschlooExact(one, two).less);
   }
-  decision.statement += fmt::format("{} and {} episodes, {} ({})", SumOf(candidate).trials, SumOf(baseline).trials,
-                                    decision.p ? PValue(*decision.p) : decision.p.reason(),
-                                    by_margin || is_large ? "Newcombe" : "Boschloo");
-  evidence.more = MoreTrials(rule, one, two);
+  decision.statement += fmt::format(
+      "{} and {} episodes, {} ({})", here.all.trials, there.all.trials,
+      decision.p ? PValue(*decision.p) : decision.p.reason(),
+      OnEpisodes(by_margin || is_large ? "Newcombe" : "Boschloo", here.Number(), there.Number()));
+  evidence.more = MoreTrials(rule, here, there);
 }
 
 /// What stands before any test.

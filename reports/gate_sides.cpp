@@ -81,15 +81,26 @@ void DemandSame(const std::string& found, const std::string& wanted, const std::
   if (found != wanted) throw InvalidInput("{}: found {}, wanted the baseline's, {}", what, found, wanted);
 }
 
+/// Unpaired, tasks are not kept apart: an easier one would pass for a better policy.
+void DemandOneTask(const GateSides& sides, const std::string& what) {
+  for (const auto& [side, where] : {std::pair{&sides.candidate, ""}, std::pair{&sides.baseline, " in the baseline"}}) {
+    if (side->cells.size() > 1)
+      throw InvalidInput("{}task: found {} tasks{}, wanted one: unpaired tasks pooled can say the opposite of each",
+                         what, side->cells.size(), where);
+  }
+  DemandSame(sides.candidate.cells.front()->task, sides.baseline.cells.front()->task, what + "task");
+}
+
 void DemandComparable(const GateSides& sides, const GateRule& rule, const GateData& data, const std::string& what) {
-  if (!rule.ComparesPairs()) return;
-  const std::string& world = sides.world;
-  DemandSame(data.candidate.worlds.at(world), data.baseline->worlds.at(world), what + "profile of world " + world);
+  if (!rule.ComparesPairs()) DemandOneTask(sides, what);
   for (const PinnedCell* cell : sides.candidate.cells) {
     if (data.baseline->tasks.contains(cell->task))
       DemandSame(data.candidate.tasks.at(cell->task), data.baseline->tasks.at(cell->task),
                  what + "page of task " + cell->task);
   }
+  if (!rule.ComparesPairs()) return;
+  const std::string& world = sides.world;
+  DemandSame(data.candidate.worlds.at(world), data.baseline->worlds.at(world), what + "profile of world " + world);
   DemandSameStates(sides, rule.test == GateTest::kSavi, what);
 }
 
@@ -112,9 +123,26 @@ std::map<Place, const PinnedOutcome*> ByPlace(const GateSide& side) {
   return places;
 }
 
+/// Of each (task, initial state) the first seed that counts.
+std::set<Place> FirstOfEachState(const std::map<Place, const PinnedOutcome*>& places) {
+  std::set<Place> firsts;
+  std::set<std::pair<std::string, std::string>> states;
+  for (const auto& [place, one] : places) {
+    const auto& [task, state, seed] = place;
+    if (one->Counts() && states.insert({task, state}).second) firsts.insert(place);
+  }
+  return firsts;
+}
+
 void Add(bool success, Count& count) {
   ++count.trials;
   count.successes += success;
+}
+
+void Add(bool now, bool then, PairedOutcomes& outcomes) {
+  ++outcomes.pairs;
+  outcomes.flips.only_first += now && !then;
+  outcomes.flips.only_second += !now && then;
 }
 
 }  // namespace
@@ -135,9 +163,6 @@ GateSides SidesOf(const GateRule& rule, const GateData& data) {
     throw InvalidInput("{}world: found '{}', which the baseline has not, wanted one of: {}", what, sides.world,
                        fmt::join(Keys(data.baseline->worlds), ", "));
   DemandSame(data.candidate.judge, data.baseline->judge, what + "judge");
-  if (!rule.is_paired && sides.candidate.cells.size() > 1)
-    throw InvalidInput("{}task: found {} tasks, wanted one: unpaired tasks pooled can say the opposite of each", what,
-                       sides.candidate.cells.size());
   const std::string other = BaselinePolicy(rule, policy, data.baseline->Policies(), what);
   sides.baseline = SideOf(*data.baseline, rule, sides.world, other);
   if (sides.baseline.cells.empty())
@@ -151,15 +176,14 @@ GatePairs PairUp(const GateSides& sides, const GateData& data) {
   std::map<std::pair<std::string, std::string>, PairedOutcomes> states;
   std::map<std::pair<std::string, std::string>, Count> candidate, baseline;
   const std::map<Place, const PinnedOutcome*> before = ByPlace(sides.baseline);
+  const std::set<Place> first = FirstOfEachState(before);
   for (const auto& [place, one] : ByPlace(sides.candidate)) {
     const auto partner = before.find(place);
     if (partner == before.end() || !one->Counts() || !partner->second->Counts()) continue;
     const auto& [task, state, seed] = place;
     const bool now = one->outcome == Outcome::kSuccess, then = partner->second->outcome == Outcome::kSuccess;
-    PairedOutcomes& outcomes = states[{task, state}];
-    ++outcomes.pairs;
-    outcomes.flips.only_first += now && !then;
-    outcomes.flips.only_second += !now && then;
+    Add(now, then, states[{task, state}]);
+    if (first.contains(place)) Add(now, then, pairs.one_each);
     Add(now, candidate[{task, state}]);
     Add(then, baseline[{task, state}]);
     if (!now && then && pairs.counter_examples.size() < kMostCounterExamples)
@@ -167,12 +191,8 @@ GatePairs PairUp(const GateSides& sides, const GateData& data) {
           {task, state, seed, ClipPath(data.candidate, one->video), ClipPath(*data.baseline, partner->second->video)});
   }
   std::vector<PairedOutcomes> clusters;
-  for (const auto& [state, outcomes] : states) {
-    clusters.push_back(outcomes);
-    pairs.all.pairs += outcomes.pairs;
-    pairs.all.flips.only_first += outcomes.flips.only_first;
-    pairs.all.flips.only_second += outcomes.flips.only_second;
-  }
+  for (const auto& [state, outcomes] : states) clusters.push_back(outcomes);
+  pairs.all = SumOf(clusters);
   pairs.effective = EffectivePairs(clusters);
   pairs.candidate = Values(candidate);
   pairs.baseline = Values(baseline);

@@ -31,14 +31,17 @@ struct GateSides {
 };
 
 /// @throws InvalidInput naming the rule: a policy, world or task that is not there or is not named where there are
-/// several; no baseline; for pairs another list of initial states, another task page or another world profile than the
-/// baseline's (a sequential rule may have seen only a part of its states yet).
+/// several; no baseline; another task page than the baseline's; for pairs another list of initial states or another
+/// world profile (a sequential rule may have seen only a part of its states yet); without pairs more than one task on
+/// either side, or not the same.
 GateSides SidesOf(const GateRule& rule, const GateData& data);
 
 /// The states that count on both sides. "First" is the candidate: flips.only_first are for the better.
 struct GatePairs {
   PairedOutcomes all;
   PairedOutcomes effective;                ///< where states repeat (several seeds), what the pairs tell as much as
+  PairedOutcomes one_each;                 ///< one pair of each state: the first seed that counts in the baseline, so
+                                           ///< that a growing run adds pairs and exchanges none
   std::vector<Count> candidate, baseline;  ///< by (task, initial state)
   std::vector<CounterExample> counter_examples;  ///< at most kMostCounterExamples, in order
 };

@@ -126,7 +126,7 @@ Headline Trusted(const ReportData& report) {
     headline.items = {{"unknown", report.no_trust, ""}};
     return headline;
   }
-  const bool one = report.trust.size() == 1;
+  const bool one = report.trust.size() == 1 && report.unsaid.empty();
   headline.question =
       fmt::format("Can I trust {} to within ±{:.0f} points?", one ? report.trust[0].world : "the other worlds",
                   100 * report.trust[0].options.margin);
@@ -142,6 +142,8 @@ Headline Trusted(const ReportData& report) {
   }
   if (left_out > 0)
     headline.items.push_back({"", Counted(static_cast<std::int64_t>(left_out), "further task") + " below", "#trust"});
+  for (const auto& [world, reason] : report.unsaid)
+    headline.items.push_back({"unknown", fmt::format("{}: {}", world, reason), "#trust"});
   if (headline.items.empty()) headline.items.push_back({"unknown", "no task was tried in both worlds", "#trust"});
   return headline;
 }

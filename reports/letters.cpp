@@ -1,12 +1,14 @@
 #include "reports/letters.h"
 
 #include <algorithm>
+#include <iterator>
 #include <map>
 #include <numeric>
 #include <string>
 
 #include "core/statistics/many_comparisons.h"
 #include "core/statistics/mcnemar.h"
+#include "core/statistics/rate_difference.h"
 #include "core/statistics/two_by_two.h"
 #include "reports/summary.h"
 
@@ -15,8 +17,9 @@ namespace {
 
 constexpr double kPairedFrom = 0.8;
 
-/// One cell's outcomes that count, in the order of their key: a number for each (state, seed), and whether it succeeded.
-using Outcomes = std::vector<std::pair<std::size_t, bool>>;
+using Where = std::pair<std::size_t, std::uint64_t>;  // a number for each initial state, seed
+/// One cell's outcomes that count, in the order of their key, and whether they succeeded.
+using Outcomes = std::vector<std::pair<Where, bool>>;
 using Place = std::pair<std::string, std::string>;  // world, task
 
 struct Contestant {
@@ -31,33 +34,44 @@ struct Contest {
   bool is_paired = true;
 };
 
-double PairedP(const Outcomes& a, const Outcomes& b, std::size_t& shared) {
-  Flips flips;
-  shared = 0;
+/// The pairs of each initial state, so that its repeats do not count as if they were new.
+std::vector<PairedOutcomes> PairsByState(const Outcomes& a, const Outcomes& b) {
+  std::vector<PairedOutcomes> states;
+  std::size_t last_state = 0;
   for (auto one = a.begin(), two = b.begin(); one != a.end() && two != b.end();) {
     if (one->first != two->first) {
       ++(one->first < two->first ? one : two);
       continue;
     }
-    flips.only_first += one->second && !two->second;
-    flips.only_second += !one->second && two->second;
-    ++shared, ++one, ++two;
+    const std::size_t state = one->first.first;
+    if (states.empty() || state != last_state) states.emplace_back();
+    last_state = state;
+    ++states.back().pairs;
+    states.back().flips.only_first += one->second && !two->second;
+    states.back().flips.only_second += !one->second && two->second;
+    ++one, ++two;
   }
-  return McNemarExact(flips).p_exact;
+  return states;
 }
 
-Count CountOf(const Outcomes& outcomes) {
-  return {std::count_if(outcomes.begin(), outcomes.end(), [](const auto& one) { return one.second; }),
-          static_cast<std::int64_t>(outcomes.size())};
+Count EffectiveCountOf(const Outcomes& outcomes) {
+  std::vector<Count> states;
+  for (auto one = outcomes.begin(); one != outcomes.end(); ++one) {
+    if (one == outcomes.begin() || one->first.first != std::prev(one)->first.first) states.emplace_back();
+    ++states.back().trials;
+    states.back().successes += one->second;
+  }
+  return EffectiveCount(states);
 }
 
 Contest ContestOf(const std::vector<Contestant>& contestants, std::size_t first, std::size_t second) {
   const Outcomes &a = contestants[first].outcomes, &b = contestants[second].outcomes;
-  std::size_t shared = 0;
-  const double paired = PairedP(a, b, shared);
+  const std::vector<PairedOutcomes> states = PairsByState(a, b);
+  std::int64_t shared = 0;
+  for (const PairedOutcomes& state : states) shared += state.pairs;
   if (static_cast<double>(shared) >= kPairedFrom * static_cast<double>(std::max(a.size(), b.size())))
-    return {first, second, paired, true};
-  return {first, second, BoschlooExact(CountOf(a), CountOf(b)).two_sided, false};
+    return {first, second, McNemarExact(EffectivePairs(states).flips).p_exact, true};
+  return {first, second, BoschlooExact(EffectiveCountOf(a), EffectiveCountOf(b)).two_sided, false};
 }
 
 std::map<Place, std::vector<Contestant>> ContestantsOf(const std::vector<JudgedEpisode>& episodes,
@@ -69,16 +83,16 @@ std::map<Place, std::vector<Contestant>> ContestantsOf(const std::vector<JudgedE
     where[{{cell.world, cell.task}, cell.policy}] = contestants.size();
     contestants.push_back({&cell, {}});
   }
-  std::map<std::pair<std::string, std::uint64_t>, std::size_t> numbers;  // of (state, seed)
+  std::map<std::string, std::size_t> numbers;  // of initial states
   for (const JudgedEpisode& judged : episodes) {
     if (!judged.Counts()) continue;
     const EpisodeKey& key = judged.episode.key;
     const Place place{key.world, key.pair.task};
     const auto found = where.find({place, PolicyLabel(key.pair.policy, key.pair.checkpoint)});
     if (found == where.end()) continue;
-    const std::size_t number =
-        numbers.try_emplace({key.pair.initial_state, key.pair.seed}, numbers.size()).first->second;
-    places[place][found->second].outcomes.emplace_back(number, judged.outcome == Outcome::kSuccess);
+    const std::size_t state = numbers.try_emplace(key.pair.initial_state, numbers.size()).first->second;
+    places[place][found->second].outcomes.emplace_back(Where{state, key.pair.seed},
+                                                       judged.outcome == Outcome::kSuccess);
   }
   for (auto& [place, contestants] : places) {
     for (Contestant& one : contestants) std::sort(one.outcomes.begin(), one.outcomes.end());

@@ -17,8 +17,8 @@ struct LetterTests {
 
 /// Gives each cell its letters: within a task and a world, policies share one exactly if their difference is not
 /// significant (compact letter display, Piepho 2004). Exact McNemar over the (state, seed) pairs where both count; where
-/// fewer than 80 % are shared, Boschloo's test over all that count, as `evac compare` does. Holm over all pairs of
-/// policies that a world shows, over all its tasks.
+/// fewer than 80 % are shared, Boschloo's test over all that count, as `evac compare` does. Both on the effective number
+/// where initial states repeat. Holm over all pairs of policies that a world shows, over all its tasks.
 /// @param alpha  in (0, 1): of the whole family
 LetterTests GiveLetters(const std::vector<JudgedEpisode>& episodes, double alpha, std::vector<RateCell>& cells);
 

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <set>
 
 #include "reports/counted_judges.h"
@@ -56,6 +57,10 @@ std::string Rates(const RunSummary& summary) {
                      Joined(methods));
 }
 
+bool HasRepeats(const RunSummary& summary) {
+  return std::ranges::any_of(summary.rates, [](const RateCell& cell) { return cell.rate.n > cell.states; });
+}
+
 std::string Policies(const ReportData& report) {
   if (report.candidates.empty()) return "";
   std::set<std::string> tests, intervals;
@@ -75,8 +80,9 @@ std::string Policies(const ReportData& report) {
   if (report.letters.pairs > 0) {
     letters = fmt::format(
         "Letters join policies whose difference on a task in a world is not significant (exact McNemar over shared "
-        "states and seeds{}; Holm over the {} of a world; Piepho 2004). ",
+        "states and seeds{}{}; Holm over the {} of a world; Piepho 2004). ",
         report.letters.has_unpaired ? ", Boschloo where fewer than 80 % are shared" : "",
+        HasRepeats(report.summary) ? ", on effective pairs and episodes" : "",
         Counted(report.letters.pairs, "pair"));
   }
   return fmt::format(

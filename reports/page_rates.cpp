@@ -132,7 +132,7 @@ std::string RatesPart(const ReportData& report) {
   if (report.letters.pairs > 0) {
     html += fmt::format(
         " Policies that share a letter, on one task in one world, do not differ significantly: exact McNemar over "
-        "shared initial states, Holm over {} of a world, {:.0f} %.",
+        "shared initial states (on their effective number where states repeat), Holm over {} of a world, {:.0f} %.",
         Counted(report.letters.pairs, "pair"), 100 * (1 - summary.options.confidence));
   }
   html += "</p>";

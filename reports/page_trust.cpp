@@ -82,6 +82,9 @@ std::string TrustPart(const ReportData& report) {
         Escaped(trust.world), Escaped(trust.real), 100 * trust.options.margin, Escaped(trust.world));
     html += TaskTable(trust) + PredictedRates(trust);
   }
+  for (const auto& [world, reason] : report.unsaid)
+    html += fmt::format("<h3>May {} stand for the real world?</h3><p>No statement: {}.</p>", Escaped(world),
+                        Escaped(reason));
   return html + "</section>";
 }
 

@@ -1,7 +1,5 @@
 #include "reports/policy_comparison.h"
 
-#include <fmt/format.h>
-
 #include <algorithm>
 #include <cmath>
 #include <map>
@@ -15,6 +13,7 @@
 #include "core/statistics/stratified.h"
 #include "core/statistics/two_by_two.h"
 #include "reports/comparison.h"
+#include "reports/wording.h"
 
 namespace evac {
 namespace {
@@ -52,10 +51,17 @@ Estimate RateOfSide(const Side& side, double confidence) {
   return RateOf(episodes, confidence);
 }
 
-Count CountOf(const Side& side) {
-  Count count{0, static_cast<std::int64_t>(side.counted.size())};
-  for (const auto& [where, judged] : side.counted) count.successes += Succeeded(*judged);
-  return count;
+/// By initial state, so that repeats of one do not count as if they were new.
+Count EffectiveCountOf(const Side& side) {
+  std::map<std::string, Count> states;
+  for (const auto& [where, judged] : side.counted) {
+    Count& state = states[where.first];
+    ++state.trials;
+    state.successes += Succeeded(*judged);
+  }
+  std::vector<Count> clusters;
+  for (const auto& [state, count] : states) clusters.push_back(count);
+  return EffectiveCount(clusters);
 }
 
 Side SharedPart(const Side& side, const Side& other) {
@@ -96,29 +102,34 @@ Winner WinnerOf(const ComparisonRow& row, const Number& p, double alpha) {
   return *row.difference.value > 0 ? Winner::kFirst : Winner::kSecond;
 }
 
-/// From the flips seen, half a flip added to each kind so that none is thought impossible.
-Defined<std::int64_t> MorePairs(const ComparisonRow& row, const ComparisonOptions& options) {
+/// From the flips that as many independent pairs would have had, half a flip added to each kind so that none is thought
+/// impossible.
+Defined<std::int64_t> MorePairs(const ComparisonRow& row, const Promise& promise) {
   const auto [b, c] = row.flips;
   if (b == c) return Undefined{b == 0 ? "no pair differs" : "the flips lean to neither side"};
-  const double n = static_cast<double>(row.shared) + 1;
-  const FlipRates rates{(static_cast<double>(b) + 0.5) / n, (static_cast<double>(c) + 0.5) / n};
-  const SampleSize size = PairsForMcNemar(rates, {options.alpha, options.power});
+  const double n = static_cast<double>(row.pairs.effective), each = n / static_cast<double>(row.pairs.all);
+  const FlipRates rates{(static_cast<double>(b) * each + 0.5) / (n + 1),
+                        (static_cast<double>(c) * each + 0.5) / (n + 1)};
+  const SampleSize size = PairsForMcNemar(rates, promise);
   if (!size.exact) return Undefined{size.exact.reason()};
-  return std::max<std::int64_t>(1, size.n - row.shared);
+  return FurtherWanted(static_cast<double>(size.n), row.pairs);
 }
 
-Defined<std::int64_t> MoreEpisodes(const ComparisonRow& row, const ComparisonOptions& options) {
+Defined<std::int64_t> MoreEpisodes(const ComparisonRow& row, const Promise& promise) {
   if (!row.first.value || !row.second.value) return Undefined{"one of the two has no episode that counts"};
-  const SampleSize size = TrialsPerPolicy(*row.first.value, *row.second.value, {options.alpha, options.power});
+  const SampleSize size = TrialsPerPolicy(*row.first.value, *row.second.value, promise);
   if (!size.exact) return Undefined{size.exact.reason()};
-  return std::max<std::int64_t>(1, size.n - std::min(row.first_episodes, row.second_episodes));
+  const double wanted = static_cast<double>(size.n);
+  return std::max(FurtherWanted(wanted, row.first_trials), FurtherWanted(wanted, row.second_trials));
 }
 
 /// Winner and "how many more", once the p that counts is known.
-void Decide(const ComparisonOptions& options, ComparisonRow& row) {
+/// @param family  how many p-values alpha was shared among; planned for the strictest of Holm's steps.
+void Decide(const ComparisonOptions& options, std::size_t family, ComparisonRow& row) {
   row.winner = WinnerOf(row, row.p_holm, options.alpha);
-  if (row.winner == Winner::kNotDecided)
-    row.more = row.is_paired ? MorePairs(row, options) : MoreEpisodes(row, options);
+  if (row.winner != Winner::kNotDecided) return;
+  const Promise promise{options.alpha / static_cast<double>(std::max<std::size_t>(1, family)), options.power};
+  row.more = row.is_paired ? MorePairs(row, promise) : MoreEpisodes(row, promise);
 }
 
 void ComparePaired(const Side& first, const Side& second, const ComparisonOptions& options, ComparisonRow& row) {
@@ -129,18 +140,21 @@ void ComparePaired(const Side& first, const Side& second, const ComparisonOption
   row.difference = TangoDifference(effective, options.confidence());
   row.difference.value = seen;
   row.difference.n = row.shared;
-  const bool has_repeats = effective.pairs < row.shared;
-  if (has_repeats) row.difference.method = fmt::format("Tango on {} effective pairs", effective.pairs);
-  row.test = has_repeats ? fmt::format("exact McNemar on {} effective pairs", effective.pairs) : "exact McNemar";
+  row.pairs = {row.shared, effective.pairs};
+  row.difference.method = OnPairs("Tango", row.pairs);
+  row.test = OnPairs("exact McNemar", row.pairs);
   if (row.shared > 0) row.p = McNemarExact(effective.flips).p_exact;
 }
 
 void CompareUnpaired(const Side& first, const Side& second, const ComparisonOptions& options, ComparisonRow& row) {
-  const Count one = CountOf(first), two = CountOf(second);
+  const Count one = EffectiveCountOf(first), two = EffectiveCountOf(second);
   row.first = RateOfSide(first, options.confidence());
   row.second = RateOfSide(second, options.confidence());
-  row.difference = NewcombeDifference(one, two, options.confidence());
-  row.test = "Boschloo";
+  row.first_trials = {row.first_episodes, one.trials};
+  row.second_trials = {row.second_episodes, two.trials};
+  row.difference = NewcombeOfRates(row.first, row.second);
+  row.difference.method = OnEpisodes("Newcombe", row.first_trials, row.second_trials);
+  row.test = OnEpisodes("Boschloo", row.first_trials, row.second_trials);
   if (one.trials > 0 && two.trials > 0) row.p = BoschlooExact(one, two).two_sided;
 }
 
@@ -169,7 +183,7 @@ void AdjustForTasks(const ComparisonOptions& options, std::vector<ComparisonRow>
   auto next = adjusted.begin();
   for (ComparisonRow& row : rows) {
     if (row.p) row.p_holm = *next++;
-    Decide(options, row);
+    Decide(options, p_values.size(), row);
   }
 }
 
@@ -183,23 +197,31 @@ Side AllTasks(const std::map<std::string, Side>& sides) {
   return all;
 }
 
-/// Paired: each pair is a stratum of its own, so that the pooled flips are the stratified test already.
-ComparisonRow CompareAll(const std::map<std::string, Side>& first, const std::map<std::string, Side>& second,
-                         const std::set<std::string>& tasks, const ComparisonOptions& options) {
-  ComparisonRow row = CompareTask("", AllTasks(first), AllTasks(second), options);
-  if (!row.is_paired && tasks.size() > 1) {
-    std::vector<Stratum> strata;
-    for (const std::string& task : tasks) {
-      const auto one = first.find(task), two = second.find(task);
-      if (one != first.end() && two != second.end()) strata.push_back({CountOf(one->second), CountOf(two->second)});
-    }
-    const StratifiedTest test = MantelHaenszel(strata, options.confidence());
-    row.difference = test.risk_difference;
-    row.test = "Cochran-Mantel-Haenszel";
-    row.p = test.p;
+/// A task is a stratum. The difference is that of the effective counts, as its interval is: one weighting makes both.
+void Stratify(const std::map<std::string, Side>& first, const std::map<std::string, Side>& second,
+              const ComparisonOptions& options, ComparisonRow& row) {
+  std::vector<Stratum> strata;
+  row.first_trials.effective = row.second_trials.effective = 0;
+  for (const auto& [task, side] : first) {
+    const Stratum& stratum = strata.emplace_back(Stratum{EffectiveCountOf(side), EffectiveCountOf(second.at(task))});
+    row.first_trials.effective += stratum.first.trials;
+    row.second_trials.effective += stratum.second.trials;
   }
+  const StratifiedTest test = MantelHaenszel(strata, options.confidence());
+  row.difference = test.risk_difference;
+  row.difference.method = OnEpisodes(row.difference.method, row.first_trials, row.second_trials);
+  row.test = OnEpisodes("Cochran-Mantel-Haenszel", row.first_trials, row.second_trials);
+  row.p = test.p;
+}
+
+/// Paired: each pair is a stratum of its own, so that the pooled flips are the stratified test already.
+/// @param first, second  each with a side for every task, empty where there is none.
+ComparisonRow CompareAll(const std::map<std::string, Side>& first, const std::map<std::string, Side>& second,
+                         const ComparisonOptions& options) {
+  ComparisonRow row = CompareTask("", AllTasks(first), AllTasks(second), options);
+  if (!row.is_paired && first.size() > 1) Stratify(first, second, options, row);
   row.p_holm = row.p;
-  Decide(options, row);
+  Decide(options, 1, row);
   return row;
 }
 
@@ -219,7 +241,7 @@ PolicyComparison ComparePolicies(const ComparedPolicy& first, const ComparedPoli
   PolicyComparison comparison{first.name, second.name, options, {}, {}};
   for (const std::string& task : tasks) comparison.tasks.push_back(CompareTask(task, one[task], two[task], options));
   AdjustForTasks(options, comparison.tasks);
-  comparison.all = CompareAll(one, two, tasks, options);
+  comparison.all = CompareAll(one, two, options);
   return comparison;
 }
 

@@ -7,10 +7,12 @@
 
 #include "core/statistics/estimate.h"
 #include "core/statistics/mcnemar.h"
+#include "core/statistics/rates.h"
 #include "reports/outcome.h"
 
 /// Which of two policies is better, and how sure: per task and over all tasks (statistics.md 3.2). Paired by initial
-/// state and seed wherever at least 80 % of them are shared. Output: policy_comparison_output.h.
+/// state and seed wherever at least 80 % of them are shared. Repeats of an initial state are not new states: rates are
+/// of all episodes; intervals, tests and plans of what these tell as much as. Output: policy_comparison_output.h.
 namespace evac {
 
 /// One policy's episodes in one world.
@@ -32,16 +34,19 @@ struct ComparisonRow {
   std::string task;        ///< empty: all tasks, stratified
   Estimate first, second;  ///< success rates; over the shared pairs where paired, else over all that count
   std::int64_t first_episodes = 0, second_episodes = 0, shared = 0;  ///< that count, and with one (state, seed)
+  Repeated pairs;                                  ///< the shared ones, where paired
+  Repeated first_trials, second_trials;            ///< the episodes that count, where not
   std::int64_t first_apart = 0, second_apart = 0;  ///< errors, cannot tell, invalid, not judged: in no rate
   bool is_paired = false;
   Flips flips;          ///< of the shared pairs
   Estimate difference;  ///< first - second
-  std::string test;     ///< "exact McNemar", "Boschloo", "Cochran-Mantel-Haenszel"
+  std::string test;     ///< "exact McNemar", "Boschloo on 4 and 6 effective episodes", "Cochran-Mantel-Haenszel"
   Number p = Undefined{"no episodes to compare"};
   Number p_holm = Undefined{"no episodes to compare"};  ///< over the tasks shown; of all tasks: p itself
   Winner winner = Winner::kNotDecided;
   Defined<std::int64_t> more = Undefined{"decided"};  ///< further pairs, or episodes per policy, that would decide with
-                                                      ///< the power asked for if the rates are those seen
+                                                      ///< the power asked for if the rates are those seen; of one among
+                                                      ///< several tasks at its share of alpha
 };
 
 struct PolicyComparison {

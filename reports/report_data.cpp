@@ -2,11 +2,11 @@
 
 #include <algorithm>
 #include <map>
+#include <utility>
 
 #include "core/error.h"
 #include "core/statistics/many_comparisons.h"
 #include "reports/gate_data.h"
-#include "reports/wording.h"
 
 namespace evac {
 namespace {
@@ -56,24 +56,18 @@ std::vector<Candidate> CandidatesOf(const RunSummary& summary, const std::string
   return candidates;
 }
 
-TrustReport TrustIn(const RunSummary& summary, const std::string& world, TrustOptions options) {
-  options.confidence = summary.options.confidence;
-  options.bootstrap = {summary.options.bootstrap_replicates, summary.options.bootstrap_seed,
-                       summary.options.confidence};
-  const std::vector<RealTrial>& trials = summary.data.real_trials;
-  const std::string real = trials.empty() ? "the world " + summary.reference
-                                          : Counted(static_cast<std::int64_t>(trials.size()), "imported real trial");
-  return {world, real, summary.options.judge, options, TrustOf(TrustInputOf(summary, trials, world), options)};
-}
-
-void AddTrust(const TrustOptions& options, ReportData& report) try {
-  for (const WorldInfo& world : report.summary.data.worlds) {
-    if (!world.is_real) report.trust.push_back(TrustIn(report.summary, world.name, options));
+void AddTrust(TrustOptions options, ReportData& report) {
+  const RunSummary& run = report.summary;
+  options.confidence = run.options.confidence;
+  options.bootstrap = {run.options.bootstrap_replicates, run.options.bootstrap_seed, run.options.confidence};
+  std::vector<std::string> worlds;
+  for (const WorldInfo& world : run.data.worlds) {
+    if (!world.is_real) worlds.push_back(world.name);
   }
-  if (report.trust.empty()) report.no_trust = "the run has no world beside the real one";
-} catch (const Error& error) {  // no real trials, or no verdicts yet: the page says so
-  report.trust.clear();
-  report.no_trust = error.what();
+  WorldsTrust trust = TrustOfWorlds(run, worlds, options);
+  report.trust = std::move(trust.worlds);
+  report.unsaid = std::move(trust.unsaid);
+  if (report.trust.empty()) report.no_trust = WhyNothingIsSaid(report.unsaid);
 }
 
 }  // namespace

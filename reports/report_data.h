@@ -10,7 +10,7 @@
 #include "reports/policy_comparison.h"
 #include "reports/stages.h"
 #include "reports/summary.h"
-#include "reports/trust_output.h"
+#include "reports/trust_worlds.h"
 
 /// Everything a report says, counted once: what `RunSummary` holds, and what follows from it.
 namespace evac {
@@ -33,10 +33,10 @@ struct ReportData {
   std::vector<Candidate> candidates;  ///< in the order declared
   LetterTests letters;                ///< what the letters of `summary.rates` rest on
   std::vector<JudgeRates> by_judge;   ///< the rates as each other judge counts them
-  std::vector<TrustReport>
-      trust;                     ///< one per world beside the real one; empty where there is nothing to hold it against
-  std::string no_trust;          ///< why `trust` is empty, else empty
-  std::vector<ShownGate> gates;  ///< the last decision of each gate that was held against this run
+  std::vector<TrustReport> trust;     ///< one per world beside the real one of which something can be said
+  std::vector<UnsaidWorld> unsaid;    ///< the others: nobody judged them, or there is nothing to hold them against
+  std::string no_trust;               ///< why `trust` is empty, else empty
+  std::vector<ShownGate> gates;       ///< the last decision of each gate that was held against this run
   StageReport stages;
   JudgeReport judges;
   std::vector<CheckpointCurve> checkpoints;

@@ -55,6 +55,7 @@ Json PairsJson(const RunSummary& summary, const PairTable& table) {
                {"both_fail", table.both_fail},
                {"uncounted", table.uncounted},
                {"unpaired", table.unpaired},
+               {"effective_pairs", table.effective_pairs},
                {"mcnemar_p_exact", table.Counted() > 0 ? Json(table.test.p_exact) : Json(nullptr)},
                {"agreement", JsonOf(table.agreement)},
                {"flips", Json::array()}};

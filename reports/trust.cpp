@@ -10,6 +10,7 @@
 
 #include "core/error.h"
 #include "core/statistics/special.h"
+#include "reports/wording.h"
 
 namespace evac {
 namespace {
@@ -28,9 +29,11 @@ std::map<std::string, ByState> ByTask(const std::vector<TrialOutcome>& outcomes)
   return tasks;
 }
 
+using PairsByState = std::map<StateKey, std::vector<BothOutcomes>>;
+
 /// One task's pairs by policy and state, and the outcomes that have no partner.
 struct Paired {
-  std::map<StateKey, std::vector<BothOutcomes>> pairs;
+  PairsByState pairs;
   std::map<std::string, std::int64_t> real_alone;               ///< by policy
   std::map<std::string, std::map<std::string, Count>> further;  ///< by policy and state
 };
@@ -84,18 +87,43 @@ std::vector<Count> CountsOf(const ByState& states, const std::string& policy) {
 }
 
 /// Repeats of one state count by the design effect, so that H's spread is not understated.
-Count EffectiveCount(const std::map<std::string, Count>& states) {
+Count EffectiveOf(const std::map<std::string, Count>& states) {
   std::vector<Count> clusters;
-  Count total;
-  for (const auto& [state, count] : states) {
-    clusters.push_back(count);
-    total.successes += count.successes;
-    total.trials += count.trials;
+  for (const auto& [state, count] : states) clusters.push_back(count);
+  return EffectiveCount(clusters);
+}
+
+/// By initial state: policies that share one, and its repeats, are not independent.
+std::map<std::string, BothWorlds> TablesOf(const PairsByState& pairs) {
+  std::map<std::string, BothWorlds> tables;
+  for (const auto& [key, of_state] : pairs) {
+    const BothWorlds added = TableOf(of_state);
+    BothWorlds& table = tables[key.second];
+    table.both += added.both;
+    table.only_real += added.only_real;
+    table.only_model += added.only_model;
+    table.neither += added.neither;
   }
-  const ClusterStatistics statistics = StatisticsOfClusters(clusters);
-  if (!statistics.effective_trials) return total;
-  const double trials = std::max(1.0, std::floor(*statistics.effective_trials));
-  return {static_cast<std::int64_t>(std::lround(*statistics.rate * trials)), static_cast<std::int64_t>(trials)};
+  return tables;
+}
+
+PairedOutcomes EffectiveOf(const std::map<std::string, BothWorlds>& tables) {
+  std::vector<PairedOutcomes> clusters;
+  for (const auto& [state, table] : tables) clusters.push_back({{table.only_model, table.only_real}, table.n()});
+  return EffectivePairs(clusters);
+}
+
+/// The table that as many independent pairs would have had: the flips are theirs, the rest keeps its proportion.
+BothWorlds Shrunk(const BothWorlds& table, const PairedOutcomes& effective) {
+  BothWorlds shrunk;
+  shrunk.only_model = effective.flips.only_first;
+  shrunk.only_real = effective.flips.only_second;
+  const std::int64_t alike = table.both + table.neither, left = effective.pairs - shrunk.discordant();
+  if (alike == 0) return shrunk;
+  shrunk.both =
+      std::llround(static_cast<double>(left) * static_cast<double>(table.both) / static_cast<double>(alike));
+  shrunk.neither = left - shrunk.both;
+  return shrunk;
 }
 
 std::vector<bool> Flags(const Count& count) {
@@ -104,23 +132,43 @@ std::vector<bool> Flags(const Count& count) {
   return flags;
 }
 
+/// The real rate from both worlds: values of all pairs, intervals of what they tell as much as.
+/// @param first_of_state  a pair of each initial state: bets are on pairs, not on counts of them.
+void Foretell(const BothWorlds& effective, const std::vector<BothOutcomes>& first_of_state, const TrustOptions& options,
+              PredictedRate& rate) {
+  const double confidence = options.confidence;
+  rate.predicted = PpiMover(effective, rate.further, confidence);
+  rate.predicted.value = PpiMover(rate.pairs, rate.further, confidence).value;
+  rate.predicted.n = rate.pairs.n();
+  rate.predicted.method = OnPairs(rate.predicted.method, {rate.pairs.n(), effective.n()});
+  rate.tuned = PpiMean(rate.pairs, rate.further, PpiWeight::kTuned, confidence);
+  const PpiEstimate rests_on = PpiMean(effective, rate.further, PpiWeight::kTuned, confidence);
+  rate.tuned.se = rests_on.se;
+  rate.tuned.normal = rests_on.normal;
+  rate.tuned.allowed = rests_on.allowed;
+  rate.betting = PpiBetting(first_of_state, Flags(rate.further),
+                            {.confidence = confidence, .seed = options.bootstrap.seed});
+  rate.betting.value = rate.tuned.value;
+  if (rate.betting.n < rate.pairs.n()) rate.betting.method += ", one pair of each state";
+}
+
 PredictedRate Predict(const std::string& policy, const Paired& paired, const TrustOptions& options) {
   PredictedRate rate;
   rate.policy = policy;
-  std::vector<BothOutcomes> pairs;
-  for (const auto& [key, of_state] : paired.pairs) {
-    if (key.first == policy) pairs.insert(pairs.end(), of_state.begin(), of_state.end());
+  PairsByState own = paired.pairs;
+  std::erase_if(own, [&](const auto& entry) { return entry.first.first != policy; });
+  std::vector<BothOutcomes> all, first_of_state;
+  for (const auto& [key, of_state] : own) {
+    all.insert(all.end(), of_state.begin(), of_state.end());
+    first_of_state.push_back(of_state.front());
   }
-  rate.pairs = TableOf(pairs);
+  rate.pairs = TableOf(all);
   if (const auto further = paired.further.find(policy); further != paired.further.end()) {
-    rate.further = EffectiveCount(further->second);
+    rate.further = EffectiveOf(further->second);
   }
   if (const auto alone = paired.real_alone.find(policy); alone != paired.real_alone.end())
     rate.real_alone = alone->second;
-  rate.predicted = PpiMover(rate.pairs, rate.further, options.confidence);
-  rate.betting =
-      PpiBetting(pairs, Flags(rate.further), {.confidence = options.confidence, .seed = options.bootstrap.seed});
-  rate.tuned = PpiMean(rate.pairs, rate.further, PpiWeight::kTuned, options.confidence);
+  Foretell(Shrunk(rate.pairs, EffectiveOf(TablesOf(own))), first_of_state, options, rate);
   return rate;
 }
 
@@ -163,29 +211,27 @@ Estimate CorrelationOver(const std::vector<std::string>& policies, const Paired&
   return CorrelateOutcomes("", {task}, {.convention = {}, .bootstrap = bootstrap}).pearson;
 }
 
-/// Pairs by initial state: policies that share one, and its repeats, are not independent.
-PairedOutcomes EffectiveOf(const Paired& paired) {
-  std::map<std::string, PairedOutcomes> states;
-  for (const auto& [key, pairs] : paired.pairs) {
-    const BothWorlds table = TableOf(pairs);
-    PairedOutcomes& state = states[key.second];
-    state.pairs += table.n();
-    state.flips.only_first += table.only_model;
-    state.flips.only_second += table.only_real;
+/// Rates over the pairs, each initial state a cluster.
+void AddRates(const std::map<std::string, BothWorlds>& tables, double confidence, TaskTrust& task) {
+  std::vector<Count> real, model, same;
+  for (const auto& [state, table] : tables) {
+    real.push_back({table.both + table.only_real, table.n()});
+    model.push_back({table.both + table.only_model, table.n()});
+    same.push_back({table.both + table.neither, table.n()});
   }
-  std::vector<PairedOutcomes> clusters;
-  for (const auto& [state, outcomes] : states) clusters.push_back(outcomes);
-  return EffectivePairs(clusters);
+  task.real = ClusteredWilsonInterval(real, confidence);
+  task.model = ClusteredWilsonInterval(model, confidence);
+  task.same = ClusteredWilsonInterval(same, confidence);
 }
 
 /// model - real and its test, on the effective number of pairs.
-void AddBias(const Paired& paired, double confidence, TaskTrust& task) {
-  const PairedOutcomes effective = EffectiveOf(paired);
+void AddBias(const std::map<std::string, BothWorlds>& tables, double confidence, TaskTrust& task) {
+  const PairedOutcomes effective = EffectiveOf(tables);
   const Flips flips{task.pairs.only_model, task.pairs.only_real};
   task.bias = TangoDifference(effective, confidence);
   task.bias.value = TangoDifference({flips, task.pairs.n()}, confidence).value;
   task.bias.n = task.pairs.n();
-  if (effective.pairs < task.pairs.n()) task.bias.method = fmt::format("Tango on {} effective pairs", effective.pairs);
+  task.bias.method = OnPairs("Tango", {task.pairs.n(), effective.pairs});
   task.test = McNemarExact(effective.flips);
   task.effective_pairs = effective.pairs;
 }
@@ -224,18 +270,16 @@ TaskTrust TrustTask(const std::string& name, const ByState& real, const ByState&
   task.task = name;
   std::set<std::string> policies;
   for (const auto& [key, trials] : real) policies.insert(key.first);
-  for (const auto& [key, pairs] : paired.pairs) {
-    const BothWorlds table = TableOf(pairs);
+  const std::map<std::string, BothWorlds> tables = TablesOf(paired.pairs);
+  for (const auto& [state, table] : tables) {
     task.pairs.both += table.both;
     task.pairs.only_real += table.only_real;
     task.pairs.only_model += table.only_model;
     task.pairs.neither += table.neither;
   }
   const auto [both, only_real, only_model, neither] = task.pairs;
-  task.real = WilsonInterval(both + only_real, task.pairs.n(), options.confidence);
-  task.model = WilsonInterval(both + only_model, task.pairs.n(), options.confidence);
-  task.same = WilsonInterval(both + neither, task.pairs.n(), options.confidence);
-  AddBias(paired, options.confidence, task);
+  AddRates(tables, options.confidence, task);
+  AddBias(tables, options.confidence, task);
   task.agreement = StatisticsOf({.both_success = both,
                                  .only_judge_success = only_model,
                                  .only_human_success = only_real,

@@ -50,22 +50,22 @@ struct PredictedRate {
   BothWorlds pairs;
   Count further;  ///< imagined outcomes on states without a real trial; of repeats, their effective number
   std::int64_t real_alone = 0;  ///< real trials without an imagined partner
-  Estimate real;                ///< from all real trials: Wilson
+  Estimate real;                ///< from all real trials, clustered by state
   Estimate model;               ///< from all imagined trials, clustered by state
-  Estimate predicted;           ///< real rate from both: MOVER, the interval of record
-  Estimate betting;             ///< the same by betting
-  PpiEstimate tuned;            ///< the same by PPI++: an estimate
+  Estimate predicted;           ///< real rate from both: MOVER on the effective pairs, the interval of record
+  Estimate betting;             ///< the same by betting on one pair of each state, the first
+  PpiEstimate tuned;            ///< the same by PPI++: an estimate; its intervals on the effective pairs
 };
 
 struct TaskTrust {
   std::string task;
   std::int64_t effective_pairs = 0;  ///< what `pairs` tell as much as: repeats and shared states considered
   BothWorlds pairs;                  ///< over all policies
-  Estimate real, model;              ///< rates over the pairs
+  Estimate real, model;              ///< rates over the pairs, clustered by state
   Estimate bias;                     ///< model - real over the pairs, Tango
-  McNemar test;                      ///< of "no bias"
+  McNemar test;                      ///< of "no bias", on the effective pairs
   ConfusionStatistics agreement;     ///< the model as judge of what the robot would do: kappa
-  Estimate same;                     ///< share of pairs with one outcome
+  Estimate same;                     ///< share of pairs with one outcome, clustered by state
   Estimate correlation;              ///< Pearson over policies, undefined below kMinTrustPolicies
   Trust trust = Trust::kUnknown;
   Defined<std::int64_t> more = Undefined{"decided"};  ///< further pairs that would decide, if the bias is that seen

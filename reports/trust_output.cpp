@@ -30,9 +30,10 @@ std::string Evidence(const TaskTrust& task) {
 std::string AgreementLine(const TaskTrust& task) {
   if (task.pairs.n() == 0) return "";
   return fmt::format(
-      "  per state: same outcome in {} of {}, kappa {}; flips {} model only / {} real only, exact McNemar {}\n",
+      "  per state: same outcome in {} of {}, kappa {}; flips {} model only / {} real only, {} {}\n",
       task.pairs.both + task.pairs.neither, task.pairs.n(), NumberWithInterval(task.agreement.kappa),
-      task.pairs.only_model, task.pairs.only_real, PValue(task.test.p_exact));
+      task.pairs.only_model, task.pairs.only_real, OnPairs("exact McNemar", {task.pairs.n(), task.effective_pairs}),
+      PValue(task.test.p_exact));
 }
 
 std::string CorrelationLine(const TaskTrust& task) {

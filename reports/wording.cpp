@@ -54,6 +54,16 @@ std::string PValue(double p) {
   return p < 0.01 ? fmt::format("p = {:.3f}", p) : fmt::format("p = {:.2f}", p);
 }
 
+std::string OnPairs(const std::string& method, const Repeated& pairs) {
+  if (pairs.effective >= pairs.all) return method;
+  return fmt::format("{} on {}", method, Counted(pairs.effective, "effective pair"));
+}
+
+std::string OnEpisodes(const std::string& method, const Repeated& first, const Repeated& second) {
+  if (first.effective >= first.all && second.effective >= second.all) return method;
+  return fmt::format("{} on {} and {} effective episodes", method, first.effective, second.effective);
+}
+
 std::string Counted(std::int64_t count, const std::string& singular, const std::string& plural) {
   if (count == 1) return "1 " + singular;
   return fmt::format("{} {}", count, plural.empty() ? singular + "s" : plural);

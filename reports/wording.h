@@ -3,6 +3,7 @@
 #include <string>
 
 #include "core/statistics/estimate.h"
+#include "core/statistics/rates.h"
 
 /// How numbers are written for people. Nothing undefined becomes a digit.
 namespace evac {
@@ -20,6 +21,10 @@ std::string NumberWithInterval(const Estimate& estimate);
 std::string Plain(double value);
 /// "p = 0.04", "p < 0.001".
 std::string PValue(double p);
+/// "exact McNemar"; "exact McNemar on 4 effective pairs" where repeats of initial states make them tell less.
+std::string OnPairs(const std::string& method, const Repeated& pairs);
+/// The same of two samples: "Boschloo", "Boschloo on 4 and 6 effective episodes".
+std::string OnEpisodes(const std::string& method, const Repeated& first, const Repeated& second);
 /// "1 episode", "3 episodes".
 std::string Counted(std::int64_t count, const std::string& singular, const std::string& plural = "");
 

@@ -5,6 +5,7 @@
 #include <cstdio>
 #include <cstring>
 #include <span>
+#include <string_view>
 #include <utility>
 
 #include "core/error.h"
@@ -17,7 +18,9 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr const char* kFormat = "evac chunk 1";
-constexpr const char* kEnding = ".safetensors";
+constexpr std::size_t kGroupDigits = 2, kKeyDigits = 64;
+constexpr std::string_view kEnding = ".safetensors";
+constexpr std::string_view kPartial = ".partial-";  ///< behind it the number of the process: TensorFileWriter's
 constexpr auto kAbandoned = std::chrono::hours(24);  ///< a file that nobody has finished by then
 
 struct Entry {
@@ -26,19 +29,48 @@ struct Entry {
   std::uintmax_t bytes = 0;
 };
 
+bool IsHex(std::string_view text, std::size_t digits) {
+  return text.size() == digits && text.find_first_not_of("0123456789abcdef") == std::string_view::npos;
+}
+
+enum class Kind { kEntry, kUnfinished, kOfOthers };
+
+/// @param group  the folder's name that the file lies in: the first 2 digits of its key
+Kind KindOf(std::string_view name, std::string_view group) {
+  if (!name.starts_with(group) || !IsHex(name.substr(0, kKeyDigits), kKeyDigits)) return Kind::kOfOthers;
+  name.remove_prefix(kKeyDigits);
+  if (!name.starts_with(kEnding)) return Kind::kOfOthers;
+  name.remove_prefix(kEnding.size());
+  if (name.empty()) return Kind::kEntry;
+  const bool is_partial = name.starts_with(kPartial) && name.size() > kPartial.size() &&
+                          name.find_first_not_of("0123456789", kPartial.size()) == std::string_view::npos;
+  return is_partial ? Kind::kUnfinished : Kind::kOfOthers;
+}
+
+/// Adds the entries of one folder of a cache, and removes what nobody has finished there.
+void AddEntries(const fs::path& group, std::vector<Entry>& entries) {
+  std::error_code gone;
+  for (fs::directory_iterator at(group, gone), end; !gone && at != end; at.increment(gone)) {
+    const Kind kind = KindOf(at->path().filename().string(), group.filename().string());
+    std::error_code error;
+    if (kind == Kind::kOfOthers || !at->is_regular_file(error) || error) continue;
+    const fs::file_time_type used = at->last_write_time(error);
+    const std::uintmax_t bytes = error ? 0 : at->file_size(error);
+    if (error) continue;
+    const bool is_old = fs::file_time_type::clock::now() - used > kAbandoned;
+    if (kind == Kind::kEntry) entries.push_back({at->path(), used, bytes});
+    if (kind == Kind::kUnfinished && is_old) fs::remove(at->path(), error);
+  }
+}
+
+/// By their names alone: the folder may be one that people keep their own files in, and those are never looked at.
 /// Files that vanish meanwhile, because another process evicts too, are left out.
 std::vector<Entry> EntriesOf(const fs::path& folder) {
   std::vector<Entry> entries;
   std::error_code gone;
-  for (fs::recursive_directory_iterator at(folder, gone), end; !gone && at != end; at.increment(gone)) {
+  for (fs::directory_iterator at(folder, gone), end; !gone && at != end; at.increment(gone)) {
     std::error_code error;
-    if (!at->is_regular_file(error) || error) continue;
-    const fs::file_time_type used = at->last_write_time(error);
-    const std::uintmax_t bytes = error ? 0 : at->file_size(error);
-    if (error) continue;
-    const bool is_entry = at->path().extension() == kEnding;
-    if (is_entry) entries.push_back({at->path(), used, bytes});
-    if (!is_entry && fs::file_time_type::clock::now() - used > kAbandoned) fs::remove(at->path(), error);
+    if (IsHex(at->path().filename().string(), kGroupDigits) && at->is_directory(error)) AddEntries(at->path(), entries);
   }
   return entries;
 }
@@ -122,7 +154,7 @@ ChunkCache::ChunkCache(ChunkCacheOptions options) : options_(std::move(options))
 }
 
 fs::path ChunkCache::PathOf(const std::string& key) const {
-  return options_.folder / key.substr(0, 2) / (key + kEnding);
+  return options_.folder / key.substr(0, kGroupDigits) / (key + std::string(kEnding));
 }
 
 std::optional<CachedChunk> ChunkCache::Find(const std::string& key) {

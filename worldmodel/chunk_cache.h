@@ -12,7 +12,7 @@
 namespace evac {
 
 struct ChunkCacheOptions {
-  std::filesystem::path folder;  ///< made if absent; may be shared by several processes
+  std::filesystem::path folder;  ///< made if absent; may be shared by several processes, and hold other files too
   double limit_gb = 10;          ///< 10^9 bytes; beyond it the entries that were not used for longest are removed
 };
 
@@ -26,7 +26,8 @@ struct CachedChunk {
 ///
 /// An entry is one file, FOLDER/<first 2 digits>/<key>.safetensors, with a hash of its content: it is written beside
 /// its name and renamed, so a reader finds it whole or not at all, in any number of threads and processes. One that is
-/// broken is a miss and a warning; a folder that cannot be written costs the cache, not the run.
+/// broken is a miss and a warning; a folder that cannot be written costs the cache, not the run. Files of other names,
+/// and of other folders below, are somebody's: they are not counted and never removed.
 class ChunkCache {
  public:
   /// @throws InvalidInput if the folder cannot be made, or the limit is not positive.

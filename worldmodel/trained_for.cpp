@@ -54,6 +54,7 @@ TrainedFor TrainedFor::Of(const std::string& weights, const TensorMetadata& meta
   if (const std::string period = Said(metadata, "period_s"); !period.empty())
     trained.period_s = Period(weights, period);
   trained.cameras = NamesIn(Said(metadata, "cameras"));
+  trained.arms = NamesIn(Said(metadata, "arms"));
   if (const std::string page = Said(metadata, "statistics"); !page.empty())
     trained.statistics = ParseActionStatistics(page, weights + ": metadata statistics");
   trained.pose_map = Said(metadata, "pose_map");
@@ -85,6 +86,12 @@ void TrainedFor::CheckCameras(const std::vector<std::string>& asked, const std::
   if (cameras.empty() || cameras == asked) return;
   throw InvalidInput("{}: found cameras {}, wanted {}, in this order: those that {} was trained for", who,
                      fmt::join(asked, ", "), fmt::join(cameras, ", "), weights);
+}
+
+void TrainedFor::CheckArms(const std::vector<std::string>& asked, const std::string& who) const {
+  if (arms.empty() || arms == asked) return;
+  throw InvalidInput("{}: found arms {}, wanted {}: those that {} was trained for", who, fmt::join(asked, ", "),
+                     fmt::join(arms, ", "), weights);
 }
 
 void TrainedFor::CheckPoseMap(const std::string& asked, const std::string& who) const {

@@ -17,9 +17,12 @@ struct TrainedFor {
   std::string weights;                         ///< the file, for messages
   std::optional<double> period_s;              ///< between two frames
   std::vector<std::string> cameras;            ///< of the views, in their order; empty: not said
+  std::vector<std::string> arms;               ///< {left, right} or {right}; empty: not said
   std::optional<ActionStatistics> statistics;  ///< what its actions were normalised by
   std::string pose_map;                        ///< how maps were drawn (PoseMapWords); empty: not said
-  std::string arms_read;                       ///< `told`, `measured`, or empty: not said
+  /// `told`, `measured`, or empty: not said. Compared with nothing: a policy tells targets whatever the network learned
+  /// from. It says which of a recording's arms are its actions.
+  std::string arms_read;
 
   /// @throws InvalidInput naming the file and the key: a period that is none, a page of statistics that is none.
   static TrainedFor Of(const std::string& weights, const TensorMetadata& metadata);
@@ -37,6 +40,8 @@ struct TrainedFor {
   void CheckPeriod(double asked_period_s, const std::string& who) const;
   /// @throws InvalidInput with both lists: other cameras, or the same in another order
   void CheckCameras(const std::vector<std::string>& asked, const std::string& who) const;
+  /// @throws InvalidInput with both lists: one arm where two were, or the reverse
+  void CheckArms(const std::vector<std::string>& asked, const std::string& who) const;
   /// @throws InvalidInput with both ways of drawing
   void CheckPoseMap(const std::string& asked, const std::string& who) const;
 };

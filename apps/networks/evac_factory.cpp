@@ -1,9 +1,10 @@
+#include <fmt/ranges.h>
+
 #include <algorithm>
 #include <cstdio>
 
 #include "apps/factory.h"
 #include "apps/network_parts.h"
-#include "core/recording.h"
 #include "worldmodel/evac_config.h"
 #include "worldmodel/evac_world.h"
 #include "worldmodel/nn/memory.h"
@@ -54,8 +55,7 @@ InitialScene SeenInRealRun(const Store* store, const std::string& world, const T
 
 FirstScene FirstSceneOf(const Suite& suite, const Store* store, const std::string& world) {
   if (suite.recording) {
-    return
-        [scene = InitialSceneOf(ReadRecording(*suite.recording))](const Task&, const InitialState&) { return scene; };
+    return [scene = InitialSceneOf(RecordingOf(suite))](const Task&, const InitialState&) { return scene; };
   }
   return [store, world](const Task& task, const InitialState& initial) {
     return SeenInRealRun(store, world, task, initial);
@@ -85,10 +85,53 @@ void CheckTrainedFor(const SuiteEvac& evac, const nn::ModelConfig& config, const
   trained.StatisticsOr(evac.statistics);
   trained.CheckPeriod(evac.period_s, who + ": field period_s");
   trained.CheckPoseMap(PoseMapWords(PoseMapsOf(evac, config)), who);
-  for (const Task& task : tasks) trained.CheckCameras(NamesOf(task.cameras), fmt::format("{}: task {}", who, task.id));
+  for (const Task& task : tasks) {
+    const std::string of_task = fmt::format("{}: task {}", who, task.id);
+    trained.CheckCameras(NamesOf(task.cameras), of_task);
+    trained.CheckArms(task.arms, of_task);
+  }
+}
+
+/// How a network was trained to see recordings.
+struct Sight {
+  double period_s;
+  std::vector<std::string> cameras;
+
+  std::string Words() const {
+    return fmt::format("frames {:.4g} s apart of {}", period_s, fmt::join(cameras, ", "));
+  }
+};
+
+Sight SightOf(const SuiteWorld& world, const Suite& suite) {
+  const TrainedFor trained = TrainedFor::Read(world.evac->weights);
+  trained.CheckPeriod(world.evac->period_s, fmt::format("world {}: field period_s", world.name));
+  if (!trained.cameras.empty()) return {world.evac->period_s, trained.cameras};
+  std::vector<std::string> cameras = NamesOf(ReadRecording(*suite.recording, {.count_video_frames = false}).cameras);
+  const auto views = static_cast<std::size_t>(ReadEvacConfig(world.evac->config).views);
+  if (cameras.size() > views) cameras.resize(views);  // fewer are refused where an episode begins
+  return {world.evac->period_s, std::move(cameras)};
 }
 
 }  // namespace
+
+Recording ReadAsTrained(const Suite& suite) try {
+  const SuiteWorld* first = nullptr;
+  Sight wanted{};
+  for (const SuiteWorld& world : suite.worlds) {
+    if (!world.evac) continue;
+    const Sight own = SightOf(world, suite);
+    if (first == nullptr) {
+      first = &world;
+      wanted = own;
+    }
+    if (own.Words() == wanted.Words()) continue;
+    throw InvalidInput("{}: field recording: world {} is to see {}, world {} {}: wanted a suite for each",
+                       suite.path.string(), first->name, wanted.Words(), world.name, own.Words());
+  }
+  return Thinned(ReadRecording(*suite.recording, {.cameras = wanted.cameras}), wanted.period_s);
+} catch (const TensorError& error) {
+  throw InvalidInput("{}", error.what());
+}
 
 void CheckNetwork(const SuiteWorld& world, const std::vector<Task>& tasks) try {
   const nn::ModelConfig config = ReadEvacConfig(world.evac->config);

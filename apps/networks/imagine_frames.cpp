@@ -84,6 +84,7 @@ void FillIn(ImagineInputs& inputs, const TrainedFor& trained) {
 
 void CheckFits(const ImagineStart& start, const ImaginerOptions& options, const TrainedFor& trained) {
   trained.CheckCameras(NamesOf(start.scene.cameras), start.source);
+  trained.CheckArms(start.arm_names, start.source);
   trained.CheckPeriod(start.period_s, start.source);
   trained.CheckPoseMap(PoseMapWords(options.conditioning.pose_map), "--config and --scaled-maps");
 }

@@ -69,6 +69,7 @@ ImagineStart ReadImagineStart(const ImagineInputs& inputs, std::size_t views) {
   start.stride = inputs.stride > 0 ? inputs.stride : automatic;
   start.source = recording.source;
   start.scene = InitialSceneOf(recording);
+  start.arm_names = recording.arm_names;
   for (std::size_t step = 0; step < track.size(); step += static_cast<std::size_t>(start.stride))
     start.arms.push_back(std::move(track[step]));
   if (start.arms.size() < 2) {

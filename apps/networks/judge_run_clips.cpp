@@ -7,6 +7,7 @@
 #include <cstring>
 #include <limits>
 #include <map>
+#include <utility>
 
 #include "core/hash.h"
 #include "core/seed.h"
@@ -50,7 +51,8 @@ std::vector<std::string> CameraNames(const Task& task) {
   return names;
 }
 
-/// Tasks by name; all must be seen by the same cameras.
+/// Tasks by run and name: a run's clips are as large as its own cameras made them. All must be seen by cameras of the
+/// same names.
 class Tasks {
  public:
   const Task* Add(const Task& task, const std::filesystem::path& run) {
@@ -59,12 +61,12 @@ class Tasks {
     if (names != cameras_)
       throw InvalidInput("{}: task {} is seen by {}, wanted {} as the tasks before it", run.string(), task.id,
                          fmt::join(names, ", "), fmt::join(cameras_, ", "));
-    return &tasks_.try_emplace(task.id, task).first->second;
+    return &tasks_.try_emplace({run, task.id}, task).first->second;
   }
   const std::vector<std::string>& cameras() const { return cameras_; }
 
  private:
-  std::map<std::string, Task> tasks_;
+  std::map<std::pair<std::filesystem::path, std::string>, Task> tasks_;
   std::vector<std::string> cameras_;
 };
 

@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cmath>
 
 #include "core/error.h"
 #include "core/file.h"
@@ -118,23 +117,14 @@ Recording ReadForPacking(const fs::path& folder, const SourceOptions& options) {
   RecordingOptions how;
   how.cameras = options.cameras;
   how.read_told = options.arms == ArmsKind::kTold || (options.arms == ArmsKind::kAuto && row);
-  Recording recording = ReadRecording(folder, how);
-  const double steps = options.period_s / recording.period_s;
-  const int every_nth = static_cast<int>(std::lround(steps));
-  if (every_nth < 1 || std::abs(steps - every_nth) > 0.02 * every_nth) {
-    throw InvalidInput("{}: steps of {:.4g} s, wanted {} s or a whole part of it", folder.string(), recording.period_s,
-                       options.period_s)
-        .Called("other_rate");
-  }
+  Recording recording = Thinned(ReadRecording(folder, how), options.period_s);
   if (recording.videos.empty())
     throw InvalidInput("{}: there is no video, only a first frame", folder.string()).Called("no_video");
   if (options.arms == ArmsKind::kTold && recording.told.empty())
     throw InvalidInput("{}: it does not say where the arms were told to be", folder.string()).Called("nothing_told");
-  if (every_nth == 1) return recording;
-  if (row) throw InvalidInput("{}: a collection's episodes are packed at their own period", folder.string());
-  how.every_nth = every_nth;
-  how.count_video_frames = false;  // they were counted
-  return ReadRecording(folder, how);
+  if (row && recording.every_nth > 1)
+    throw InvalidInput("{}: a collection's episodes are packed at their own period", folder.string());
+  return recording;
 }
 
 Looked LookAt(const fs::path& folder, const SourceOptions& options) try {

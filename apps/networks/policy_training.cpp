@@ -35,8 +35,9 @@ Eigen::Isometry3d PoseFrom(const at::Tensor& c2w) {
   return pose;
 }
 
-Mount MountOf(const std::string& camera) {
-  if (camera == "hand_left") return Mount::kLeftGripper;
+/// A robot that has no left arm may call a fixed camera so (docs/formats/recording.md).
+Mount MountOf(const std::string& camera, std::size_t arms) {
+  if (camera == "hand_left") return arms == 2 ? Mount::kLeftGripper : Mount::kBase;
   return camera == "hand_right" ? Mount::kRightGripper : Mount::kBase;
 }
 
@@ -73,6 +74,25 @@ const PackedClip& WholePicture(const PackedSet& set) {
 bool HoldsContact(const train::Shard& shard, std::int64_t first, std::int64_t end) {
   const auto* contact = shard.contact.data_ptr<std::uint8_t>();
   return std::any_of(contact + first, contact + end, [](std::uint8_t c) { return c != 0; });
+}
+
+/// Successes of the behaviours that are wanted; where all are, demonstrations too that nobody gave an outcome, as a
+/// robot's recordings are. Failures never.
+bool IsImitated(const PackedClip& clip, const std::set<std::string>& wanted) {
+  if (clip.frames < 2 || clip.outcome == 0) return false;
+  return wanted.empty() || (clip.outcome == 1 && wanted.contains(clip.behaviour));
+}
+
+/// @throws InvalidInput: none of the clips is imitated.
+[[noreturn]] void RefuseToImitateNothing(const PackedSet& set, const std::string& behaviours) {
+  if (NamesIn(behaviours).empty())
+    throw InvalidInput("policy training: each of {} clips is a failure or has a single frame", set.clips.size());
+  const bool robots = std::ranges::any_of(set.clips, [](const PackedClip& clip) { return clip.outcome < 0; });
+  throw InvalidInput("policy training: none of {} clips is a success of behaviours '{}'{}", set.clips.size(),
+                     behaviours,
+                     robots ? "; a robot's recordings have no behaviour and no outcome: all are imitated with "
+                              "`behaviours: \"\"`"
+                            : "");
 }
 
 }  // namespace
@@ -115,7 +135,7 @@ PolicyTraining::PolicyTraining(const PackedSet& set, const PolicyOptions& option
   for (const train::Shard& shard : set.shards.shards()) actions_.push_back(ActionsOf(shard.path));
   for (std::size_t i = 0; i < set.clips.size(); ++i) {
     const PackedClip& clip = set.clips[i];
-    if (clip.outcome != 1 || clip.frames < 2 || (!wanted.empty() && !wanted.contains(clip.behaviour))) continue;
+    if (!IsImitated(clip, wanted)) continue;
     imitated_.push_back(i);
     for (std::int64_t row = 0; row + 1 < clip.frames; ++row) {
       const std::int64_t end = std::min(row + kLearnedChunk, clip.frames - 1) + 1;
@@ -123,9 +143,7 @@ PolicyTraining::PolicyTraining(const PackedSet& set, const PolicyOptions& option
         contacts_.push_back({i, row});
     }
   }
-  if (imitated_.empty())
-    throw InvalidInput("policy training: none of {} clips is a success of behaviours '{}'", set.clips.size(),
-                       options.behaviours);
+  if (imitated_.empty()) RefuseToImitateNothing(set, options.behaviours);
 }
 
 Arms PolicyTraining::ArmsAt(const PackedClip& clip, std::int64_t row) const {
@@ -144,10 +162,11 @@ void PolicyTraining::PutMoment(const Moment& moment, std::int64_t b, Batch& batc
   const PackedClip& clip = set_.clips[moment.clip];
   const train::Shard& shard = set_.shards.shards()[clip.shard];
   const std::int64_t row = clip.first + moment.row;
-  for (std::int64_t v = 0; v < set_.shards.views(); ++v)
-    PutRays(CameraAt(shard, row, v),
-            ToldCamera(shard, clip.first, moment.row, v, MountOf(set_.cameras[static_cast<std::size_t>(v)])),
+  for (std::int64_t v = 0; v < set_.shards.views(); ++v) {
+    const Mount mount = MountOf(set_.cameras[static_cast<std::size_t>(v)], arms_.size());
+    PutRays(CameraAt(shard, row, v), ToldCamera(shard, clip.first, moment.row, v, mount),
             batch.input.rays[b][v].data_ptr<float>(), batch.input.eyes[b][v].data_ptr<float>());
+  }
   const Arms now = ArmsAt(clip, moment.row);
   for (std::size_t a = 0; a < arms_.size(); ++a) {
     const auto arm = static_cast<std::int64_t>(a);
@@ -245,7 +264,7 @@ std::vector<Camera> CamerasOf(const PackedSet& set) {
   for (std::size_t v = 0; v < set.cameras.size(); ++v) {
     Camera camera = CameraAt(shard, clip.first, static_cast<std::int64_t>(v));
     camera.name = set.cameras[v];
-    camera.mount = MountOf(camera.name);
+    camera.mount = MountOf(camera.name, ArmsOf(set).size());
     const Eigen::Isometry3d base_from_camera = PoseFrom(shard.c2w[clip.first][static_cast<std::int64_t>(v)]);
     const float* told = actions.data_ptr<float>() + 16 * clip.first;
     camera.mount_from_camera = camera.mount == Mount::kBase

@@ -10,13 +10,14 @@
 #include "policies/learned_net.h"
 #include "worldmodel/train/settings.h"
 
-/// How a policy learns by imitation: what was told to the arms in recordings that succeeded.
+/// How a policy learns by imitation: what the arms did in recordings that did not fail.
 namespace evac {
 
 struct PolicyOptions {
   train::JobOptions job;                      ///< of it the trainer's alone: a policy is trained in floats
   std::int64_t batch = 64;                    ///< moments
-  std::string behaviours = "good,near_miss";  ///< of a collection's mix, those worth imitating; empty: all
+  std::string behaviours = "good,near_miss";  ///< of a collection's mix, those worth imitating; empty: all, and
+                                              ///< recordings whose outcome nobody knows
   double contact_share = 0.5;                 ///< of moments whose chunk holds contact, beside those drawn from all
   double arm_noise_m = 0.004;                 ///< deviation of where the arm is said to be: it learns to come back
   double object_weight = 1;                   ///< of pointing at the object, beside the targets

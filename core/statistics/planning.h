@@ -3,6 +3,7 @@
 #include <cstdint>
 
 #include "core/statistics/estimate.h"
+#include "core/statistics/rates.h"
 
 /// How many trials, before any is made (statistics.md 3.11). All throw InvalidInput for shares outside [0, 1], or
 /// alpha, power or confidence outside (0, 1).
@@ -40,6 +41,10 @@ double McNemarPower(std::int64_t pairs, const FlipRates& rates, double alpha = 0
 /// The smallest number of pairs from which on, for all sizes looked at, the power holds. Undefined for equal rates and
 /// above `most` pairs.
 SampleSize PairsForMcNemar(const FlipRates& rates, const Promise& promise = {}, std::int64_t most = 5000);
+
+/// How many further pairs or trials, that repeat initial states as those there are do, until they tell as much as
+/// `wanted` independent ones. At least 1.
+std::int64_t FurtherWanted(double wanted, const Repeated& have);
 
 /// Power of Fisher's exact two-sided test with n trials per policy.
 double FisherPower(std::int64_t n, double p1, double p2, double alpha = 0.05);

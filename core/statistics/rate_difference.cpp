@@ -60,12 +60,15 @@ double CrossingOf(const PairedOutcomes& outcomes, double target, Interval within
 }  // namespace
 
 Estimate NewcombeDifference(const Count& first, const Count& second, double confidence) {
-  const Estimate one = WilsonInterval(first.successes, first.trials, confidence);
-  const Estimate two = WilsonInterval(second.successes, second.trials, confidence);
+  return NewcombeOfRates(WilsonInterval(first.successes, first.trials, confidence),
+                         WilsonInterval(second.successes, second.trials, confidence));
+}
+
+Estimate NewcombeOfRates(const Estimate& one, const Estimate& two) {
   Estimate difference;
   difference.method = "Newcombe";
-  difference.confidence = confidence;
-  difference.n = first.trials + second.trials;
+  difference.confidence = one.confidence;
+  difference.n = one.n + two.n;
   difference.interval = Interval{-1, 1};
   difference.value = Undefined{"no trials"};
   if (!one.value || !two.value) return difference;
@@ -88,27 +91,33 @@ Estimate TangoDifference(const PairedOutcomes& outcomes, double confidence) {
   return difference;
 }
 
-PairedOutcomes EffectivePairs(std::span<const PairedOutcomes> clusters) {
+PairedOutcomes SumOf(std::span<const PairedOutcomes> clusters) {
   PairedOutcomes total;
-  double groups = 0;
   for (const PairedOutcomes& cluster : clusters) {
     Check(cluster);
     total.pairs += cluster.pairs;
     total.flips.only_first += cluster.flips.only_first;
     total.flips.only_second += cluster.flips.only_second;
-    groups += cluster.pairs > 0;
   }
+  return total;
+}
+
+PairedOutcomes EffectivePairs(std::span<const PairedOutcomes> clusters) {
+  const PairedOutcomes total = SumOf(clusters);
+  double groups = 0;
+  for (const PairedOutcomes& cluster : clusters) groups += cluster.pairs > 0;
   const double n = static_cast<double>(total.pairs), b = static_cast<double>(total.flips.only_first),
                c = static_cast<double>(total.flips.only_second);
-  const double mean = n > 0 ? (b - c) / n : 0, spread = b + c - n * mean * mean;  // n times the variance of one pair
-  if (groups < 2 || groups == n) return total;
+  if (groups == n) return total;
+  const double mean = (b - c) / n, spread = b + c - n * mean * mean;  // n times the variance of one pair
   double residuals = 0;  // linearised, as of a ratio
   for (const PairedOutcomes& cluster : clusters) {
     const double difference = static_cast<double>(cluster.flips.only_first - cluster.flips.only_second);
     const double residual = difference - mean * static_cast<double>(cluster.pairs);
     residuals += residual * residual;
   }
-  const double design_effect = spread > 0 ? std::max(1.0, groups / (groups - 1) * residuals / spread) : n / groups;
+  const bool is_seen = groups > 1 && spread > 0;
+  const double design_effect = is_seen ? std::max(1.0, groups / (groups - 1) * residuals / spread) : n / groups;
   const auto shrunk = [&](std::int64_t count) { return std::llround(static_cast<double>(count) / design_effect); };
   const Flips flips{shrunk(total.flips.only_first), shrunk(total.flips.only_second)};
   return {flips, std::max<std::int64_t>({1, shrunk(total.pairs), flips.only_first + flips.only_second})};

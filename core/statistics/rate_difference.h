@@ -14,6 +14,8 @@ namespace evac {
 
 /// Different initial states: hybrid score interval without continuity correction (Newcombe 1998, method 10).
 Estimate NewcombeDifference(const Count& first, const Count& second, double confidence = 0.95);
+/// The same from two rates with intervals of one confidence, as ClusteredWilsonInterval makes them of repeated states.
+Estimate NewcombeOfRates(const Estimate& first, const Estimate& second);
 
 /// Outcomes on the same initial states.
 struct PairedOutcomes {
@@ -21,13 +23,16 @@ struct PairedOutcomes {
   std::int64_t pairs = 0;  ///< all of them, those that agree too
 };
 
+/// All clusters' pairs together. @throws InvalidInput for impossible counts.
+PairedOutcomes SumOf(std::span<const PairedOutcomes> clusters);
+
 /// Same initial states: score interval (Tango 1998), the one of record. Its test is McNemar's.
 Estimate TangoDifference(const PairedOutcomes& outcomes, double confidence = 0.95);
 
 /// Pairs that come in clusters (several seeds or policies on one initial state) as the number of independent pairs that
-/// would tell as much: divided by the design effect of their differences, at least 1, and rounded. Where all
-/// differences are equal that effect cannot be seen, and each cluster counts as one pair. One pair per cluster, or one
-/// cluster: as they are.
+/// would tell as much: divided by the design effect of their differences, at least 1, and rounded. Where that effect
+/// cannot be seen (all differences are equal, or there is one cluster) each cluster counts as one pair, its flips as
+/// their share of it. One pair per cluster: as they are.
 /// @param clusters  each one initial state's pairs. @throws InvalidInput for impossible counts.
 PairedOutcomes EffectivePairs(std::span<const PairedOutcomes> clusters);
 

@@ -10,6 +10,8 @@
 namespace evac {
 namespace {
 
+constexpr double kRounding = 1e-9;  // an effective 5.999… is a 6
+
 /// The rate without its interval yet.
 Estimate Rate(std::int64_t successes, std::int64_t trials, double confidence) {
   CheckCount({successes, trials});
@@ -45,20 +47,11 @@ std::vector<Count> WithTrials(std::span<const Count> clusters) {
   return kept;
 }
 
-Count Total(std::span<const Count> clusters) {
-  Count total;
-  for (const Count& cluster : clusters) {
-    total.successes += cluster.successes;
-    total.trials += cluster.trials;
-  }
-  return total;
-}
-
 /// ICC(1) = (MSB - MSW) / (MSB + (m - 1) MSW) of 0/1 outcomes; m is the ANOVA's average size, the size where all are
 /// equal.
 Number AnovaIcc(std::span<const Count> clusters, double rate, double average_size) {
   const double groups = static_cast<double>(clusters.size());
-  const double trials = static_cast<double>(Total(clusters).trials);
+  const double trials = static_cast<double>(SumOf(clusters).trials);
   if (groups < 2) return Undefined{"fewer than 2 clusters"};
   if (trials == groups) return Undefined{"no cluster has more than one trial"};
   double between = 0, within = 0;
@@ -104,6 +97,15 @@ void CheckCount(const Count& count) {
   }
 }
 
+Count SumOf(std::span<const Count> clusters) {
+  Count total;
+  for (const Count& cluster : clusters) {
+    total.successes += cluster.successes;
+    total.trials += cluster.trials;
+  }
+  return total;
+}
+
 Estimate WilsonInterval(std::int64_t successes, std::int64_t trials, double confidence) {
   Estimate rate = Rate(successes, trials, confidence);
   rate.method = "Wilson";
@@ -144,7 +146,7 @@ Estimate HoeffdingInterval(std::int64_t successes, std::int64_t trials, double c
 
 ClusterStatistics StatisticsOfClusters(std::span<const Count> all_clusters) {
   const std::vector<Count> clusters = WithTrials(all_clusters);
-  const Count total = Total(clusters);
+  const Count total = SumOf(clusters);
   ClusterStatistics result;
   result.clusters = static_cast<std::int64_t>(clusters.size());
   result.trials = total.trials;
@@ -155,12 +157,15 @@ ClusterStatistics StatisticsOfClusters(std::span<const Count> all_clusters) {
   result.rate = rate;
   result.naive_se = std::sqrt(rate * (1 - rate) / trials);
   result.icc = result.design_effect = result.effective_trials = result.cluster_se = Undefined{"fewer than 2 clusters"};
+  const bool has_repeats = result.trials > result.clusters;
+  if (has_repeats) result.effective_trials = static_cast<double>(result.clusters);  // nothing shows yet that it is more
   if (clusters.size() < 2) return result;
 
   const double size = AverageClusterSize(clusters);
   result.cluster_se = LinearisedSe(clusters, rate);
   result.icc = AnovaIcc(clusters, rate, size);
-  result.design_effect = result.effective_trials = Undefined{result.icc.reason()};
+  result.design_effect = Undefined{result.icc.reason()};
+  if (!has_repeats) result.effective_trials = Undefined{result.icc.reason()};
   if (!result.icc) return result;
   const double design_effect = 1 + (size - 1) * *result.icc;
   result.design_effect = design_effect;
@@ -170,12 +175,19 @@ ClusterStatistics StatisticsOfClusters(std::span<const Count> all_clusters) {
 
 Estimate ClusteredWilsonInterval(std::span<const Count> clusters, double confidence) {
   const ClusterStatistics statistics = StatisticsOfClusters(clusters);
-  const Count total = Total(clusters);
+  const Count total = SumOf(clusters);
   Estimate rate = WilsonInterval(total.successes, total.trials, confidence);
   if (!statistics.effective_trials) return rate;
   rate.interval = Wilson(*rate.value, *statistics.effective_trials, confidence);
   rate.method = "Wilson on effective trials";
   return rate;
+}
+
+Count EffectiveCount(std::span<const Count> clusters) {
+  const ClusterStatistics statistics = StatisticsOfClusters(clusters);
+  if (!statistics.effective_trials) return SumOf(clusters);
+  const double trials = std::max(1.0, std::floor(*statistics.effective_trials + kRounding));
+  return {std::llround(*statistics.rate * trials), static_cast<std::int64_t>(trials)};
 }
 
 }  // namespace evac

@@ -15,6 +15,8 @@ struct Count {
 };
 /// @throws InvalidInput unless 0 <= successes <= trials.
 void CheckCount(const Count& count);
+/// All clusters together.
+Count SumOf(std::span<const Count> clusters);
 
 /// Score interval without continuity correction (Wilson 1927). The default of every rate that is shown.
 Estimate WilsonInterval(std::int64_t successes, std::int64_t trials, double confidence = 0.95);
@@ -34,7 +36,8 @@ struct ClusterStatistics {
   Number rate = Undefined{"no trials"};  ///< pooled: sum of successes / sum of trials
   Number icc = Undefined{"no trials"};   ///< ICC(1) by one-way ANOVA; below 0 where clusters are more alike than chance
   Number design_effect = Undefined{"no trials"};     ///< 1 + (m - 1) ICC, m the (average) number of trials per cluster
-  Number effective_trials = Undefined{"no trials"};  ///< trials / design effect, at most trials
+  Number effective_trials = Undefined{"no trials"};  ///< trials / design effect, at most trials; of repeats that cannot
+                                                     ///< show it (one cluster, all outcomes equal), their clusters
   Number cluster_se = Undefined{"no trials"};        ///< of the rate: linearised ratio, with G / (G - 1)
   Number naive_se = Undefined{"no trials"};          ///< as if all trials were independent
   std::int64_t clusters = 0, trials = 0;
@@ -44,5 +47,14 @@ ClusterStatistics StatisticsOfClusters(std::span<const Count> clusters);
 
 /// Wilson on the effective number of trials; plain Wilson where that is undefined (one trial per cluster).
 Estimate ClusteredWilsonInterval(std::span<const Count> clusters, double confidence = 0.95);
+
+/// The effective trials as a count, for tests of whole numbers: rounded down, at least 1, with the clusters' rate. As
+/// they are where no cluster has more than one trial.
+Count EffectiveCount(std::span<const Count> clusters);
+
+/// How many trials or pairs there are, and how many independent ones would tell as much.
+struct Repeated {
+  std::int64_t all = 0, effective = 0;
+};
 
 }  // namespace evac

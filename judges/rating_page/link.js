@@ -11,6 +11,9 @@ class Refusal extends Error {
 }
 class Offline extends Error {}
 
+/** This browser is somebody else's by now, or the address another study's: loading the page again says whose. */
+const isNotOurs = refusal => refusal instanceof Refusal && (refusal.status === 401 || refusal.error === 'csrf');
+
 async function request(path, body) {
   const options = {method: body === undefined ? 'GET' : 'POST', credentials: 'same-origin', cache: 'no-store'};
   if (body !== undefined) {

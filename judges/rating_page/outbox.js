@@ -1,5 +1,6 @@
 // Verdicts wait on disk (IndexedDB) until the server has said that they are on its disk; order is kept.
-const outbox = {waiting: [], isSending: false, database: null, listeners: []};
+// Another study that was or is served at this address may have entries here too: they are left alone.
+const outbox = {waiting: [], isSending: false, isStopped: false, database: null, listeners: []};
 
 function openOutbox() {
   return new Promise(resolve => {
@@ -21,17 +22,29 @@ function inOutbox(mode, act) {
   });
 }
 
-async function loadOutbox(rater) {
+/** Entries without a study are of a page that knew of one alone. */
+async function loadOutbox(study, rater) {
+  outbox.study = study;
   outbox.rater = rater;
   outbox.database = await openOutbox();
   const all = await inOutbox('readonly', store => store.getAll()) || [];
-  outbox.waiting = all.filter(entry => entry.rater === rater);
+  outbox.waiting = all.filter(entry => entry.rater === rater && (entry.study ?? study) === study);
   sayUnsent();
+}
+
+/** Of a rater who has left: nobody will ever take it. */
+async function emptyOutbox() {
+  for (const entry of outbox.waiting.splice(0)) await forget(entry);
+  sayUnsent();
+}
+
+async function forget(entry) {
+  if (entry.at !== undefined) await inOutbox('readwrite', store => store.delete(entry.at));
 }
 
 /** @returns a promise of the server's answer; it may take as long as the line is down. */
 async function send(path, body) {
-  const entry = {path, body, rater: outbox.rater};
+  const entry = {path, body, study: outbox.study, rater: outbox.rater};
   entry.answered = new Promise((resolve, reject) => { entry.resolve = resolve; entry.reject = reject; });
   entry.answered.catch(() => {});
   const {resolve, reject, answered, ...plain} = entry;
@@ -43,11 +56,13 @@ async function send(path, body) {
   return {answered: entry.answered};
 }
 
+const maySend = () => !session.isOther && !outbox.isStopped;
+
 async function flush() {
-  if (outbox.isSending || session.isOther) return;
+  if (outbox.isSending || !maySend()) return;
   outbox.isSending = true;
   try {
-    while (outbox.waiting.length && !session.isOther) await sendFirst(outbox.waiting[0]);
+    while (outbox.waiting.length && maySend()) await sendFirst(outbox.waiting[0]);
   } finally {
     outbox.isSending = false;
     sayUnsent();
@@ -61,15 +76,16 @@ async function sendFirst(entry) {
   } catch (error) {
     if (!(error instanceof Refusal)) throw error;
     if (error.error === 'tab') { losePlace(); return; }  // it stays: whoever takes over sends it
+    if (isNotOurs(error)) { outbox.isStopped = true; location.reload(); return; }  // it stays until its rater is back
     refusal = error;
   }
   outbox.waiting.shift();
-  if (entry.at !== undefined) await inOutbox('readwrite', store => store.delete(entry.at));
+  await forget(entry);
   sayUnsent();
   if (answer) { entry.resolve?.(answer); return; }
   entry.reject?.(refusal);
   if (refusal.error === 'answered') await offerReplace(entry, refusal.body.verdict);
-  else if (refusal.status === 401 || refusal.error === 'withdrawn') location.reload();
+  else if (refusal.error === 'withdrawn') location.reload();
   else toast(`Not stored: ${refusal.message}`, null, 10);
 }
 

@@ -35,7 +35,7 @@ async function rate() {
     showClip(ready.clip, ready.source);
   } catch (error) {
     if (error instanceof Refusal && error.error === 'tab') return losePlace();
-    if (error instanceof Refusal && (error.status === 401 || error.error === 'withdrawn')) return location.reload();
+    if (isNotOurs(error) || error.error === 'withdrawn') return location.reload();
     throw error;
   }
 }

@@ -168,6 +168,7 @@ async function leave() {
   if (!choice) return;
   await patiently(() => post('/api/withdraw', {verdicts: choice, erase: erase.checked}));
   session.epoch = 0;
+  await emptyOutbox();
   show(make('.sheet', {}, make('h1', {}, 'You have left the study'),
     make('p', {}, choice === 'keep' ? 'Your answers stay in it.' : 'Your answers are left out of every result.'),
     make('p', {}, erase.checked ? 'Your name and notes are erased.' : ''))).className = 'centred done';

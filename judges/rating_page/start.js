@@ -13,7 +13,7 @@ async function start() {
   session.csrf = me.csrf;
   document.title = `${me.study} · rating`;
   if (me.role === 'lead') return board();
-  await loadOutbox(me.rater);
+  await loadOutbox(me.study_id, me.rater);
   const isBusy = await isAnotherTabHere();
   if (isBusy) {
     const choice = await ask('Open in another tab', [make('p', {}, 'This study is open in another tab of this browser. Only one may write.')], [['Leave it there', false], ['Take over', true, 'primary']]);

@@ -107,6 +107,17 @@ TEST_F(Deciding, ImportedTrialsAreWhatAWorldIsHeldAgainst) {
   EXPECT_EQ(task.at("policies").at(0).at("further_imagined").at("trials"), 8);
 }
 
+TEST_F(Deciding, AWorldThatNobodyJudgedIsNamedAndTakesNoTrustFromTheOthers) {
+  Store::Open(Run(), Store::Mode::kReadWrite).AddWorld({"dream", "evac", false, "d4e"});
+  const std::string text = Printed(AddTrust, {"trust", Run()});
+  EXPECT_THAT(text, HasSubstr("May sim be trusted? Held against the world real"));
+  EXPECT_THAT(text, HasSubstr("May dream be trusted? Nothing can be said: no imagined episode is judged"));
+  const auto json = nlohmann::json::parse(Printed(AddTrust, {"trust", Run(), "--json"}));
+  ASSERT_EQ(json.at("worlds").size(), 1u);
+  EXPECT_EQ(json.at("unsaid").at(0).at("world"), "dream");
+  EXPECT_THROW(Printed(AddTrust, {"trust", Run(), "--world", "dream"}), Error) << "nothing is left to say";
+}
+
 TEST_F(Deciding, AWrongFileImportsNothing) {
   EXPECT_THROW(Printed(AddImportReal, {"import-real", Csv("take_bottle,41-0000,visual_pick,good,success,missing.mp4\n"),
                                      "--run", Run()}),

@@ -26,42 +26,45 @@ using testing::ThrowsMessage;
 /// said so of all but the last state.
 class LabelledRun : public testing::Test {
  protected:
-  LabelledRun() {
+  LabelledRun() { FillIn(store_, 24); }
+
+  static void FillIn(Store& store, int width_px) {
     Task task;
     task.id = "carry";
-    task.cameras = {{.name = "head", .width_px = 24, .height_px = 16}};
+    task.cameras = {{.name = "head", .width_px = width_px, .height_px = 16}};
     task.rubric.version = "1";
-    store_.AddTask(task);
-    store_.AddWorld({.name = "real", .type = "mujoco", .is_real = true, .profile_hash = ""});
+    store.AddTask(task);
+    store.AddWorld({.name = "real", .type = "mujoco", .is_real = true, .profile_hash = ""});
     for (const char* checkpoint : {"1", "2"})
-      store_.AddPolicy({.name = "p", .checkpoint = checkpoint, .declaration = "{}"});
+      store.AddPolicy({.name = "p", .checkpoint = checkpoint, .declaration = "{}"});
     for (int state = 0; state < kStates; ++state) {
-      AddClip(state, "1", true);
-      AddClip(state, "2", false);
+      AddClip(store, width_px, state, true);
+      AddClip(store, width_px, state, false);
     }
   }
 
-  void AddClip(int state, const std::string& checkpoint, bool success) {
+  static void AddClip(Store& store, int width_px, int state, bool success) {
+    const char* checkpoint = success ? "1" : "2";
     EpisodeRecord record;
     Episode& episode = record.episode;
     episode.key = {{"carry", fmt::format("5-{:04d}", state), "p", checkpoint, 1}, "real"};
     episode.stop = StopReason::kStill;
     episode.observations.resize(1);
     episode.observations[0].arms.resize(1);
-    VideoWriter writer(store_.VideoPath(episode.key), {.period_s = 0.1, .scale = 2});
+    VideoWriter writer(store.VideoPath(episode.key), {.period_s = 0.1, .scale = 2});
     for (int t = 0; t < 30; ++t) {
-      cv::Mat view(16, 24, CV_8UC3, cv::Scalar::all(50 + state));
+      cv::Mat view(16, width_px, CV_8UC3, cv::Scalar::all(50 + state));
       view(cv::Rect(2 + (success ? t / 2 : 0), 4 + state % 7, 5, 5)).setTo(cv::Scalar(240, 60, 60));
       writer.Append(view);
     }
     record.video = writer.Finish();
-    store_.Add(record);
+    store.Add(record);
     if (state + 1 == kStates) return;
     Verdict verdict;
     verdict.episode_id = episode.key.Id();
     verdict.judge = "people";
     verdict.label = success ? Label::kSuccess : Label::kFailure;
-    store_.AddVerdict(verdict);
+    store.AddVerdict(verdict);
   }
 
   LabelledRuns Options() const {
@@ -86,6 +89,18 @@ TEST_F(LabelledRun, IsSplitByInitialStateAndHoldsWhatWasJudgedAlone) {
   for (const PackedClip& clip : clips.holdout->clips) EXPECT_FALSE(learned.contains(clip.state)) << clip.state;
   EXPECT_GT(clips.holdout->clips.size(), 8U);
   EXPECT_FALSE(clips.learn->KnowsObjects());
+}
+
+TEST_F(LabelledRun, BesideAnotherOfTheSameTaskByLargerCamerasBothAreReadWhole) {
+  Store other = Store::CreateOrContinue(
+      folder_ / "other", {.suite_text = "suite: test\n", .suite_hash = "o", .suite_path = "", .evac_version = "0"});
+  FillIn(other, 36);
+  LabelledRuns options = Options();
+  options.runs = {folder_ / "run", folder_ / "other"};
+  const LabelledClips clips = Read(options);
+  EXPECT_THAT(said_, testing::IsEmpty());
+  EXPECT_EQ(clips.learn->clips.size() + clips.holdout->clips.size(), 4U * (kStates - 1));
+  EXPECT_EQ(clips.learn->tasks, std::vector<std::string>{"carry"});
 }
 
 TEST_F(LabelledRun, BecomesAClassifierThatJudgesOthersAndNotWhatItLearnedFrom) {

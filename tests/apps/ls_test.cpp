@@ -122,6 +122,25 @@ TEST_F(Ls, RatesCountWhatAJudgeSaidAndSayWhatTheyDoNotCount) {
   EXPECT_THAT(Print({"--rates", "--judge", "human:ann"}), HasSubstr("1 cannot tell\n"));
 }
 
+TEST_F(Ls, RatesOfAJudgeAreFoundByTheBeginningOfItsName) {
+  AddVerdict("classifier:0123456789ab", Label::kFailure);
+  EXPECT_EQ(Print({"--rates", "--judge", "classifier"}), Print({"--rates", "--judge", "classifier:0123456789ab"}));
+  EXPECT_THAT(Print({"--rates", "--judge", "classifier"}), HasSubstr("sim    1         0 % [0, 79]"));
+}
+
+TEST_F(Ls, RatesOfAJudgeWhoGaveNoVerdictAndOfSeveralAreRefused) {
+  for (const auto& [judge, words] : std::vector<std::pair<std::string, std::string>>{
+           {"orakel", "'orakel', wanted one of: human:ann, oracle"}, {"oracle,human:ann", "wanted one judge"}}) {
+    try {
+      Print({"--rates", "--judge", judge});
+      FAIL() << "wanted an error for " << judge;
+    } catch (const Error& error) {
+      EXPECT_EQ(error.exit_code(), ExitCode::kInvalidInput);
+      EXPECT_THAT(error.what(), HasSubstr(words));
+    }
+  }
+}
+
 TEST_F(Ls, HowTheWireMisbehavedIsShownWhereItDid) {
   EXPECT_THAT(Print({}), testing::Not(HasSubstr("wire:")));
   store_.Count("visual_pick@good", {{"repeats", 31}, {"late_replies", 0}, {"timeouts", 2}});

@@ -35,6 +35,7 @@ TEST(ShippedWeights, OfTheWorldModelSayWhatTheyAreFor) {
   const TrainedFor trained = TrainedFor::Read(kShipped / "evac.safetensors");
   EXPECT_EQ(trained.period_s, 0.1);
   EXPECT_EQ(trained.cameras, (std::vector<std::string>{"head", "hand_right"}));
+  EXPECT_EQ(trained.arms, (std::vector<std::string>{"right"}));
   EXPECT_EQ(trained.arms_read, "told");
   ASSERT_TRUE(trained.statistics.has_value());
   EXPECT_NO_THROW(trained.StatisticsOr(kShipped / "statistics.yaml"));

@@ -85,6 +85,39 @@ TEST_F(TrainPolicyTest, OnlySuccessesOfTheWantedBehavioursAreImitated) {
               ThrowsMessage<Error>(HasSubstr("none of 24 clips is a success of behaviours 'push,roam'")));
 }
 
+/// Every outcome times this: failures stay failures.
+void MultiplyOutcomes(const std::filesystem::path& folder, int by) {
+  for (const std::filesystem::path& shard : train::ShardPaths(folder)) {
+    nn::MappedTensors file(TensorFile::Open(shard));
+    std::vector<at::Tensor> tensors;
+    std::vector<TensorView> views;
+    for (const TensorView& view : file.file().tensors()) {
+      at::Tensor tensor = file.Get(view.name).clone();
+      if (view.name == "outcome") tensor.mul_(by);
+      tensors.push_back(tensor);
+      views.push_back(nn::ViewOf(view.name, tensors.back()));
+    }
+    WriteTensorFile(shard, views, file.file().metadata());
+  }
+}
+
+TEST_F(TrainPolicyTest, ARobotsRecordingsWhoseOutcomeNobodyKnowsAreImitatedAndFailuresNever) {
+  MultiplyOutcomes(folder_ / "shards", -1);
+  const PackedSet set({folder_ / "shards"}, train::Split::kTrain);
+  PolicyOptions options = Quick(2);
+  EXPECT_THAT([&] { PolicyTraining(set, options, nullptr); },
+              ThrowsMessage<Error>(HasSubstr("all are imitated with `behaviours: \"\"`")))
+      << "a wanted behaviour must have succeeded";
+  options.behaviours = "";
+  EXPECT_EQ(PolicyTraining(set, options, nullptr).clips(), set.clips.size() / 2);
+  TrainPolicy(Place("policy"), options, nullptr, {});
+  EXPECT_EQ(WeightFile(folder_ / "policy" / "policy.safetensors", kLearnedFormat).Text("imitated_clips"), "12");
+  MultiplyOutcomes(folder_ / "shards", 0);
+  const PackedSet failures({folder_ / "shards"}, train::Split::kTrain);
+  EXPECT_THAT([&] { PolicyTraining(failures, options, nullptr); },
+              ThrowsMessage<Error>(HasSubstr("each of 24 clips is a failure")));
+}
+
 TEST_F(TrainPolicyTest, TheCardKeepsTheCamerasOfTheShards) {
   const std::vector<Camera> cameras = CamerasOf(PackedSet({folder_ / "shards"}, train::Split::kTrain));
   ASSERT_EQ(cameras.size(), 2U);
@@ -93,6 +126,30 @@ TEST_F(TrainPolicyTest, TheCardKeepsTheCamerasOfTheShards) {
   EXPECT_EQ(cameras[1].mount, Mount::kRightGripper);
   // The gripper, at (.3, 0, .1) and upside down, carries a camera that stands at (.4, 0, 1).
   EXPECT_TRUE(cameras[1].mount_from_camera.translation().isApprox(Eigen::Vector3d(0.1, 0, -0.9), 1e-5));
+}
+
+/// The same shards by cameras of other names.
+void RenameCameras(const std::filesystem::path& folder, const std::string& cameras) {
+  for (const auto& shard : train::ShardPaths(folder)) {
+    nn::MappedTensors file(TensorFile::Open(shard));
+    std::vector<at::Tensor> tensors;
+    std::vector<TensorView> views;
+    for (const TensorView& view : file.file().tensors()) {
+      tensors.push_back(file.Get(view.name).clone());
+      views.push_back(nn::ViewOf(view.name, tensors.back()));
+    }
+    TensorMetadata metadata = file.file().metadata();
+    metadata["cameras"] = cameras;
+    WriteTensorFile(shard, views, metadata);
+  }
+}
+
+TEST_F(TrainPolicyTest, ACameraNamedAfterALeftHandThatIsNotThereIsCarriedByNone) {
+  RenameCameras(folder_ / "shards", "head,hand_left");
+  const std::vector<Camera> cameras = CamerasOf(PackedSet({folder_ / "shards"}, train::Split::kTrain));
+  ASSERT_EQ(cameras.size(), 2U);
+  EXPECT_EQ(cameras[1].mount, Mount::kBase);
+  EXPECT_TRUE(cameras[1].mount_from_camera.translation().isApprox(Eigen::Vector3d(0.4, 0, 1), 1e-5));
 }
 
 /// The training clips, two by two, become crops of one recording: the first a part of it, with twice the focal length.

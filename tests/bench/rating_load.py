@@ -53,7 +53,7 @@ class Client:
 
     def __init__(self, server, number):
         self.server, self.address = server, f"127.0.{1 + number // 250}.{1 + number % 250}"
-        self.cookie, self.reader, self.writer = "", None, None
+        self.name, self.cookie, self.reader, self.writer = "none", "", None, None
 
     async def once(self, method, path, body=b"", head=""):
         if not self.writer:
@@ -62,7 +62,7 @@ class Client:
         csrf = hashlib.sha256(("csrf " + self.cookie).encode()).hexdigest()[:32]
         self.writer.write((f"{method} {path} HTTP/1.1\r\nHost: 127.0.0.1:{self.server.port}\r\n"
                            f"Content-Type: application/json\r\nContent-Length: {len(body)}\r\n"
-                           f"Cookie: evac_rating={self.cookie}\r\nX-Evac-Csrf: {csrf}\r\n{head}\r\n").encode() + body)
+                           f"Cookie: {self.name}={self.cookie}\r\nX-Evac-Csrf: {csrf}\r\n{head}\r\n").encode() + body)
         text = (await self.reader.readuntil(b"\r\n\r\n")).decode()
         length = int(re.search(r"(?i)content-length: *(\d+)", text)[1])
         return int(text.split(" ", 2)[1]), text, await self.reader.readexactly(length)
@@ -86,7 +86,7 @@ class Client:
         status, text, answer, _ = await self.ask("POST", "/api/join", {"invite": link, "uuid": uuid.uuid4().hex})
         if status != 200:
             sys.exit(f"join: {status} {answer.decode()}")
-        self.cookie = re.search(r"evac_rating=([0-9a-f]{32})", text)[1]
+        self.name, self.cookie = re.search(r"(evac_rating_[0-9a-f]+)=([0-9a-f]{32})", text).groups()
 
 
 async def rate(client, tally, until, think_s):

@@ -1,5 +1,6 @@
 #include "core/geometry.h"
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <numbers>
@@ -63,6 +64,14 @@ TEST(Geometry, ACameraStandsOnItsMount) {
   EXPECT_TRUE(BaseFromCamera(camera, arms).isApprox(arms[1].base_from_gripper * camera.mount_from_camera));
   EXPECT_TRUE(BaseFromCamera(camera, {arms[0]}).isApprox(arms[0].base_from_gripper * camera.mount_from_camera));
   EXPECT_THROW(BaseFromCamera(camera, {}), Error);
+}
+
+TEST(Geometry, ACameraOnALeftGripperThatIsNotThereIsRefusedAndNotCarriedByTheRight) {
+  Camera camera = SomeCamera();
+  camera.mount = Mount::kLeftGripper;
+  const Arms right_alone(1);
+  EXPECT_THAT([&] { BaseFromCamera(camera, right_alone); },
+              testing::ThrowsMessage<Error>(testing::HasSubstr("camera head is mounted on the left gripper")));
 }
 
 TEST(Geometry, AQuaternionIsReadInTheOrderXyzwAndNormalised) {

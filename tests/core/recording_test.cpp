@@ -2,6 +2,8 @@
 
 #include <gmock/gmock.h>
 
+#include <algorithm>
+#include <array>
 #include <fstream>
 #include <opencv2/imgcodecs.hpp>
 
@@ -143,6 +145,24 @@ TEST(Recording, AWristCameraIsDescribedByItsPlaceOnTheGripper) {
   EXPECT_TRUE(at_last.isApprox(clip.BaseFromGripper(5, 1) * SyntheticClip::MountFromCamera(), 1e-6));
 }
 
+TEST(Recording, ASecondFixedCameraOfARobotWithOneArmStaysWhereItIsWhileTheHandMoves) {
+  const TempFolder folder;
+  SyntheticClip clip(6);
+  clip.cameras = {"head", "hand_left", "hand_right"};
+  for (std::size_t step = 0; step < 6; ++step) {  // no left arm: at the base's origin, unturned, open
+    clip.grippers[2 * step] = 0;
+    std::fill_n(&clip.positions_m[6 * step], 3, 0.0);
+    std::copy_n(std::array{0.0, 0.0, 0.0, 1.0}.begin(), 4, &clip.quaternions_xyzw[8 * step]);
+  }
+  clip.Write(OneFolder(folder / "a"));
+  const Recording recording = ReadRecording(folder / "a");
+  EXPECT_THAT(recording.arm_names, testing::ElementsAre("right"));
+  const Mount mounts[] = {Mount::kBase, Mount::kBase, Mount::kRightGripper};
+  for (const int camera : {0, 1, 2}) EXPECT_EQ(recording.cameras[camera].mount, mounts[camera]);
+  for (const Arms& arms : recording.arms)
+    EXPECT_TRUE(BaseFromCamera(recording.cameras[1], arms).isApprox(SyntheticClip::MountFromCamera(), 1e-6));
+}
+
 TEST(Recording, ACameraThatMovesOnItsMountIsRefusedUnlessToldToTolerateIt) {
   const TempFolder folder;
   for (const std::string camera : {"head", "hand_left"}) {
@@ -170,6 +190,26 @@ TEST(Recording, ItsFramesComeInOrderAndTheLastOneStays) {
       EXPECT_NEAR(GreyOf(frames.Next()[0]), SyntheticClip::FrameGrey(frame), 3)
           << "step " << step << " of every " << every_nth;
     }
+  }
+}
+
+TEST(Recording, ThinnedToAPeriodItIsTheSameAsReadSo) {
+  const TempFolder folder;
+  SyntheticClip(7).Write(OneFolder(folder / "a"));
+  const Recording recording = ReadRecording(folder / "a"), thinned = Thinned(recording, 0.1);
+  EXPECT_EQ(thinned.period_s, 0.1);
+  EXPECT_EQ(thinned.every_nth, 3);
+  ASSERT_EQ(thinned.arms.size(), 3u);
+  EXPECT_EQ(thinned.arms[2][1].base_from_gripper.matrix(), recording.arms[6][1].base_from_gripper.matrix());
+  RecordedFrames frames(thinned);
+  for (const int frame : {0, 3, 6, 6}) EXPECT_NEAR(GreyOf(frames.Next()[0]), SyntheticClip::FrameGrey(frame), 3);
+
+  EXPECT_EQ(Thinned(recording, 0.033).period_s, 0.033) << "meant exactly";
+  EXPECT_EQ(Thinned(recording, 0.033).arms.size(), 7u);
+  EXPECT_EQ(Thinned(thinned, 0.2).every_nth, 6);
+  for (const double period_s : {0.05, 0.01}) {
+    EXPECT_THAT([&] { Thinned(recording, period_s); },
+                testing::ThrowsMessage<Error>(AllOf(HasSubstr("steps of 0.03333 s"), HasSubstr("wanted steps of 0.0"))));
   }
 }
 
@@ -297,6 +337,20 @@ TEST(Recording, FourFilesOfAnyNameAreReadAsTheFoldersThatHoldThem) {
   } catch (const Error& error) {
     EXPECT_THAT(error.what(), HasSubstr("found the ending '.png', wanted .npy or .h5"));
   }
+}
+
+TEST(Recording, FourFilesOfARobotWithoutALeftArmHaveTheRightOneAlone) {
+  const TempFolder folder;
+  NpyArray actions = Actions(3);
+  for (std::size_t i = 0; i < actions.values.size(); ++i) {
+    if (i % 16 < 8) actions.values[i] = i % 16 == 6 ? 1 : 0;
+  }
+  WriteExample(folder / "a", actions);
+  const Recording recording = ReadRecordingFiles({folder / "a" / "frame.png", folder / "a" / "action.npy",
+                                                  folder / "a" / "extrinsics.npy", folder / "a" / "intrinsics.npy"});
+  EXPECT_EQ(recording.arm_names, std::vector<std::string>{"right"});
+  ASSERT_EQ(recording.arms[2].size(), 1u);
+  EXPECT_EQ(recording.arms[2][0].base_from_gripper.translation().y(), -0.2);
 }
 
 TEST(Recording, ItsTaskAcceptsEveryRecordedStep) {

@@ -126,6 +126,13 @@ TEST(TaskPage, EveryComplaintNamesFileFieldAndWhatWasFound) {
   EXPECT_THAT(ComplaintAbout(Replaced(kPage, "id: push", "id: ../push")), HasSubstr("id"));
 }
 
+TEST(TaskPage, ACameraOnALeftGripperWantsALeftArm) {
+  const std::string on_the_left = Replaced(kPage, "mount: base", "mount: left_gripper");
+  EXPECT_THAT(ComplaintAbout(on_the_left),
+              AllOf(HasSubstr("arms"), HasSubstr("camera head"), HasSubstr("left gripper")));
+  EXPECT_EQ(ComplaintAbout(Replaced(on_the_left, "arms: [right]", "arms: [left, right]")), "no complaint");
+}
+
 TEST(TaskPage, TwoCamerasOfOneNameAreRefused) {
   const std::string camera =
       "  - {name: head, mount: base, width_px: 96, height_px: 64, fovy_deg: 40, position_m: [1, 0, 1], look_at_m: [0, "

@@ -5,6 +5,7 @@
 
 #include <array>
 #include <fstream>
+#include <limits>
 
 #include "core/error.h"
 #include "tests/support/temp_folder.h"
@@ -18,8 +19,7 @@ using testing::ThrowsMessage;
 
 class WeightFileTest : public testing::Test {
  protected:
-  std::filesystem::path Written(const TensorMetadata& card) const {
-    static const std::array<float, 2> numbers = {1.5F, -2};
+  std::filesystem::path Written(const TensorMetadata& card, const std::array<float, 2>& numbers = {1.5F, -2}) const {
     TensorView view{{"out.bias", TensorType::kF32, {2}}, std::as_bytes(std::span(numbers))};
     WriteTensorFile(folder_ / "w.safetensors", {&view, 1}, card);
     return folder_ / "w.safetensors";
@@ -63,6 +63,17 @@ TEST_F(WeightFileTest, TensorsThatAreMissingMisshapenOrUnreadAreRefused) {
       },
       ThrowsMessage<Error>(HasSubstr("out.bias is F32 [2], wanted F32 [3, 1]")));
   EXPECT_THAT([&] { file.RequireAllTaken(); }, ThrowsMessage<Error>(HasSubstr("nothing reads tensor 'out.bias'")));
+}
+
+TEST_F(WeightFileTest, NumbersThatAreNotFiniteAreRefusedWithTheTensorAndThePlace) {
+  const auto taking = [&](float second) {
+    WeightFile(Written({{"format", "evac-x 1"}}, {1.5F, second}), "evac-x 1").Take("out.bias", {2});
+  };
+  EXPECT_THAT([&] { taking(std::numeric_limits<float>::quiet_NaN()); },
+              ThrowsMessage<Error>(HasSubstr("w.safetensors: out.bias: number 1 is nan, wanted a finite one")));
+  EXPECT_THAT([&] { taking(-std::numeric_limits<float>::infinity()); },
+              ThrowsMessage<Error>(HasSubstr("out.bias: number 1 is -inf")));
+  EXPECT_NO_THROW(taking(std::numeric_limits<float>::max()));
 }
 
 TEST_F(WeightFileTest, CardFieldsAreCheckedByName) {

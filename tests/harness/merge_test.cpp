@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include "core/error.h"
 #include "tests/core/store_samples.h"
 #include "tests/support/temp_folder.h"
 
@@ -52,6 +53,68 @@ TEST_F(TakenEpisodes, BringNoSceneOfAStateThatNobodyWants) {
   elsewhere.pair.initial_state = "41-0008";
   EXPECT_EQ(Take(elsewhere), 0);
   EXPECT_TRUE(to_.InitialScenes().empty());
+}
+
+/// Two shards on disk, and what is merged from them.
+class MergedRuns : public testing::Test {
+ protected:
+  MergedRuns() {
+    for (Store* store : {&a_, &b_}) samples::Declare(*store);
+  }
+
+  MergeSummary Merge(const std::string& out = "merged") { return MergeRuns({a_.folder(), b_.folder()}, folder_ / out); }
+
+  /// What was said in the merged run, oldest first: "judge: reason".
+  std::vector<std::string> Said() const {
+    std::vector<std::string> said;
+    for (const Verdict& verdict : Store::Open(folder_ / "merged", Store::Mode::kReadOnly).Verdicts())
+      said.push_back(verdict.judge + ": " + verdict.reason);
+    return said;
+  }
+
+  Verdict Says(const std::string& judge, const std::string& reason) const {
+    Verdict verdict;
+    verdict.episode_id = key_.Id();
+    verdict.judge = judge;
+    verdict.label = Label::kSuccess;
+    verdict.reason = reason;
+    return verdict;
+  }
+
+  const TempFolder folder_;
+  const EpisodeKey key_ = samples::Key(1, "real"), other_ = samples::Key(2, "real");
+  Store a_ = Store::CreateOrContinue(folder_ / "a", samples::SomeRun()),
+        b_ = Store::CreateOrContinue(folder_ / "b", samples::SomeRun());
+};
+
+TEST_F(MergedRuns, AreWhereTheyWereWantedAlsoWithASlashBehindTheName) {
+  a_.Add(samples::SomeEpisode(a_, key_));
+  EXPECT_EQ(Merge("merged/").episodes, 1);
+  EXPECT_TRUE(Store::Open(folder_ / "merged", Store::Mode::kReadOnly).Has(key_));
+  EXPECT_FALSE(std::filesystem::exists(folder_ / "merged.tmp"));
+  EXPECT_THROW(Merge("merged/"), Error) << "it is there now";
+  EXPECT_THROW(MergeRuns({a_.folder()}, ""), Error);
+}
+
+TEST_F(MergedRuns, KeepTheVerdictsOfTheCopyThatWasNotTakenAndSayOnceWhatBothSay) {
+  for (Store* store : {&a_, &b_}) store->Add(samples::SomeEpisode(*store, key_));
+  a_.AddVerdict(Says("oracle", "it stands"));
+  b_.AddVerdict(Says("oracle", "it stands"));
+  b_.AddVerdict(Says("human:night:r1", "I saw it"));
+  EXPECT_EQ(Merge().duplicates, 1);
+  EXPECT_EQ(Said(), (std::vector<std::string>{"oracle: it stands", "human:night:r1: I saw it"}));
+}
+
+TEST_F(MergedRuns, LoseWhatWasSaidOfAFailedCopyThatYieldedAndDoNotCountItAsTheSame) {
+  a_.Add(samples::SomeEpisode(a_, key_, StopReason::kPolicyError));
+  a_.AddVerdict(Says("vlm:x", "of the failed one"));
+  b_.Add(samples::SomeEpisode(b_, key_));
+  b_.AddVerdict(Says("oracle", "of the good one"));
+  b_.Add(samples::SomeEpisode(b_, other_, StopReason::kPolicyError));
+  const MergeSummary summary = Merge();
+  EXPECT_EQ(summary.episodes, 2);
+  EXPECT_EQ(summary.duplicates, 0);
+  EXPECT_EQ(Said(), std::vector<std::string>{"oracle: of the good one"});
 }
 
 }  // namespace

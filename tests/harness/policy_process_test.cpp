@@ -114,6 +114,21 @@ TEST_F(PolicyProcessTest, OneThatDiesAgainAndAgainIsGivenUpWithItsLastWords) {
   EXPECT_EQ(process.restarts(), 2);
 }
 
+TEST_F(PolicyProcessTest, WhatAnEarlierProcessSaidIsNotTakenForItsLastWords) {
+  PolicyProcessOptions silent = Shell("exit 3");
+  silent.restarts = 0;
+  std::ofstream(silent.log) << "yesterday: out of memory\n";
+  PolicyProcess process(silent);
+  ASSERT_TRUE(Eventually([&] { return process.WhyGone().has_value(); }));
+  EXPECT_THAT(*process.WhyGone(), HasSubstr("at last with exit code 3: it said nothing ("));
+
+  PolicyProcessOptions second_says_nothing = Shell("test -e $FOLDER/second && exit 4; touch $FOLDER/second; echo first; exit 3");
+  second_says_nothing.restarts = 1;
+  PolicyProcess other(second_says_nothing);
+  ASSERT_TRUE(Eventually([&] { return other.WhyGone().has_value(); }));
+  EXPECT_THAT(*other.WhyGone(), HasSubstr("at last with exit code 4: it said nothing ("));
+}
+
 TEST_F(PolicyProcessTest, OneThatIsKilledIsSaidToBe) {
   PolicyProcessOptions options = Shell("kill -SEGV $$");
   options.restarts = 0;

@@ -145,6 +145,17 @@ TEST_F(EvacSuite, WhatIsWrongIsNamedWithItsField) {
   EXPECT_THAT(Complaint({"worlds.0={name: echo, type: echo, steps: 3}"}), HasSubstr("steps"));
 }
 
+TEST_F(EvacSuite, ATaskOfAnotherPeriodIsRefusedBeforeTheRealWorldsEpisodes) {
+  WriteBoth();
+  try {
+    ReadSuite(folder_ / "both.yaml", {"worlds.1.period_s=0.2"});
+    FAIL() << "no complaint";
+  } catch (const Error& error) {
+    EXPECT_EQ(error.exit_code(), ExitCode::kInvalidInput);
+    EXPECT_THAT(error.what(), AllOf(HasSubstr("worlds.1.period_s"), HasSubstr("0.2 s apart, those of task take_bottle 0.1 s")));
+  }
+}
+
 TEST_F(EvacSuite, WithoutARealWorldOrARecordingNothingCouldBeStartedFrom) {
   const std::string task = EVAC_SOURCE_DIR "/worldmodel/sim/scenes/take_bottle.yaml";
   Write("suite.yaml",

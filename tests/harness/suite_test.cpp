@@ -66,6 +66,16 @@ TEST_F(SuiteTest, ASecondRealWorldOrATwinPolicyIsRefused) {
   EXPECT_THAT(Complaint(std::string(kSuite), {"policies.1.checkpoint=a"}), HasSubstr("'replay@a' is there twice"));
 }
 
+TEST_F(SuiteTest, ASeedThatIsThereTwiceIsRefusedBeforeTheSecondEpisodeOfItsName) {
+  EXPECT_THAT(Complaint(std::string(kSuite), {"seeds=[1, 2, 1]"}), AllOf(HasSubstr("field seeds"), HasSubstr("'1' is there twice, wanted distinct seeds")));
+}
+
+TEST_F(SuiteTest, AJudgeThatNoRunHasIsRefusedBeforeTheFirstEpisodeAndNotAfterTheLast) {
+  for (const char* judges : {"judges=[classifier]", "judges=[oracel]", "judges=[oracle, human]"})
+    EXPECT_THAT(Complaint(std::string(kSuite), {judges}), AllOf(HasSubstr("field judges"), HasSubstr("wanted [oracle] or none"))) << judges;
+  for (const char* judges : {"judges=[oracle]", "judges=[]"}) EXPECT_EQ(Complaint(std::string(kSuite), {judges}), "no complaint") << judges;
+}
+
 TEST_F(SuiteTest, AWorldMayTryTheFirstOfTheInitialStatesAlone) {
   const auto read = [](std::vector<std::string> set) {
     set.insert(set.begin(), "initial_states.count=20");

@@ -5,6 +5,8 @@
 
 #include <cmath>
 #include <deque>
+#include <limits>
+#include <map>
 
 #include "core/error.h"
 #include "core/seed.h"
@@ -34,14 +36,15 @@ const TensorMetadata kCard = {{"format", "evac-classifier 1"},
                               {"unsure", "0.05"}};
 
 /// Weights that no training made, as a file, with that card.
-fs::path Weights(const fs::path& path, const TensorMetadata& card = kCard) {
+/// @param furthest  no number is further from 0
+fs::path Weights(const fs::path& path, const TensorMetadata& card = kCard, double furthest = 0.2) {
   std::deque<std::vector<float>> numbers;
   std::vector<TensorView> views;
   SplitMix64 random(3);
   const TakeParameter take = [&](const std::string& key, const std::vector<std::int64_t>& shape) {
     TensorView view{{key, TensorType::kF32, shape}, {}};
     std::vector<float>& values = numbers.emplace_back(view.ByteCount() / sizeof(float));
-    for (float& value : values) value = static_cast<float>(random.Uniform(-0.2, 0.2));
+    for (float& value : values) value = static_cast<float>(random.Uniform(-furthest, furthest));
     view.bytes = std::as_bytes(std::span(values));
     views.push_back(view);
     return at::Tensor();
@@ -133,6 +136,24 @@ TEST_F(ClassifierJudgeTest, AClipThatCannotBeReadIsAnErrorRowAndNoFailure) {
   const Verdict verdict = store_.CurrentVerdicts().at(broken.key.Id()).at(judge.Name());
   EXPECT_EQ(verdict.label, Label::kInvalid);
   EXPECT_THAT(verdict.reason, HasSubstr(".mp4"));
+}
+
+TEST_F(ClassifierJudgeTest, AnAnswerThatIsNotFiniteIsAnErrorRowAndNoFailure) {
+  const Episode episode = Stored("1-0000", 40);
+  ClassifierJudge judge(Weights(folder_ / "w.safetensors", kCard, 1e30), folder_.path());  // finite, what they make is not
+  const JudgeSummary summary = JudgeEpisodes(judge, store_, {});
+  EXPECT_EQ(summary.labels, (std::map<Label, int>{{Label::kInvalid, 1}}));
+  const Verdict verdict = store_.CurrentVerdicts().at(episode.key.Id()).at(judge.Name());
+  EXPECT_THAT(verdict.reason, HasSubstr("wanted a finite number"));
+  EXPECT_FALSE(verdict.probability);
+}
+
+TEST_F(ClassifierJudgeTest, WeightsWithNumbersThatAreNoneAreRefused) {
+  EXPECT_THAT(
+      [&] {
+        ClassifierJudge(Weights(folder_ / "w.safetensors", kCard, std::numeric_limits<double>::infinity()), "");
+      },
+      ThrowsMessage<Error>(HasSubstr("wanted a finite one")));
 }
 
 TEST_F(ClassifierJudgeTest, AClipLongerThanAnyItLearnedFromIsNotJudged) {

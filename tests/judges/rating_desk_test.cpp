@@ -262,6 +262,28 @@ TEST_F(RatingDeskTest, AdjudicatorsSayWhatTheySeeBeforeTheySeeTheOthers) {
   EXPECT_EQ(ann.Say(usurped).status, 403);
 }
 
+TEST_F(RatingDeskTest, WhatAnAdjudicatorWhoLeftDecidedIsGivenToAnother) {
+  AtTheDesk ann(store, desk), bob(store, desk);
+  ann.RateAll([](const StudyClip&) { return "success"; });
+  bob.RateAll([](const StudyClip&) { return "failure"; });
+  AtTheDesk eve(store, desk, RaterRole::kAdjudicator), fay(store, desk, RaterRole::kAdjudicator);
+  const std::size_t split = store.Disputes().size();
+  const std::string clip = eve.Next().body.at("presentation");
+  eve.Say(clip, "success");
+  HumanVerdict last = eve.Watched(clip, "success");
+  last.supersedes = store.CurrentVerdict(clip)->id;
+  last.is_final = true;
+  ASSERT_EQ(eve.Say(last).status, 200);
+  EXPECT_EQ(store.Disputes().size(), split - 1);
+  desk.Withdraw(eve.Me(), {.keep = false, .erase = false}, 9);
+  EXPECT_EQ(store.Disputes().size(), split);
+  RatingTally tally;
+  tally.Read(store);
+  EXPECT_EQ(tally.Disputes(), store.Disputes());
+  const std::string given = fay.Next().body.at("presentation");
+  EXPECT_EQ(store.FindPresentation(given)->clip, store.FindPresentation(clip)->clip) << "the first of them again";
+}
+
 TEST_F(RatingDeskTest, TheBoardGivesItsRowsInPagesDisputesFirstAndItsNumbersOfAll) {
   AtTheDesk ann(store, desk), bob(store, desk);
   ann.RateAll([](const StudyClip&) { return "success"; });

@@ -54,10 +54,13 @@ class RatingServerTest : public testing::Test {
     const Heard heard =
         Post("/api/join", json{{"invite", link}, {"uuid", NewSecret()}, {"name", "<b>Ann</b>"}}.dump(), "");
     EXPECT_EQ(heard.status, 200) << heard.body;
-    const std::size_t at = heard.head.find("evac_rating=");
-    const std::string session = heard.head.substr(at + 12, 32);
     cookies.push_back(heard.head.substr(heard.head.find("Set-Cookie")));
-    return "Cookie: evac_rating=" + session + "\r\nX-Evac-Csrf: " + CsrfOf(session) + "\r\n";
+    return With(CookieSetBy(heard.head));
+  }
+  /// Headers of a browser that has this cookie, and others before it.
+  static std::string With(const std::string& cookie, const std::string& others = "") {
+    const std::string session = cookie.substr(cookie.find('=') + 1);
+    return "Cookie: " + others + cookie + "\r\nX-Evac-Csrf: " + CsrfOf(session) + "\r\n";
   }
   std::int64_t Epoch(const std::string& who) { return Post("/api/tab", "{}", who).Json().at("tab_epoch"); }
   json Next(const std::string& who, std::int64_t epoch) {
@@ -237,6 +240,47 @@ TEST_F(RatingServerTest, SlowClientsHinderNobody) {
     EXPECT_LE(::recv(socket, &byte, 1, 0), 0);
     close(socket);
   }
+}
+
+TEST_F(RatingServerTest, TwoStudiesOnOneHostDoNotTakeEachOthersSessions) {
+  Join();
+  const std::string link = NewSecret();
+  SmallStudy other(2);  // of the same name and seed
+  {
+    StudyStore store = other.Open();
+    store.AddInvite(link, RaterRole::kRater, 1);
+  }
+  RatingServer second(OptionsFor(other.folder()));
+  std::thread at_work([&] { second.Serve(); });
+  const Heard joined{PostJson(second.port(), "/api/join", json{{"invite", link}, {"uuid", NewSecret()}}.dump(), "")};
+  const std::string mine = CookieSetBy(cookies.back()), theirs = CookieSetBy(joined.head);
+  EXPECT_NE(mine.substr(0, mine.find('=')), theirs.substr(0, theirs.find('='))) << "a browser keeps one of each name";
+  const Heard here = Get("/api/me", With(mine, theirs + "; "));
+  EXPECT_EQ(here.status, 200) << here.body;
+  const Heard there{RawExchange(second.port(), "GET /api/me HTTP/1.1\r\nHost: 127.0.0.1\r\nConnection: close\r\n" +
+                                                   With(theirs, mine + "; ") + "\r\n")};
+  EXPECT_EQ(there.status, 200) << there.body;
+  EXPECT_EQ(here.Json().at("study"), there.Json().at("study"));
+  EXPECT_NE(here.Json().at("study_id"), there.Json().at("study_id")) << "by which the page keeps their answers apart";
+  EXPECT_EQ(Get("/api/me", With(theirs)).status, 401);
+  second.Stop();
+  at_work.join();
+}
+
+TEST_F(RatingServerTest, ASessionUnderTheNameThatAllStudiesSharedGoesOn) {
+  Join();
+  const std::string cookie = CookieSetBy(cookies.back()), old = "evac_rating" + cookie.substr(cookie.find('='));
+  EXPECT_EQ(Get("/api/me", With(old)).status, 200);
+  EXPECT_EQ(Post("/api/tab", "{}", With(old)).status, 200);
+  EXPECT_EQ(Get("/api/me", With(cookie, "evac_rating=" + NewSecret() + "; ")).status, 200) << "that one is another's";
+}
+
+TEST(StudyId, StaysWithItsStudyAndIsNoOthers) {
+  const SmallStudy study(1), alike(1);
+  const std::string id = study.Open().Id();
+  EXPECT_EQ(study.Open().Id(), id);
+  EXPECT_NE(alike.Open().Id(), id) << "of the same name, seed and clips";
+  EXPECT_EQ(id.find_first_not_of("0123456789abcdef"), std::string::npos);
 }
 
 TEST_F(RatingServerTest, AStudyHasOneServer) {

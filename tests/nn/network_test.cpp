@@ -58,13 +58,17 @@ TEST_F(Network, ThreeScenesTogetherAreThreeAlone) {
 /// Another source's weights in half the bytes.
 class HalfWeights final : public ParameterSource {
  public:
-  explicit HalfWeights(ParameterSource& source) : source_(source) {}
-  Tensor Take(const std::string& key, at::IntArrayRef shape) override {
-    return source_.Take(key, shape).to(at::kBFloat16);
-  }
+  /// @param products  of which type they are; nothing: that of the weights
+  explicit HalfWeights(ParameterSource& source, at::ScalarType type = at::kBFloat16,
+                       std::optional<at::ScalarType> products = std::nullopt)
+      : source_(source), type_(type), products_(products) {}
+  Tensor Take(const std::string& key, at::IntArrayRef shape) override { return source_.Take(key, shape).to(type_); }
+  std::optional<at::ScalarType> ProductType() const override { return products_; }
 
  private:
   ParameterSource& source_;
+  at::ScalarType type_;
+  std::optional<at::ScalarType> products_;
 };
 
 TEST_F(Network, InHalfTheBytesItSaysNearlyTheSame) {
@@ -83,6 +87,44 @@ TEST_F(Network, InHalfTheBytesItSaysNearlyTheSame) {
   EXPECT_LT(relative(half.ImageTokens(pictures), model_.ImageTokens(pictures)), .05);
   const Tensor latents = Noise({1, 4, 8, 12}, 6);
   EXPECT_LT(relative(DecodeLatents(half, latents), DecodeLatents(model_, latents)), .05);
+}
+
+/// libtorch multiplies no f16 on a processor, so the products here are floats; everything between them is as on a GPU.
+TEST_F(Network, WithWeightsInF16ComputesInFloatsBetweenItsProducts) {
+  HalfWeights halves(weights_, at::kHalf, at::kFloat);
+  const EvacModel half(halves, TinyConfig());
+  const Tensor x = Noise({1, 19, 5, 8, 12}, 10), tokens = Noise({1, 7, 32}, 1010), fps = at::full({1}, 2, at::kLong);
+  const auto denoised = [&](const EvacModel& model) {
+    return model.unet()({x, at::full({1}, 481, at::kLong), 1, 2}, model.unet().Prepare({tokens, fps, fps, 1}));
+  };
+  const auto relative = [](const Tensor& a, const Tensor& b) { return ((a - b).norm() / b.norm()).item<double>(); };
+  EXPECT_EQ(denoised(half).scalar_type(), at::kFloat);
+  EXPECT_LT(relative(denoised(half), denoised(model_)), .01);
+  EXPECT_GT(relative(denoised(half), denoised(model_)), 1e-6) << "nothing was halved";
+  const Tensor latents = Noise({1, 4, 8, 12}, 6), deltas = Noise({1, 3, 14}, 3);
+  EXPECT_LT(relative(DecodeLatents(half, latents), DecodeLatents(model_, latents)), .01);
+  EXPECT_LT(relative(half.ActionTokens(deltas), model_.ActionTokens(deltas)), .01);
+}
+
+TEST_F(Network, WithWeightsInF16TheImageEncoderCutsItsPatchesInFloats) {
+  HalfWeights halves(weights_, at::kHalf, at::kFloat);
+  ImageEncoderConfig config = TinyConfig().image_encoder;
+  config.layers = 0;  // up to the first block, whose products are in the type of its weights
+  const ImageEncoder half(Scope(halves, "embedder.model.visual"), config),
+      whole(Scope(weights_, "embedder.model.visual"), config);
+  const Tensor picture = Noise({1, 3, 28, 28}, 5);
+  EXPECT_EQ(half(picture).scalar_type(), at::kFloat);
+  EXPECT_LT(LargestDifference(half(picture), whole(picture)), .01);
+}
+
+TEST(Precise, RaisesHalvesOfBothKindsToFloatsAndLeavesOthersAsTheyAre) {
+  const Tensor whole = Noise({5}, 1);
+  for (const at::ScalarType type : {at::kHalf, at::kBFloat16}) {
+    EXPECT_EQ(Precise(whole.to(type)).scalar_type(), at::kFloat);
+    EXPECT_TRUE(Precise(whole.to(type)).equal(whole.to(type).to(at::kFloat)));
+  }
+  EXPECT_TRUE(Precise(whole).is_same(whole));
+  EXPECT_EQ(Precise(whole.to(at::kDouble)).scalar_type(), at::kDouble);
 }
 
 TEST_F(Network, AnswersTheSameBitsTwice) { EXPECT_TRUE(Denoised({10, 20}, 1).equal(Denoised({10, 20}, 1))); }

@@ -4,6 +4,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <deque>
 #include <fstream>
 #include <map>
 #include <optional>
@@ -200,6 +201,35 @@ TEST_F(Weights, WithAnotherScheduleAreRefused) {
   const fs::path path = Saved();
   config_.schedule.linear_end = 0.02;
   EXPECT_THAT(Refusal(path), HasSubstr("the schedule is another than the configuration's"));
+}
+
+TEST_F(Weights, WithAnotherScaleOfLatentsAreRefusedWithTheNumberThatDiffers) {
+  const fs::path path = Saved();
+  config_.schedule.base_scale = 0.8;
+  EXPECT_THAT(Refusal(path), HasSubstr("scale_arr[1] is 0.999248, wanted 0.999499"));
+}
+
+TEST_F(Weights, WithAnotherScaleOfLatentsAreRefusedWhereTheScheduleIsPutAsideToo) {
+  std::vector<float> bar(1000, 0.0047F), scale(1400, 0.5F);
+  const fs::path path = Changed([&](auto& tensors) {
+    Find(tensors, "alphas_cumprod").bytes = std::as_bytes(std::span(bar));
+    Find(tensors, "scale_arr").bytes = std::as_bytes(std::span(scale));
+  });
+  EXPECT_THAT(Refusal(path), HasSubstr("scale_arr[0] is 0.500000, wanted 1.000000"));
+}
+
+TEST_F(Weights, WithAScheduleThatWasRoundedAreTaken) {
+  std::deque<Tensor> rounded;
+  const fs::path path = Changed([&](auto& tensors) {
+    for (const char* key : {"alphas_cumprod", "scale_arr"}) {
+      TensorView& tensor = Find(tensors, key);
+      rounded.push_back(TensorFrom(tensor).to(at::kBFloat16));
+      tensor = ViewOf(key, rounded.back());
+    }
+  });
+  LoadReport report;
+  LoadModel(path, config_, {}, &report);
+  EXPECT_EQ(report.schedule, "");
 }
 
 TEST_F(Weights, OfOtherTypesAreConverted) {

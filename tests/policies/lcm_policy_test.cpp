@@ -2,6 +2,9 @@
 
 #include <gmock/gmock.h>
 
+#include <chrono>
+#include <thread>
+
 #include "core/error.h"
 #include "tests/policies/wire_support.h"
 
@@ -204,6 +207,46 @@ TEST_F(LcmPolicyTest, APolicyThatHangsFailsItsSceneAloneWithTheNumbers) {
   EXPECT_EQ(Told(answers[2]), "chunk");
   EXPECT_EQ(Count(policy.counters(), "timeouts"), 1);
   EXPECT_GE(Count(policy.counters(), "repeats"), 1);
+}
+
+/// Takes its time for each of those that ask.
+class SlowPolicy : public wire::ProbePolicy {
+ public:
+  explicit SlowPolicy(double seconds) : seconds_(seconds) {}
+  std::vector<Acted> Act(std::span<const SceneObservation> batch) override {
+    std::this_thread::sleep_for(std::chrono::duration<double>(seconds_));
+    return ProbePolicy::Act(batch);
+  }
+
+ private:
+  double seconds_;
+};
+
+TEST_F(LcmPolicyTest, OneThatAnswersInTurnIsGivenItsTimeForEachOfThoseThatAskTogether) {
+  const LcmAddress address = wire::OwnAddress();
+  SlowPolicy slow(0.5);
+  wire::Served served(slow, wire::ProbeSpec(), address);
+  LcmPolicyOptions options = Patient(address);
+  options.deadline_s = 1.5;
+  LcmPolicy policy(options);
+  const std::vector<SceneId> scenes = {0, 1, 2, 3, 4};
+  for (const SceneId scene : scenes) policy.Reset(scene, wire::TwoCameraTask(), 1);
+  for (int request = 0; request < 2; ++request) {
+    for (const Acted& acted : Ask(policy, scenes, wire::TwoCameraTask())) EXPECT_EQ(Told(acted), "chunk") << request;
+  }
+  EXPECT_EQ(Count(policy.counters(), "timeouts"), 0);
+}
+
+TEST_F(LcmPolicyTest, AnAnswerOfTheLastRoundGivesNobodyMoreTimeInThisOne) {
+  const LcmAddress address = wire::OwnAddress();
+  wire::RawServer server(address, [&](LcmLink& link, const observation_t& header) {
+    if (header.request == 0) link.Publish(address.Channel("chunk"), wire::RawServer::Honest(header));
+  });
+  LcmPolicy policy(Hasty(address));
+  policy.Reset(0, wire::TwoCameraTask(), 1);
+  EXPECT_EQ(Told(Ask(policy, {0}, wire::TwoCameraTask())[0]), "chunk");
+  EXPECT_THAT(Told(Ask(policy, {0}, wire::TwoCameraTask())[0]),
+              testing::ContainsRegex("no answer to request 1 within 0\\.[2-9] s .*deadline 0.2 s"));
 }
 
 TEST_F(LcmPolicyTest, APolicyThatIsNotThereTimesOut) {

@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <deque>
 
@@ -146,6 +147,25 @@ TEST(LearnedPolicy, DoesTheSameWhereNobodyMeasuresTheArms) {
   Ask(policy, first, 1);
   commanded.arms = told.targets.back();
   EXPECT_EQ(Numbers(Ask(policy, measured)), Numbers(Ask(policy, commanded, 1)));
+}
+
+TEST(LearnedPolicy, AHandThatBeginsClosedHasGraspedAsInTraining) {
+  const TempFolder folder;
+  LearnedPolicy policy(Weights(folder / "step.safetensors"), 8);
+  const auto begun = [&](double closure) {
+    Observation first = wire::ObservationFor(Trained(), 5);
+    first.arms[0].closure = closure;
+    policy.Reset(0, Trained(), 1);
+    return Numbers(Ask(policy, first));
+  };
+  const auto farthest = [](const std::vector<double>& a, const std::vector<double>& b) {
+    double most = 0;
+    for (std::size_t i = 0; i < a.size(); ++i) most = std::max(most, std::abs(a[i] - b[i]));
+    return most;
+  };
+  const std::vector<double> open = begun(0.5), closed = begun(0.50001);
+  EXPECT_LT(farthest(begun(0.49999), open), 1e-4) << "its answer follows the closure without a jump";
+  EXPECT_GT(farthest(open, closed), 1e-3) << "but for what it takes to be held";
 }
 
 TEST(LearnedPolicy, DeclaresWhatItsCardSays) {

@@ -43,6 +43,16 @@ TEST(ReplayPolicy, EveryRowAfterTheStartIsPlayedOnceAndTheLastChunkEndsIt) {
   EXPECT_TRUE(std::holds_alternative<Failure>(policy.Act({&asked, 1})[0]));
 }
 
+TEST(ReplayPolicy, WhereTheRecordingSaysItTheToldArmsArePlayed) {
+  Recording recording = Counting(4);
+  recording.told = {recording.arms[0], recording.arms[2], recording.arms[3], recording.arms[3]};
+  ReplayPolicy policy(recording, 3);
+  policy.Reset(0, Task(), 1);
+  const Observation observation;
+  const SceneObservation asked{0, &observation};
+  EXPECT_EQ(Rows(policy.Act({&asked, 1})[0]), (std::vector<double>{2, 3, 3}));
+}
+
 TEST(ReplayPolicy, ARecordingThatFillsItsLastChunkEndsWithIt) {
   ReplayPolicy policy(Counting(4), 3);
   policy.Reset(0, Task(), 1);

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include "reports/wording.h"
+#include "tests/reports/repeated_run.h"
 #include "tests/reports/sample_run.h"
 
 namespace evac {
@@ -79,6 +80,15 @@ TEST(Findings, TheBestPolicyIsNamedOnlyWhereTheSharedStatesDecide) {
       FindingsOf(SampleRun({{"a", "pick", "1", "sss", "sss"}, {"a", "pick", "2", "ssf", "ssf"}}).Summary());
   EXPECT_EQ(close[2].decision, Decision::kNotDecided);
   EXPECT_THAT(close[2].answer, HasSubstr("3 shared initial states"));
+}
+
+TEST(Findings, RepeatsOfOneStateDoNotDecideWhichPolicyIsBest) {
+  const std::vector<Finding> findings =
+      FindingsOf(RepeatedRun({{"a", "p", Alike(10, "ssss"), {}}, {"a", "q", Alike(10, "sfff"), {}}}));
+  const Finding& best = findings.at(findings.size() - 2);
+  EXPECT_EQ(best.decision, Decision::kNotDecided);
+  EXPECT_THAT(best.answer, AllOf(HasSubstr("p@c 40/40"), HasSubstr("In 40 shared pairs, 30 to 0 where only one"),
+                                 HasSubstr("exact McNemar on 3 effective pairs p = 0.50")));
 }
 
 TEST(Findings, WhatIsInNoRateIsSaid) {

@@ -1,11 +1,15 @@
 #include "reports/gate.h"
 
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include "core/error.h"
+#include "core/statistics/planning.h"
+#include "core/statistics/sequential.h"
 #include "reports/gate_evidence.h"
 #include "reports/gate_output.h"
+#include "tests/reports/repeated_run.h"
 #include "tests/reports/sample_run.h"
 
 namespace evac {
@@ -148,6 +152,72 @@ TEST(Gate, SequentialBetsRememberTheirBestLookAndMayHaveSeenAPart) {
   EXPECT_DOUBLE_EQ(*second.decision.rules[0].p, 1 / first.looks[0].e_value);
   EXPECT_EQ(Decide(rules, {early.Summary({.bootstrap_replicates = 1}), "out", first.looks}, &pinned).looks.size(), 0u)
       << "the same data are no new look";
+}
+
+/// A run of policy p on task t in sim against such a baseline.
+GateResult DecidedOnRepeats(const std::string& rule, const std::vector<std::string>& now,
+                            const std::vector<std::string>& then) {
+  const PinnedResult pinned = Pin(RepeatedRun({{"t", "p", {}, then}}), "out/main");
+  return Decide(Rules("  - {name: r, world: sim, " + rule + "}\n"),
+                {RepeatedRun({{"t", "p", {}, now}}), "out/candidate", {}}, &pinned);
+}
+
+TEST(Gate, SequentialBetsTakeOnePairOfEachStateWhateverTheSeeds) {
+  const GateResult result = DecidedOnRepeats("test: savi", Alike(10, "fffs"), Alike(10, "ssss"));
+  EXPECT_EQ(result.decision.outcome, GateOutcome::kInconclusive) << "three states of four flipped, not thirty";
+  const RuleDecision& rule = result.decision.rules.at(0);
+  EXPECT_THAT(rule.statement, HasSubstr("4 pairs, one of each state, 0 better / 3 worse; e-value 2.5"));
+  EXPECT_EQ(rule.states, 4);
+  EXPECT_EQ(rule.flips_worse, 3);
+  EXPECT_EQ(rule.value.n, 40) << "rates are of all episodes";
+  const Estimate sequence = ConfidenceSequence({3, 4}, 1 - 0.05 / 2), none = ConfidenceSequence({0, 4}, 1 - 0.05 / 2);
+  EXPECT_DOUBLE_EQ(rule.difference.interval->low, none.interval->low - sequence.interval->high);
+  ASSERT_EQ(result.looks.size(), 1u);
+  EXPECT_EQ(result.looks[0].pairs, 4);
+  EXPECT_EQ(result.looks[0].only_second, 3);
+}
+
+TEST(Gate, WhichPairOfAStateIsBetOnDoesNotDependOnHowFarTheRunIs) {
+  std::vector<std::string> part = Alike(3, "ffss");
+  part[0] = "-fss";  // of state 0 the first seed is not there yet: nothing stands in for it
+  EXPECT_EQ(DecidedOnRepeats("test: savi", part, Alike(3, "ssss")).looks.at(0).pairs, 3);
+  std::vector<std::string> then = Alike(3, "ssss");
+  then[0] = "-sss";  // the baseline never had it: its second seed is the first
+  EXPECT_EQ(DecidedOnRepeats("test: savi", part, then).looks.at(0).pairs, 4);
+}
+
+TEST(Gate, HowManyMoreIsPlannedFromWhatRepeatsTell) {
+  const RuleDecision paired =
+      DecidedOnRepeats("test: paired_mcnemar", Alike(10, "fffs"), Alike(10, "ssss")).decision.rules.at(0);
+  EXPECT_THAT(paired.statement,
+              HasSubstr("40 pairs, 0 better / 30 worse, p = 0.50 (exact McNemar on 3 effective pairs)"));
+  const SampleSize size = PairsForMcNemar({0.5 / 4, 2.75 / 4});
+  EXPECT_THAT(paired.more, HasSubstr(fmt::format("about {} more pairs to show it worse",
+                                                 FurtherWanted(static_cast<double>(size.n), {40, 3}))));
+  const RuleDecision unpaired =
+      DecidedOnRepeats("test: boschloo", Alike(10, "sssf"), Alike(10, "sssf")).decision.rules.at(0);
+  EXPECT_THAT(unpaired.statement, HasSubstr("(Boschloo on 4 and 4 effective episodes)"));
+  EXPECT_THAT(unpaired.more, HasSubstr("about 2560 more episodes of each")) << "260 tell as much as 2600 such";
+}
+
+TEST(Gate, UnpairedRulesWantOneTaskAndTheSameOnBothSides) {
+  const RepeatedCell take{"take", "p", {}, {"ssss"}}, place{"place", "p", {}, {"ssss"}};
+  const auto message = [](const RunSummary& now, const PinnedResult& then) {
+    return MessageOf([&] { Decide(Rules("  - {name: r, test: boschloo, world: sim}\n"), {now, "out", {}}, &then); });
+  };
+  const RunSummary one = RepeatedRun({take}), other = RepeatedRun({place}), both = RepeatedRun({take, place});
+  EXPECT_THAT(message(one, Pin(both, "out")),
+              HasSubstr("gate rule 'r': task: found 2 tasks in the baseline, wanted one: unpaired tasks pooled can say "
+                        "the opposite of each"));
+  EXPECT_THAT(message(both, Pin(one, "out")), HasSubstr("task: found 2 tasks, wanted one: unpaired tasks pooled"));
+  EXPECT_THAT(message(one, Pin(other, "out")), HasSubstr("task: found take, wanted the baseline's, place"));
+  PinnedResult changed = Pin(one, "out");
+  changed.tasks["take"] = "0ther";
+  EXPECT_THAT(message(one, changed), HasSubstr("page of task take: found"));
+  EXPECT_EQ(message(one, Pin(one, "out")), "nothing was thrown");
+  const PinnedResult pinned = Pin(both, "out");
+  const GateRules named = Rules("  - {name: r, test: boschloo, world: sim, task: take}\n");
+  EXPECT_EQ(Decide(named, {both, "out", {}}, &pinned).decision.rules.at(0).states, 4) << "the rule names its task";
 }
 
 TEST(Gate, ARateOfItsOwnIsHeldAgainstAFloorByClopperPearson) {

@@ -5,6 +5,7 @@
 #include <map>
 
 #include "reports/report_data.h"
+#include "tests/reports/repeated_run.h"
 #include "tests/reports/sample_run.h"
 
 namespace evac {
@@ -61,6 +62,26 @@ TEST(Letters, PoliciesThatShareFewStatesAreComparedAsTwoSamples) {
   const ReportData report = ReportDataOf(SampleRun(cells).Summary());
   EXPECT_TRUE(report.letters.has_unpaired);
   EXPECT_EQ(LettersOf(report, "real"), (Letters{{"a pick@1", "a"}, {"a pick@2", "b"}}));
+}
+
+/// Of the real world, each cell's letters.
+std::vector<std::string> LettersOfRepeats(const std::vector<RepeatedCell>& cells) {
+  RunSummary summary = RepeatedRun(cells);
+  GiveLetters(summary.episodes, 0.05, summary.rates);
+  std::vector<std::string> letters;
+  for (const RateCell& cell : summary.rates) letters.push_back(cell.letters);
+  return letters;
+}
+
+TEST(Letters, RepeatsOfOneStateDoNotPartPolicies) {
+  // Three states of four flip, whatever the number of seeds.
+  EXPECT_EQ(LettersOfRepeats({{"a", "p", Alike(10, "ssss"), {}}, {"a", "q", Alike(10, "sfff"), {}}}),
+            (std::vector<std::string>{"a", "a"}));
+  // As two samples: two states against two others.
+  EXPECT_EQ(LettersOfRepeats({{"a", "p", Alike(10, "ss"), {}}, {"a", "q", Alike(10, "--ff"), {}}}),
+            (std::vector<std::string>{"a", "a"}));
+  EXPECT_EQ(LettersOfRepeats({{"a", "p", Alike(10, "ssssssss"), {}}, {"a", "q", Alike(10, "ffffffff"), {}}}),
+            (std::vector<std::string>{"a", "b"}));
 }
 
 TEST(Letters, NobodyToDifferFromGetsNone) {

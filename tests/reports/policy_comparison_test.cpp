@@ -5,6 +5,9 @@
 
 #include "core/error.h"
 #include "core/statistics/planning.h"
+#include "core/statistics/rate_difference.h"
+#include "core/statistics/stratified.h"
+#include "core/statistics/two_by_two.h"
 #include "reports/policy_comparison_output.h"
 
 namespace evac {
@@ -116,6 +119,65 @@ TEST(ComparePolicies, RepeatsOfOneStateDoNotCountAsNewStates) {
   EXPECT_NEAR(*row.difference.value, 0.5, 1e-12);
   EXPECT_THAT(row.test, HasSubstr("effective pairs"));
   EXPECT_GT(*row.p, 0.05) << "two states of four flipped, whatever the number of seeds";
+}
+
+/// The same outcomes with ten seeds.
+ComparedPolicy TenTimes(const std::string& name, const std::vector<std::pair<std::string, std::string>>& tasks) {
+  ComparedPolicy policy{name, {}};
+  for (const auto& [task, outcomes] : tasks) {
+    for (std::uint64_t seed = 0; seed < 10; ++seed) Add(task, outcomes, policy, seed);
+  }
+  return policy;
+}
+
+TEST(ComparePolicies, RepeatsOfOneStateDoNotCountAsNewStatesUnpairedEither) {
+  const ComparisonRow row = ComparePolicies(TenTimes("a", {{"t", "ss"}}), TenTimes("b", {{"t", "--ff"}})).all;
+  EXPECT_FALSE(row.is_paired);
+  EXPECT_EQ(row.first.n, 20);
+  EXPECT_EQ(*row.difference.value, 1);
+  EXPECT_EQ(row.difference.n, 40);
+  EXPECT_EQ(row.test, "Boschloo on 2 and 2 effective episodes");
+  EXPECT_EQ(row.difference.method, "Newcombe on 2 and 2 effective episodes");
+  EXPECT_EQ(*row.p, BoschlooExact({2, 2}, {0, 2}).two_sided);
+  EXPECT_EQ(row.difference.interval->low, NewcombeDifference({2, 2}, {0, 2}).interval->low);
+}
+
+TEST(ComparePolicies, RepeatsOfOneStateDoNotFillStrata) {
+  const ComparisonRow row = ComparePolicies(TenTimes("a", {{"t", "sss"}, {"u", "ssf"}}),
+                                            TenTimes("b", {{"t", "---fff"}, {"u", "---sff"}})).all;
+  EXPECT_EQ(row.test, "Cochran-Mantel-Haenszel on 6 and 6 effective episodes");
+  const std::vector<Stratum> strata = {{{3, 3}, {0, 3}}, {{2, 3}, {1, 3}}};
+  EXPECT_NEAR(*row.p, *MantelHaenszel(strata).p, 1e-12);
+  EXPECT_NEAR(*row.difference.value, 2.0 / 3, 1e-12);
+  EXPECT_EQ(row.first.n, 60);
+}
+
+TEST(ComparePolicies, HowManyMoreIsPlannedFromWhatRepeatsTell) {
+  const ComparisonRow once = ComparePolicies(Policy("a", "sssssfff"), Policy("b", "sssfffff")).all;
+  const ComparisonRow row =
+      ComparePolicies(TenTimes("a", {{"t", "sssssfff"}}), TenTimes("b", {{"t", "sssfffff"}})).all;
+  ASSERT_TRUE(once.more && row.more);
+  EXPECT_EQ(row.shared, 80);
+  const double n = static_cast<double>(row.pairs.effective), each = n / 80;
+  const SampleSize size = PairsForMcNemar({(20 * each + 0.5) / (n + 1), 0.5 / (n + 1)});
+  EXPECT_EQ(*row.more, FurtherWanted(static_cast<double>(size.n), {80, row.pairs.effective}));
+  EXPECT_GT(*row.more, 8 * *once.more) << "ten seeds each";
+
+  const ComparisonRow apart = ComparePolicies(TenTimes("a", {{"t", "ssf"}}), TenTimes("b", {{"t", "---sff"}})).all;
+  EXPECT_EQ(*apart.more, 10 * TrialsPerPolicy(2.0 / 3, 1.0 / 3).n - 30);
+}
+
+TEST(ComparePolicies, ATaskAmongSeveralIsPlannedAtItsShareOfAlpha) {
+  ComparedPolicy one{"a", {}}, two{"b", {}};
+  for (const char* task : {"t1", "t2"}) {
+    Add(task, "ssssffffss", one);
+    Add(task, "sfsfffffss", two);
+  }
+  const ComparisonRow row = ComparePolicies(one, two).tasks[0];
+  ASSERT_TRUE(row.more);
+  const FlipRates rates{2.5 / 11, 0.5 / 11};
+  EXPECT_GE(McNemarPower(row.shared + *row.more, rates, 0.025), 0.8);
+  EXPECT_LT(McNemarPower(row.shared + *row.more - 1, rates, 0.025), 0.8);
 }
 
 TEST(ComparePolicies, ErrorsAreInNoRateAndAreCounted) {

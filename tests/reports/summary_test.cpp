@@ -3,11 +3,15 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <nlohmann/json.hpp>
+
 #include "core/error.h"
 #include "core/statistics/rates.h"
 #include "reports/counted_judges.h"
 #include "reports/page.h"
+#include "reports/report_json.h"
 #include "reports/run_correlation.h"
+#include "tests/reports/repeated_run.h"
 #include "tests/reports/sample_run.h"
 
 namespace evac {
@@ -166,6 +170,19 @@ TEST(Comparison, PairsAreMadeByKeyAndCountedInFourCells) {
     EXPECT_EQ(summary.episodes[pair.real].episode.key.world, "real");
     EXPECT_EQ(summary.episodes[pair.other].episode.key.world, "sim");
   }
+}
+
+TEST(Comparison, RepeatsOfOneStateDoNotMakeItsTestSurer) {
+  const RunSummary summary = RepeatedRun({{"a", "p", Alike(10, "ssss"), Alike(10, "sfff")}});
+  const PairTable& table = summary.comparisons.at(0).tables.at(0);
+  EXPECT_EQ(table.real_only, 30) << "what is shown are all pairs";
+  EXPECT_EQ(table.effective_pairs, 3);
+  EXPECT_NEAR(table.test.p_exact, 0.5, 1e-12) << "2 flips to none";
+  EXPECT_THAT(ReportPage(summary, {".", "evac test"}),
+              testing::HasSubstr("Exact McNemar on 3 effective pairs: p = 0.50"));
+  const auto json = nlohmann::json::parse(ReportJson(summary, "evac test"));
+  EXPECT_EQ(json["comparisons"][0]["pairs"][0]["effective_pairs"], 3);
+  EXPECT_NEAR(json["comparisons"][0]["pairs"][0]["mcnemar_p_exact"].get<double>(), 0.5, 1e-12);
 }
 
 TEST(Comparison, TheReportSaysWhatCorrelateSays) {

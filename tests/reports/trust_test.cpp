@@ -110,6 +110,43 @@ TEST(TrustIn, FewRealAndManyImaginedTrialsGiveOneRate) {
   EXPECT_FALSE(rate.tuned.allowed) << "the worlds never differ: PPI++'s interval would be a fairy tale";
 }
 
+/// The same outcomes with each of the seeds.
+TrustInput WithSeeds(const std::string& real, const std::string& model, std::uint64_t seeds) {
+  TrustInput input;
+  for (std::uint64_t seed = 0; seed < seeds; ++seed) {
+    Add("p", real, input.real, seed);
+    Add("p", model, input.model, seed);
+  }
+  return input;
+}
+
+double Width(const Estimate& estimate) { return estimate.interval->high - estimate.interval->low; }
+
+TEST(TrustIn, RepeatsOfOneStateDoNotMakeTheRealRateSurer) {
+  const std::string real = Times(4, "ssf"), model = "sff" + Times(3, "ssf") + Times(100, "ssf");
+  const TaskTrust once = TrustOf(WithSeeds(real, model, 1))[0], often = TrustOf(WithSeeds(real, model, 10))[0];
+  const PredictedRate &one = once.policies[0], &ten = often.policies[0];
+  EXPECT_EQ(ten.pairs.n(), 120);
+  EXPECT_EQ(ten.further.trials, 300);
+  EXPECT_NEAR(*ten.predicted.value, *one.predicted.value, 1e-12);
+  EXPECT_NEAR(Width(ten.predicted), Width(one.predicted), 0.05);
+  EXPECT_THAT(ten.predicted.method, HasSubstr("on 11 effective pairs"));
+  EXPECT_EQ(ten.betting.interval->low, one.betting.interval->low) << "bets are on one pair of each state";
+  EXPECT_EQ(ten.betting.interval->high, one.betting.interval->high);
+  EXPECT_FALSE(ten.tuned.allowed) << "120 pairs on 12 states are fewer than 40 real trials";
+  EXPECT_NEAR(Width(often.real), Width(once.real), 1e-9);
+  EXPECT_NEAR(Width(often.model), Width(once.model), 1e-9);
+  EXPECT_NEAR(Width(often.same), Width(once.same), 1e-9);
+}
+
+TEST(TrustIn, ManyTrialsOnOneStateAreOnePair) {
+  const TaskTrust task = TrustOf(WithSeeds("s", "s", 60))[0];
+  EXPECT_EQ(task.effective_pairs, 1);
+  EXPECT_EQ(task.trust, Trust::kUnknown);
+  EXPECT_THAT(TrustText({"sim", "the world real", "oracle", {}, {task}}),
+              HasSubstr("exact McNemar on 1 effective pair p = 1.00"));
+}
+
 TEST(TrustIn, ImportedTrialsArePairedByStateAndOwnEpisodesBySeed) {
   TrustInput input;
   Add("p", "ss", input.real, 1);

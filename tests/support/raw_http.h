@@ -17,6 +17,14 @@ struct RawAnswer {
   std::string head, body;
 };
 
+/// "NAME=VALUE" of the cookie that an answer with this head sets, or "".
+inline std::string CookieSetBy(const std::string& head) {
+  const std::string header = "Set-Cookie: ";
+  const std::size_t at = head.find(header);
+  if (at == std::string::npos) return "";
+  return head.substr(at + header.size(), head.find(';', at) - at - header.size());
+}
+
 /// A TCP connection to this machine, or -1.
 inline int ConnectTo(int port) {
   const int socket = ::socket(AF_INET, SOCK_STREAM, 0);

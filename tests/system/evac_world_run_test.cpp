@@ -121,6 +121,7 @@ TEST_F(ImaginedRun, WeightsThatWereTrainedForSomethingElseAreRefusedBeforeTheFir
   } cases[] = {
       {{{"period_s", "0.2"}}, {}, "field period_s: frames 0.1 s apart are asked for"},
       {{{"cameras", "hand_right,head"}}, {}, "task take_bottle: found cameras head, hand_right, wanted hand_right, head"},
+      {{{"arms", "left,right"}}, {}, "task take_bottle: found arms right, wanted left, right"},
       {{{"statistics", StatisticsPage(AgiBotWorldStatistics())}}, {"worlds.1.statistics=" + other_page}, "deviation of right y"},
       {{{"pose_map", "radius_px=50 thickness_px=8"}}, {}, "pose maps would be drawn with radius_px="},
   };

@@ -235,6 +235,13 @@ TEST_F(ImagineCommand, WeightsSayHowActionsAreNormalisedAndWhichPeriodTheyAreFor
   ExpectRefused(Words("refused", {"--weights", folder_ / "tiny.safetensors", "--steps", "2", "--stride", "3"}), "frames 0.1 s apart are asked for");
 }
 
+TEST_F(ImagineCommand, WeightsOfOtherArmsThanTheRecordingsAreRefused) {
+  nn::RandomWeights weights(5);
+  nn::SaveWeights(folder_ / "tiny.safetensors", weights, ReadEvacConfig(folder_ / "tiny.yaml"),
+                  {.metadata = {{"arms", "right"}}});
+  ExpectRefused(Frames("refused"), "found arms left, right, wanted right");
+}
+
 TEST_F(ImagineCommand, TheVideoShowsEachPictureAboveItsMapAndTheSidecarSaysHowItWasMade) {
   ASSERT_EQ(RunCommand(Frames("out")).exit_code, 0);
   const std::vector<cv::Mat> video = ReadAllFrames(folder_ / "out/imagined.mp4");

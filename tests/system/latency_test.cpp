@@ -3,6 +3,7 @@
 
 #include "core/file.h"
 #include "core/store.h"
+#include "harness/suite.h"
 #include "tests/support/temp_folder.h"
 #include "tests/system/run_support.h"
 
@@ -54,6 +55,15 @@ TEST(Latency, MeasuredWantsOneLaneAndCountsTheTimeThatThePolicyTook) {
   for (const Episode& episode : Episodes(folder / "run"))
     EXPECT_GE(episode.commands.size(), static_cast<std::size_t>(episode.chunks) * 8 + 5)
         << "half a second at one request is five periods";
+}
+
+TEST(Latency, MeasuredWantsOneLaneOfResumeToo) {
+  const TempFolder folder;
+  const Suite suite = ReadSuite(kFaults, {"policy={latency: measured}"});
+  Store::CreateOrContinue(folder / "run", {.suite_text = suite.text, .suite_hash = suite.hash, .suite_path = kFaults, .evac_version = "0"});
+  const CommandResult refused = RunCommand({Binary("evac"), "resume", (folder / "run").string(), "--lanes", "2"});
+  EXPECT_EQ(refused.exit_code, 2);
+  EXPECT_THAT(refused.err, testing::AllOf(HasSubstr("--lanes: found 2"), HasSubstr("measured")));
 }
 
 TEST(Latency, WhatIsNoLatencyIsRefused) {

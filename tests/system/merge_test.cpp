@@ -131,6 +131,33 @@ TEST(Merge, AVideoThatIsNotTheStoredOneIsRefused) {
   EXPECT_FALSE(fs::exists(folder / "merged"));
 }
 
+TEST(Merge, WhoRunsOneShardRetriesAndCountsItsFailedEpisodesAlone) {
+  const TempFolder folder;
+  WriteText(folder / "sick", "yes");
+  const std::string sick = "policies.0.command=[faulty-policy, --fault, error, --while, " + (folder / "sick").string() + "]";
+  const fs::path run = folder / "run";
+  ASSERT_EQ(RunCommand(RunWords(kFaults, run, {sick, "initial_states.count=5"})).exit_code, 0) << "all of them may fail";
+  const auto failed = [&] {
+    int count = 0;
+    for (const Episode& episode : Store::Open(run, Store::Mode::kReadOnly).Episodes()) count += IsFailure(episode.stop);
+    return count;
+  };
+  ASSERT_EQ(failed(), 5);
+  fs::remove(folder / "sick");
+  const CommandResult half = RunCommand({Binary("evac"), "resume", run.string(), "--retry-failed", "--shard", "1/2"});
+  EXPECT_EQ(half.exit_code, 0) << half.err;
+  EXPECT_THAT(half.err, HasSubstr("2 of 2 episodes stored in " + run.string() + ", 0 failed"));
+  EXPECT_EQ(failed(), 3) << "the other shard's are another machine's";
+}
+
+TEST(Merge, WhoRunsOneShardIsToldToGoOnWithThatShard) {
+  const TempFolder folder;
+  const CommandResult spent =
+      RunShard(folder / "run", "2/2", {"policies.0.command=[faulty-policy, --fault, error]", "error_budget=0"});
+  EXPECT_EQ(spent.exit_code, 4);
+  EXPECT_THAT(spent.err, HasSubstr("evac resume " + (folder / "run").string() + " --retry-failed --shard 2/2"));
+}
+
 TEST(Merge, AShardIsWhichOfHowMany) {
   const TempFolder folder;
   for (const char* shard : {"3/2", "0/2", "half", "1/2x"})

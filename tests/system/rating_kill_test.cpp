@@ -64,8 +64,8 @@ class Stubborn {
     const json joined = {{"invite", link}, {"uuid", NewSecret()}};
     for (RawAnswer answer; session_.empty();) {
       answer = PostJson(server_.port, "/api/join", joined.dump(), "");
-      const std::size_t at = answer.head.find("evac_rating=");
-      if (at != std::string::npos) session_ = answer.head.substr(at + 12, 32);
+      cookie_ = CookieSetBy(answer.head);
+      session_ = cookie_.substr(cookie_.find('=') + 1);
     }
     epoch_ = Insist("/api/tab", "{}").at("tab_epoch");
   }
@@ -93,7 +93,7 @@ class Stubborn {
     const std::string csrf = Sha256Hex("csrf " + session_).substr(0, 32);
     for (;;) {
       const RawAnswer answer =
-          PostJson(server_.port, path, body, "Cookie: evac_rating=" + session_ + "\r\nX-Evac-Csrf: " + csrf + "\r\n");
+          PostJson(server_.port, path, body, "Cookie: " + cookie_ + "\r\nX-Evac-Csrf: " + csrf + "\r\n");
       if (answer.status == 200) return json::parse(answer.body);
       EXPECT_TRUE(answer.status == 0 || answer.status == 429 || answer.status == 503) << answer.status << answer.body;
       std::this_thread::sleep_for(std::chrono::milliseconds(20));
@@ -101,7 +101,7 @@ class Stubborn {
   }
 
   const MortalServer& server_;
-  std::string session_;
+  std::string cookie_, session_;
   std::int64_t epoch_ = 0;
 };
 

@@ -15,7 +15,7 @@
 #include "worldmodel/evac_config.h"
 #include "worldmodel/nn/weights.h"
 
-/// `evac rate` as a lab runs it, and the page in real browsers: tests/system/browser/rating_page.py says what is tried.
+/// `evac rate` as a lab runs it, and the page in real browsers: the scripts in tests/system/browser say what is tried.
 namespace evac::system_test {
 namespace {
 
@@ -48,6 +48,18 @@ TEST(RatingSession, PeopleRateInRealBrowsersAndNothingIsLost) {
   const CommandResult rated = RunCommand(words);
   if (rated.exit_code == kSkipped) GTEST_SKIP() << rated.out;
   EXPECT_EQ(rated.exit_code, 0) << rated.err << rated.out;  // what failed comes first: logs get cut
+  EXPECT_THAT(rated.out, HasSubstr("0 failed"));
+}
+
+TEST(RatingSession, TwoStudiesOnOneHostLoseNothingOfARaterOfBoth) {
+  const StoredRun run("shared", "sfsfsf", "sffsff", 10);
+  const std::string study = (run.folder().parent_path() / "study").string(), other = study + "_other";
+  for (const std::string& folder : {study, other})
+    ASSERT_EQ(Rate({"new", folder, "--run", run.folder().string(), "--height", "96"}).exit_code, 0);
+  const CommandResult rated = RunCommand(
+      {"/usr/bin/python3", "-B", EVAC_SOURCE_DIR "/tests/system/browser/two_studies.py", Binary("evac"), study, other});
+  if (rated.exit_code == kSkipped) GTEST_SKIP() << rated.out;
+  EXPECT_EQ(rated.exit_code, 0) << rated.err << rated.out;
   EXPECT_THAT(rated.out, HasSubstr("0 failed"));
 }
 

@@ -3,6 +3,7 @@
 
 #include <filesystem>
 
+#include "core/store.h"
 #include "tests/support/command.h"
 #include "tests/support/temp_folder.h"
 
@@ -51,6 +52,18 @@ TEST_F(Refusals, APolicyWithAnotherPeriodEndsTheRunBeforeItStartsWithBothDeclara
   const CommandResult result = Run({"policies.0.command=[evac-policy, hold, --period-s, \"0.25\"]"});
   EXPECT_EQ(result.exit_code, 2);
   EXPECT_THAT(result.err, AllOf(HasSubstr("period"), HasSubstr("0.25"), HasSubstr("0.1")));
+}
+
+TEST_F(Refusals, ASecondPolicyThatDoesNotFitOrIsNotThereEndsTheRunBeforeTheFirstsEpisodes) {
+  const CommandResult unfit = Run({"policies.1.command=[evac-policy, hold, --period-s, \"0.25\"]"});
+  EXPECT_EQ(unfit.exit_code, 2);
+  EXPECT_THAT(unfit.err, AllOf(HasSubstr("period"), HasSubstr("0.25"), HasSubstr("0.1")));
+  EXPECT_TRUE(Store::Open(folder_ / "run", Store::Mode::kReadOnly).Episodes().empty());
+  std::filesystem::remove_all(folder_ / "run");
+  const CommandResult absent = Run({"policies.1.command=[no-such-policy]"});
+  EXPECT_EQ(absent.exit_code, 2);
+  EXPECT_THAT(absent.err, HasSubstr("no-such-policy"));
+  EXPECT_TRUE(Store::Open(folder_ / "run", Store::Mode::kReadOnly).Episodes().empty());
 }
 
 TEST_F(Refusals, AProgramThatIsNoPolicyIsRefusedAfterItsTimeToStart) {

@@ -1,3 +1,4 @@
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <signal.h>
 #include <sys/wait.h>
@@ -5,12 +6,15 @@
 
 #include <chrono>
 #include <cstdlib>
+#include <fstream>
 #include <map>
 #include <nlohmann/json.hpp>
 #include <thread>
 
 #include "core/hash.h"
 #include "core/seed.h"
+#include "core/store.h"
+#include "harness/suite.h"
 #include "tests/support/command.h"
 #include "tests/support/temp_folder.h"
 #include "tests/system/process_support.h"
@@ -28,6 +32,7 @@ using system_test::List;
 using system_test::Mark;
 using system_test::RunWords;
 using system_test::WaitUntil;
+using testing::HasSubstr;
 
 const std::string& kSuite = system_test::kSmall;
 
@@ -103,6 +108,38 @@ TEST(Resume, AfterThePolicyOrBothWereKilledTheTablesAndVideosAreThoseOfAnUninter
         << killed;
     EXPECT_EQ(Videos(folder / killed), Videos(folder / "whole")) << killed;
   }
+}
+
+TEST(Resume, WhoRanWithOtherTimesThanTheRunBeganWithIsToldTheCommandThatKeepsThem) {
+  const TempFolder folder;
+  std::ofstream(folder / "sick") << "yes";
+  const std::string run = (folder / "run").string();
+  std::vector<std::string> assignments = {
+      "policies.0.command=[faulty-policy, --fault, error, --while, " + (folder / "sick").string() + "]", "error_budget=0"};
+  const CommandResult began = RunCommand(RunWords(kFaults, run, assignments));
+  EXPECT_EQ(began.exit_code, 4);
+  EXPECT_THAT(began.err, HasSubstr("go on with: evac resume " + run + " --retry-failed"));
+
+  assignments.push_back("transport.deadline_s=60");
+  std::vector<std::string> words = RunWords(kFaults, run, assignments);
+  const CommandResult longer = RunCommand(words);
+  EXPECT_EQ(longer.exit_code, 4);
+  EXPECT_THAT(longer.err, HasSubstr("go on with: evac run " + kFaults + " --out " + run + " --set 'policies.0.command=["));
+  EXPECT_THAT(longer.err, HasSubstr("--set error_budget=0 --set transport.deadline_s=60 --retry-failed\n"));
+
+  std::filesystem::remove(folder / "sick");
+  words.push_back("--retry-failed");
+  const CommandResult good = RunCommand(words);
+  EXPECT_EQ(good.exit_code, 0) << good.err;
+}
+
+TEST(Resume, ARunThatAnotherVersionBeganGoesOnAndSaysSo) {
+  const TempFolder folder;
+  const Suite suite = ReadSuite(kFaults, {"initial_states.count=1"});
+  Store::CreateOrContinue(folder / "run", {.suite_text = suite.text, .suite_hash = suite.hash, .suite_path = kFaults, .evac_version = "0.0.1"});
+  const CommandResult goes_on = RunCommand({Binary("evac"), "resume", (folder / "run").string()});
+  EXPECT_EQ(goes_on.exit_code, 0) << goes_on.err;
+  EXPECT_THAT(goes_on.err, HasSubstr("was begun by evac 0.0.1; evac "));
 }
 
 TEST(Resume, ARunIsNotContinuedWithAnotherSuite) {

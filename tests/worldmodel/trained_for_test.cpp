@@ -26,6 +26,7 @@ ActionStatistics OfTheDesk() {
 TrainedFor Desk() {
   return TrainedFor::Of("desk.safetensors", {{"period_s", "0.1"},
                                              {"cameras", "head,hand_right"},
+                                             {"arms", "right"},
                                              {"statistics", StatisticsPage(OfTheDesk())},
                                              {"pose_map", "radius_px=10 thickness_px=2"},
                                              {"arms_read", "told"}});
@@ -35,6 +36,7 @@ TEST(TrainedFor, WeightsThatSayNothingMayBeAskedForAnything) {
   const TrainedFor trained = TrainedFor::Of("published.ckpt", {{"format", "pt"}});
   EXPECT_NO_THROW(trained.CheckPeriod(0.2, "world evac"));
   EXPECT_NO_THROW(trained.CheckCameras({"front"}, "world evac"));
+  EXPECT_NO_THROW(trained.CheckArms({"left", "right"}, "world evac"));
   EXPECT_NO_THROW(trained.CheckPoseMap("radius_px=50 thickness_px=8", "world evac"));
   EXPECT_EQ(trained.StatisticsOr(std::nullopt).robot, "agibotworld");
   EXPECT_EQ(trained.arms_read, "");
@@ -44,6 +46,7 @@ TEST(TrainedFor, WhatTheyWereTrainedForIsNotRefused) {
   const TrainedFor trained = Desk();
   EXPECT_NO_THROW(trained.CheckPeriod(0.1, "world evac"));
   EXPECT_NO_THROW(trained.CheckCameras({"head", "hand_right"}, "world evac"));
+  EXPECT_NO_THROW(trained.CheckArms({"right"}, "world evac"));
   EXPECT_NO_THROW(trained.CheckPoseMap("radius_px=10 thickness_px=2", "world evac"));
   EXPECT_EQ(trained.arms_read, "told");
 }
@@ -60,6 +63,15 @@ TEST(TrainedFor, OtherCamerasAndTheSameInAnotherOrderAreRefusedWithBoth) {
                                                 HasSubstr("wanted head, hand_right"))));
   EXPECT_THROW(Desk().CheckCameras({"head"}, ""), Error);
   EXPECT_THROW(Desk().CheckCameras({"head", "hand_left"}, ""), Error);
+}
+
+TEST(TrainedFor, OneArmWhereTwoWereAndTheReverseAreRefusedWithBoth) {
+  EXPECT_THAT([] { Desk().CheckArms({"left", "right"}, "task carry"); },
+              ThrowsMessage<Error>(AllOf(HasSubstr("task carry: found arms left, right, wanted right"),
+                                         HasSubstr("desk.safetensors"))));
+  const TrainedFor two = TrainedFor::Of("two.safetensors", {{"arms", "left,right"}});
+  EXPECT_NO_THROW(two.CheckArms({"left", "right"}, ""));
+  EXPECT_THROW(two.CheckArms({"right"}, ""), Error);
 }
 
 TEST(TrainedFor, MapsDrawnOtherwiseAreRefused) {

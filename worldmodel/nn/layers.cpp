@@ -40,7 +40,8 @@ Tensor DifferentiableGroupNorm(const Tensor& x, const GroupNorm& norm, double ep
 }  // namespace
 
 Tensor Precise(const Tensor& weight) {
-  return weight.scalar_type() == at::kBFloat16 && weight.is_cpu() ? weight.to(at::kFloat) : weight;
+  const bool is_halved = weight.scalar_type() == at::kBFloat16 || weight.scalar_type() == at::kHalf;
+  return is_halved ? weight.to(at::kFloat) : weight;
 }
 
 bool CanUseKernels(const Tensor& x) {

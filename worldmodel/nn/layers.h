@@ -13,8 +13,8 @@ namespace evac::nn {
 /// Whether x may go through `kernels`: floats on the CPU, laid out as they are read, nothing to be differentiated.
 bool CanUseKernels(const Tensor& x);
 
-/// On the CPU, a model in bf16 keeps the weights of its matrix products so and computes the products in it; everything
-/// between them stays in floats, and so do small weights: these.
+/// A model in bf16 or f16 keeps the weights of its matrix products so and computes the products in it; everything
+/// between them stays in floats, and so do small weights on every device: these.
 Tensor Precise(const Tensor& weight);
 
 /// The type in which a layer's product is computed, where it is not that of its weight.

@@ -15,24 +15,33 @@ double RoundingOf(TensorType type) {
   return type == TensorType::kF16 ? 1e-3 : 1e-5;
 }
 
+/// @throws TensorError if one of the buffer's numbers is another in the file.
+void RequireSame(const MappedTensors& tensors, const NoiseSchedule::Buffer& ours) {
+  const TensorFile& file = tensors.file();
+  const Tensor theirs = tensors.Get(ours.key).to(at::kFloat).contiguous();
+  const float* found = theirs.data_ptr<float>();
+  for (std::size_t t = 0; t < ours.values.size(); ++t) {
+    if (std::abs(found[t] - ours.values[t]) <= RoundingOf(file.Get(ours.key).type)) continue;
+    throw TensorError(file.name() + ": the schedule is another than the configuration's: " + ours.key + "[" +
+                      std::to_string(t) + "] is " + std::to_string(found[t]) + ", wanted " +
+                      std::to_string(ours.values[t]));
+  }
+}
+
+/// Of the buffers two are asked: how much noise there is, which decides the others, and what clean latents are scaled
+/// by (spec 8.1).
 /// @returns why the file's schedule is put aside, or nothing.
 std::string CompareSchedule(const MappedTensors& tensors, const ModelConfig& config) {
-  const NoiseSchedule ours(config.schedule);
-  const TensorFile& file = tensors.file();
-  const Tensor theirs = tensors.Get("alphas_cumprod").to(at::kFloat);
-  const float* bar = theirs.data_ptr<float>();
-  const std::int64_t last = ours.steps() - 1;
-  if (config.schedule.zero_terminal_snr && bar[last] != 0) {
-    return file.name() + ": the schedule does not end in pure noise (alphas_cumprod[" + std::to_string(last) + "] is " +
-           std::to_string(bar[last]) + ", wanted 0): the configuration's is used";
+  const std::int64_t last = config.schedule.steps - 1;
+  const double end = tensors.Get("alphas_cumprod").to(at::kFloat)[last].item<double>();
+  const bool is_put_aside = config.schedule.zero_terminal_snr && end != 0;
+  for (const NoiseSchedule::Buffer& ours : NoiseSchedule(config.schedule).Buffers()) {
+    const std::string key = ours.key;
+    if ((key == "alphas_cumprod" && !is_put_aside) || key == "scale_arr") RequireSame(tensors, ours);
   }
-  for (std::int64_t t = 0; t <= last; ++t) {
-    if (std::abs(bar[t] - ours.AlphaBar(t)) <= RoundingOf(file.Get("alphas_cumprod").type)) continue;
-    throw TensorError(file.name() + ": the schedule is another than the configuration's: alphas_cumprod[" +
-                      std::to_string(t) + "] is " + std::to_string(bar[t]) + ", wanted " +
-                      std::to_string(ours.AlphaBar(t)));
-  }
-  return {};
+  if (!is_put_aside) return {};
+  return tensors.file().name() + ": the schedule does not end in pure noise (alphas_cumprod[" + std::to_string(last) +
+         "] is " + std::to_string(end) + ", wanted 0): the configuration's is used";
 }
 
 }  // namespace

@@ -28,7 +28,7 @@ class FileWeights final : public ParameterSource {
  public:
   /// @param path  .safetensors, or .pt/.ckpt of torch.save
   /// @throws TensorError naming the file: unreadable; missing, extra and misshapen keys (ten of each, and how many);
-  ///   a schedule that ends in pure noise like the configuration's, and is another.
+  ///   a schedule that ends in pure noise like the configuration's, and is another; latents scaled otherwise.
   FileWeights(const std::filesystem::path& path, const ModelConfig& config, const LoadOptions& options = {});
 
   /// Undefined for a key that nothing reads, unless asked for with `with_unread`.

@@ -22,7 +22,8 @@ struct WorldStart {
 void CheckStart(const nn::ModelConfig& config, const WorldStart& start);
 
 /// What weights are for, as the shards that they learned from say, for the weights' metadata: period_s, cameras, arms,
-/// arms_read, pose_map, statistics, tasks. What they are asked for is compared with it (worldmodel/trained_for.h).
+/// arms_read, pose_map, statistics, tasks. What they are asked for is compared with period, cameras, arms, maps and
+/// statistics; arms_read says which arms of recordings are their actions (worldmodel/trained_for.h).
 TensorMetadata WhatFor(const TensorMetadata& shards);
 
 /// Trains the denoiser and its resamplers (EVAC's first stage of training is the codec) and writes

@@ -65,6 +65,28 @@ TEST(EffectivePairs, CopiesOfOnePairCountOnceAndIndependentOnesAllOfThem) {
   EXPECT_THROW(EffectivePairs(Clusters{{{2, 2}, 3}}), Error);
 }
 
+TEST(EffectivePairs, OneStateIsOnePairHoweverOftenItIsRepeated) {
+  using Clusters = std::vector<PairedOutcomes>;
+  const PairedOutcomes flipped = EffectivePairs(Clusters{{{20, 0}, 20}, {{0, 0}, 0}});
+  EXPECT_EQ(flipped.pairs, 1);
+  EXPECT_EQ(flipped.flips.only_first, 1);
+  const PairedOutcomes alike = EffectivePairs(Clusters{{{2, 1}, 20}});
+  EXPECT_EQ(alike.pairs, 1);
+  EXPECT_EQ(alike.flips.only_first + alike.flips.only_second, 0);
+  EXPECT_EQ(EffectivePairs(Clusters{{{1, 0}, 1}}).flips.only_first, 1) << "nothing is repeated";
+}
+
+TEST(RateDifference, NewcombeOfRatesIsNewcombeWhereNoStateRepeats) {
+  const Estimate counts = NewcombeDifference({7, 10}, {3, 12});
+  const Estimate rates = NewcombeOfRates(WilsonInterval(7, 10), WilsonInterval(3, 12));
+  EXPECT_EQ(counts.interval->low, rates.interval->low);
+  EXPECT_EQ(counts.interval->high, rates.interval->high);
+  EXPECT_EQ(rates.n, 22);
+  const std::vector<Count> copies(4, Count{5, 5}), others = {{5, 5}, {0, 5}, {0, 5}, {0, 5}};
+  const Estimate clustered = NewcombeOfRates(ClusteredWilsonInterval(copies), ClusteredWilsonInterval(others));
+  EXPECT_NEAR(clustered.interval->low, NewcombeDifference({4, 4}, {1, 4}).interval->low, 1e-9);
+}
+
 TEST(RateDifference, TangoLeavesOutZeroWhenItsScoreTestRejects) {
   for (int b = 0; b <= 20; ++b) {
     const Interval interval = *TangoDifference({{b, 3}, 40}).interval;

@@ -121,5 +121,12 @@ TEST(Planning, NonInferiorityNeedsTheSizesOfTheDesign) {
   EXPECT_NEAR(static_cast<double>(PairsForNonInferiority(0.2, 0.1).n), 124, 1);
 }
 
+TEST(FurtherWanted, CountsRepeatsByWhatTheyTell) {
+  EXPECT_EQ(FurtherWanted(30, {20, 20}), 10);
+  EXPECT_EQ(FurtherWanted(30, {200, 20}), 100) << "ten repeats tell as much as one state";
+  EXPECT_EQ(FurtherWanted(10, {20, 20}), 1);
+  EXPECT_EQ(FurtherWanted(7, {0, 0}), 7);
+}
+
 }  // namespace
 }  // namespace evac

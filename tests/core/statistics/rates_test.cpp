@@ -99,8 +99,41 @@ TEST(ClusteredRate, GivesReasonsInsteadOfNumbersWhereNothingVaries) {
   EXPECT_EQ(StatisticsOfClusters({}).rate.reason(), "no trials");
   EXPECT_EQ(StatisticsOfClusters(std::vector<Count>{{2, 3}, {0, 0}}).cluster_se.reason(), "fewer than 2 clusters");
   EXPECT_EQ(StatisticsOfClusters(std::vector<Count>{{3, 3}, {3, 3}}).icc.reason(), "all outcomes are equal");
+  EXPECT_EQ(StatisticsOfClusters(std::vector<Count>{{3, 3}, {3, 3}}).design_effect.reason(), "all outcomes are equal");
   EXPECT_EQ(ClusteredWilsonInterval(std::vector<Count>{{3, 3}, {3, 3}}).interval->low,
-            WilsonInterval(6, 6).interval->low);
+            WilsonInterval(2, 2).interval->low);
+}
+
+TEST(ClusteredRate, IsNoSurerWhereAllRepeatsAreAlikeThanWhereOneStateDiffers) {
+  const std::vector<Count> alike(4, Count{25, 25}), one_differs = {{25, 25}, {25, 25}, {25, 25}, {0, 25}};
+  const Estimate sure = ClusteredWilsonInterval(alike);
+  EXPECT_EQ(sure.interval->low, WilsonInterval(4, 4).interval->low) << "four states, not a hundred trials";
+  EXPECT_EQ(sure.method, "Wilson on effective trials");
+  EXPECT_EQ(sure.n, 100);
+  EXPECT_NEAR(ClusteredWilsonInterval(one_differs).interval->high, WilsonInterval(3, 4).interval->high, 1e-9);
+}
+
+TEST(ClusteredRate, OfOneStateIsThatOfOneTrialHoweverOftenItIsRepeated) {
+  EXPECT_EQ(ClusteredWilsonInterval(std::vector<Count>{{10, 10}}).interval->low, WilsonInterval(1, 1).interval->low);
+  const Estimate mixed = ClusteredWilsonInterval(std::vector<Count>{{70, 100}, {0, 0}});
+  EXPECT_EQ(*mixed.value, 0.7);
+  EXPECT_LT(mixed.interval->low, 0.2);
+  const Estimate single = ClusteredWilsonInterval(std::vector<Count>{{1, 1}});
+  EXPECT_EQ(single.method, "Wilson") << "nothing is repeated";
+}
+
+TEST(EffectiveCount, IsTheTrialsWithoutRepeatsAndTheClustersOfCopies) {
+  const auto expect = [](const std::vector<Count>& clusters, std::int64_t successes, std::int64_t trials) {
+    const Count count = EffectiveCount(clusters);
+    EXPECT_EQ(count.successes, successes);
+    EXPECT_EQ(count.trials, trials);
+  };
+  expect({{1, 1}, {0, 1}, {1, 1}}, 2, 3);
+  expect({{5, 5}, {0, 5}, {5, 5}, {0, 5}, {5, 5}, {5, 5}}, 4, 6);
+  expect({{25, 25}, {25, 25}}, 2, 2);
+  expect({{1, 2}, {1, 2}, {1, 2}, {1, 2}}, 4, 8);
+  expect({{7, 10}}, 1, 1);
+  expect({}, 0, 0);
 }
 
 TEST(McNemar, DoesNotCareWhichWorldComesFirst) {

@@ -41,12 +41,12 @@ def check(holds, sentence, found=""):
 class Server:
     """`evac rate serve`, at one port for all its lives."""
 
-    def __init__(self):
-        self.port = 0
+    def __init__(self, study=STUDY):
+        self.study, self.port = study, 0
         self.start()
 
     def start(self):
-        self.process = subprocess.Popen([EVAC, "rate", "serve", STUDY, "--port", str(self.port)], stdout=subprocess.PIPE, text=True)
+        self.process = subprocess.Popen([EVAC, "rate", "serve", self.study, "--port", str(self.port)], stdout=subprocess.PIPE, text=True)
         self.url = self.process.stdout.readline().strip()
         self.port = int(self.url.rstrip("/").rsplit(":", 1)[1])
 
@@ -59,8 +59,8 @@ def evac(*words):
     return subprocess.run([EVAC, "rate", *words], capture_output=True, text=True, check=True).stdout
 
 
-def links(role, count, url):
-    return evac("invite", STUDY, "--role", role, "--count", str(count), "--url", url).split()
+def links(role, count, url, study=STUDY):
+    return evac("invite", study, "--role", role, "--count", str(count), "--url", url).split()
 
 
 def look(browser, name):

@@ -1,0 +1,97 @@
+#include "apps/judge_with_vlm.h"
+
+#include <fmt/format.h>
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <utility>
+
+#include "judges/vlm_prompt.h"
+#include "tests/reports/stored_run.h"
+#include "tests/support/scripted_server.h"
+
+namespace evac {
+namespace {
+
+using nlohmann::json;
+using testing::HasSubstr;
+
+ScriptedAnswer Saying(const json& content) {
+  return Answer(200, json{{"choices", {{{"message", {{"content", content.dump()}}}, {"finish_reason", "stop"}}}},
+                          {"usage", {{"prompt_tokens", 3200}, {"completion_tokens", 80}}}}
+                         .dump());
+}
+
+/// A model server that sees, takes eight images at most, and to which every clip is a failure.
+ScriptedAnswer Cramped(const SeenRequest& request) {
+  if (request.path == "/v1/models") return Answer(200, R"({"data": [{"id": "gloom", "root": "org/gloom"}]})");
+  const json asked = json::parse(request.body);
+  if (asked["response_format"]["json_schema"]["name"] == "numbers")
+    return Saying({{"numbers", MakeSightTest({.model = "gloom"}).numbers}});
+  int images = 0;
+  for (const json& part : asked["messages"][1]["content"]) images += part["type"] == "image_url";
+  if (images > 8) return Answer(400, R"({"error": {"message": "At most 8 images: too many images"}})");
+  return Saying({{"observations", "nothing moves"},
+                 {"stages", json::array()},
+                 {"verdict", "failure"},
+                 {"confidence", 0.9},
+                 {"evidence_frames", {0}},
+                 {"artefacts", {"none"}}});
+}
+
+class ASmallServer : public testing::Test {
+ protected:
+  ASmallServer() {
+    const Store closed = std::move(run_.store());  // verdicts are written into the run
+    std::ofstream(page_) << fmt::format("name: gloomy\nbase_url: {}/v1\nmodel: gloom\nprobe_share: 1\n", server_.Url());
+  }
+
+  std::string Judge(bool again = false, bool dry_run = false) const {
+    VlmJudgeArguments arguments;
+    arguments.run = run_.folder();
+    arguments.config = page_;
+    arguments.again = again;
+    arguments.dry_run = dry_run;
+    testing::internal::CaptureStdout();
+    const ExitCode code = JudgeWithVlm(arguments);
+    const std::string printed = testing::internal::GetCapturedStdout();
+    EXPECT_EQ(code, ExitCode::kOk);
+    return printed;
+  }
+
+  std::size_t Verdicts() const {
+    std::size_t count = 0;
+    const Store store = Store::Open(run_.folder(), Store::Mode::kReadOnly);
+    for (const auto& [episode, verdicts] : store.CurrentVerdicts()) {
+      for (const auto& [judge, verdict] : verdicts) count += judge.ends_with(":small") ? 1 : 0;
+    }
+    return count;
+  }
+
+  StoredRun run_{"run", "s", "f", 24};
+  ScriptedServer server_{Cramped};
+  std::filesystem::path page_ = run_.folder().parent_path() / "page.yaml";
+};
+
+TEST_F(ASmallServer, IsAskedOnceAboutEachEpisodeAndNotAnewAtEveryCall) {
+  EXPECT_THAT(Judge(false, true), HasSubstr("2 clips, 8 requests"));
+  EXPECT_THAT(Judge(), HasSubstr("2 rated (2 failure), 0 had a verdict already"));
+  EXPECT_EQ(Verdicts(), 4u) << "two episodes, each with its probe";
+  const std::size_t asked = server_.Seen().size();
+  EXPECT_THAT(Judge(false, true), HasSubstr("0 clips, 0 requests"));
+  const std::string second = Judge();
+  EXPECT_THAT(second, HasSubstr("0 rated, 2 had a verdict already"));
+  EXPECT_THAT(second, HasSubstr(":flip: 0 rated, 2 had a verdict already"));
+  EXPECT_EQ(server_.Seen().size(), asked + 2) << "only who it is and whether it sees";
+}
+
+TEST_F(ASmallServer, IsAskedAnewWhereThatIsWanted) {
+  Judge();
+  EXPECT_THAT(Judge(true, true), HasSubstr("2 clips, 8 requests"));
+  EXPECT_THAT(Judge(true), HasSubstr("2 rated (2 failure), 0 had a verdict already"));
+}
+
+}  // namespace
+}  // namespace evac

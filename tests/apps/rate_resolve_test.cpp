@@ -1,0 +1,179 @@
+#include "apps/rate_resolve.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "apps/rate_tables.h"
+#include "core/store.h"
+#include "tests/judges/rating_support.h"
+
+namespace evac {
+namespace {
+
+using testing::IsEmpty;
+using testing::StartsWith;
+
+using Stages = std::map<std::string, bool>;
+
+/// A study whose raters say what a test wants of all its clips, and the run that their labels go to. Its task has the
+/// stages reach (bit 0) and grasp (bit 1).
+class Resolving : public testing::Test {
+ protected:
+  Resolving() {
+    const Store closed = std::move(study.run().store());  // labels are written into the run
+  }
+
+  static void RateAll(AtTheDesk& rater, const std::string& label, int stages = 0) {
+    for (DeskAnswer next = rater.Next(); !next.body.contains("done"); next = rater.Next()) {
+      HumanVerdict verdict = rater.Watched(next.body.at("presentation"), label);
+      verdict.stages = stages;
+      ASSERT_EQ(rater.Say(verdict).status, 200);
+    }
+  }
+
+  void Import(const std::string& rater, const std::string& label) {
+    std::vector<ImportedVerdict> sheet;
+    for (const StudyClip& clip : store.Clips()) sheet.push_back({2, clip.id, rater, label, ""});
+    ImportVerdicts(store, sheet, "sheet.csv", 1, "test");
+  }
+
+  Resolved Resolve(bool each_rater = false) { return ResolveStudy(store, {.each_rater = each_rater}); }
+
+  /// What the run says of the first clip by now.
+  std::map<std::string, Verdict> Told() const {
+    const Store run = Store::Open(store.Clips().front().run, Store::Mode::kReadOnly);
+    const auto current = run.CurrentVerdicts();
+    return current.at(store.Clips().front().episode);
+  }
+
+  static std::string Named(const AtTheDesk& rater) { return fmt::format("human:study:r{}", rater.id); }
+
+  SmallStudy study{2, {.raters_per_clip = 2}};
+  StudyStore store = study.Open();
+  RatingDesk desk{store, {.min_repeats = 0}};
+};
+
+TEST_F(Resolving, ASheetSaysNothingOfStages) {
+  Import("ann", "failure");
+  Import("bob", "failure");
+  Resolve(true);
+  EXPECT_EQ(Told().at("human").label, Label::kFailure);
+  EXPECT_THAT(Told().at("human").stages, IsEmpty());
+  for (const auto& [judge, verdict] : Told()) {
+    if (judge.starts_with("human:")) {
+      EXPECT_THAT(verdict.stages, IsEmpty()) << judge;
+    }
+  }
+}
+
+TEST_F(Resolving, ASuccessWithoutAnyStageMarkedSaysNothingOfStages) {
+  AtTheDesk ann(store, desk), bob(store, desk);
+  RateAll(ann, "success");
+  RateAll(bob, "success");
+  Resolve(true);
+  EXPECT_EQ(Told().at("human").label, Label::kSuccess);
+  EXPECT_THAT(Told().at("human").stages, IsEmpty());
+  EXPECT_THAT(Told().at(Named(ann)).stages, IsEmpty());
+}
+
+TEST_F(Resolving, StagesAreVotedOnByThoseWhoTellOfThem) {
+  AtTheDesk ann(store, desk), bob(store, desk);
+  RateAll(ann, "success", 3);
+  RateAll(bob, "success");
+  Import("cleo", "success");
+  Resolve(true);
+  EXPECT_EQ(Told().at("human").stages, (Stages{{"reach", true}, {"grasp", true}}));
+  EXPECT_EQ(Told().at(Named(ann)).stages, (Stages{{"reach", true}, {"grasp", true}}));
+  EXPECT_THAT(Told().at(Named(bob)).stages, IsEmpty());
+}
+
+TEST_F(Resolving, AFailureWithoutAnyStageMarkedReachedNone) {
+  AtTheDesk ann(store, desk), bob(store, desk);
+  RateAll(ann, "failure");
+  RateAll(bob, "failure");
+  Resolve();
+  EXPECT_EQ(Told().at("human").stages, (Stages{{"reach", false}, {"grasp", false}}));
+}
+
+TEST_F(Resolving, WhoSawAFailureDoesNotSayThatASuccessReachedNothing) {
+  AtTheDesk ann(store, desk);
+  RateAll(ann, "failure");
+  Import("bob", "success");
+  Import("cleo", "success");
+  Resolve();
+  EXPECT_EQ(Told().at("human").label, Label::kSuccess);
+  EXPECT_THAT(Told().at("human").stages, IsEmpty());
+}
+
+TEST_F(Resolving, VotesOfWhoLeftAreTakenBackFromTheRun) {
+  AtTheDesk ann(store, desk), bob(store, desk);
+  RateAll(ann, "success", 3);
+  RateAll(bob, "success", 3);
+  Resolve(true);
+  ASSERT_EQ(Told().at("human").label, Label::kSuccess);
+  desk.Withdraw(ann.Me(), {.keep = false, .erase = false}, 9);
+  EXPECT_EQ(Resolve(true).undecided, 4) << "one vote is left of each clip";
+  EXPECT_THAT(Told().at("human").reason, StartsWith("too few votes"));
+  EXPECT_EQ(Told().at(Named(ann)).label, Label::kCannotTell);
+  EXPECT_EQ(Told().at(Named(ann)).reason, "no vote counts");
+  EXPECT_EQ(Told().at(Named(bob)).label, Label::kSuccess);
+  desk.Withdraw(bob.Me(), {.keep = false, .erase = true}, 9);
+  const Resolved nobody = Resolve();
+  EXPECT_EQ(nobody.decided + nobody.undecided, 0);
+  for (const std::string& judge : {std::string("human"), Named(ann), Named(bob)}) {
+    EXPECT_EQ(Told().at(judge).label, Label::kCannotTell) << judge;
+    EXPECT_EQ(Told().at(judge).reason, "no vote counts") << judge;
+    EXPECT_THAT(Told().at(judge).stages, IsEmpty()) << judge;
+  }
+  EXPECT_EQ(Resolve(true).written, 0) << "that is said once";
+}
+
+TEST_F(Resolving, AVoteThatWasUndoneIsTakenBackFromTheRun) {
+  AtTheDesk ann(store, desk), bob(store, desk);
+  RateAll(ann, "failure");
+  RateAll(bob, "failure");
+  Resolve();
+  for (AtTheDesk* rater : {&ann, &bob}) {
+    for (const StudyStore::Said& said : store.CurrentBy(rater->id))
+      desk.Retract(rater->Me(), {rater->epoch, NewSecret(), said.verdict.client_uuid}, 9);
+  }
+  Resolve();
+  EXPECT_EQ(Told().at("human").label, Label::kCannotTell);
+  EXPECT_EQ(Told().at("human").reason, "no vote counts");
+}
+
+TEST_F(Resolving, WhatNobodyOfTheStudyEverVotedOnIsLeftToWhoSaidIt) {
+  const StudyClip clip = store.Clips().front();
+  {
+    Store run = Store::Open(clip.run, Store::Mode::kReadWrite);
+    Verdict of_another_study;
+    of_another_study.episode_id = clip.episode;
+    of_another_study.judge = "human";
+    of_another_study.label = Label::kSuccess;
+    run.AddVerdict(of_another_study);
+  }
+  EXPECT_EQ(Resolve(true).written, 0);
+  EXPECT_EQ(Told().at("human").label, Label::kSuccess);
+}
+
+TEST_F(Resolving, WhatAnAdjudicatorDecidedStandsWhoeverLeft) {
+  AtTheDesk ann(store, desk), bob(store, desk), judge(store, desk, RaterRole::kAdjudicator);
+  RateAll(ann, "success", 3);
+  RateAll(bob, "failure");
+  for (DeskAnswer next = judge.Next(); !next.body.contains("done"); next = judge.Next()) {
+    const std::string clip = next.body.at("presentation");
+    judge.Say(clip, "failure");
+    HumanVerdict last = judge.Watched(clip, "failure");
+    last.supersedes = store.CurrentVerdict(clip)->id;
+    last.is_final = true;
+    ASSERT_EQ(judge.Say(last).status, 200);
+  }
+  for (AtTheDesk* rater : {&ann, &bob}) desk.Withdraw(rater->Me(), {.keep = false, .erase = false}, 9);
+  EXPECT_EQ(Resolve().decided, 4);
+  EXPECT_EQ(Told().at("human").label, Label::kFailure);
+  EXPECT_THAT(Told().at("human").reason, StartsWith("adjudicated"));
+  EXPECT_THAT(Told().at("human").stages, IsEmpty());
+}
+
+}  // namespace
+}  // namespace evac

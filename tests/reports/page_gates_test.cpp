@@ -1,0 +1,42 @@
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <nlohmann/json.hpp>
+
+#include "reports/gate.h"
+#include "reports/page.h"
+#include "tests/reports/sample_run.h"
+
+namespace evac {
+namespace {
+
+using testing::AllOf;
+using testing::HasSubstr;
+using testing::Not;
+
+/// The page of a run that failed a gate in all its six states. @param run  as whoever asked for the decision named it.
+std::string PageOfAFailedGate(const std::string& run, const std::string& run_folder) {
+  SampleRun now({{"take_bottle", "pick", "good", "-", "ffffff"}});
+  const SampleRun then({{"take_bottle", "pick", "good", "-", "ssssss"}});
+  const PinnedResult pinned = Pin(then.Summary({.bootstrap_replicates = 1}), "out/main");
+  const GateRules rules = ReadGateRules(
+      Config::FromText("gates:\n  - {name: r, test: paired_mcnemar, world: sim, margin: 0.1}\n", "gate.yaml"));
+  const GateDecision decision = Decide(rules, {now.Summary({.bootstrap_replicates = 1}), run, {}}, &pinned).decision;
+  EXPECT_EQ(decision.rules.at(0).counter_examples.size(), 6u);
+  now.store().AddGateRecord({decision.Key(), decision.name, Name(decision.outcome), JsonOf(decision).dump()}, {});
+  return ReportPage(ReportDataOf(now.Summary({.bootstrap_replicates = 1})), {run_folder, "evac test"});
+}
+
+TEST(GatesOnThePage, CounterExamplesLinkTheClipsOfTheRunWhereverItWasNamed) {
+  for (const char* run : {"out/candidate", "/data/runs/videos", "."}) {
+    const std::string page = PageOfAFailedGate(run, "..");
+    EXPECT_THAT(page, HasSubstr("<a href=\"../videos/sim/take_bottle/pick@good/41-0000-s1.mp4\">candidate failed"))
+        << run;
+    EXPECT_THAT(page, AllOf(Not(HasSubstr("candidate/videos")), Not(HasSubstr("runs/videos")))) << run;
+  }
+  EXPECT_THAT(PageOfAFailedGate("out/candidate", ""),
+              HasSubstr("<a href=\"videos/sim/take_bottle/pick@good/41-0000-s1.mp4\">candidate failed"));
+}
+
+}  // namespace
+}  // namespace evac
