@@ -14,6 +14,7 @@
 #include "core/tensor_file.h"
 #include "harness/suite.h"
 #include "tests/support/command.h"
+#include "tests/support/late_recording.h"
 #include "tests/support/synthetic_recording.h"
 #include "tests/support/temp_folder.h"
 
@@ -60,20 +61,7 @@ class PackCommand : public testing::Test {
   /// Below collected/ an episode of a collection, of two arms that are one step behind what they are told.
   void AddCollected(const std::string& episode) const {
     const TreePlace place{folder_ / "collected", "carry", episode};
-    const auto arms_at = [](int step) {
-      ArmState left, right;
-      left.base_from_gripper = Eigen::Translation3d(0.4 + 0.01 * step, 0.2, 0.3);
-      right.base_from_gripper = Eigen::Translation3d(0.4 + 0.01 * step, -0.2, 0.3);
-      return Arms{left, right};
-    };
-    RecordedEpisode recorded;
-    recorded.cameras = {{"head", 48, 32, 40, 40, 24, 16, Mount::kBase, SyntheticClip::MountFromCamera()}};
-    for (int step = 0; step < 5; ++step) {
-      recorded.arms.push_back(arms_at(std::max(0, step - 1)));
-      recorded.told.push_back(arms_at(step));
-      recorded.pictures.push_back({cv::Mat(32, 48, CV_8UC3, cv::Scalar::all(40 + step))});
-    }
-    WriteRecording(place, recorded, {.scale = 1});
+    WriteLateRecording(place);
     WriteTruth(TruthPath(place), {{"head"}, std::vector<float>(10, 1), std::vector<std::uint8_t>(5, 0)});
     CollectedEpisode row;
     row.task = place.task;

@@ -9,6 +9,7 @@
 #include "core/recording_writer.h"
 #include "core/store.h"
 #include "tests/support/command.h"
+#include "tests/support/late_recording.h"
 #include "tests/support/synthetic_recording.h"
 #include "tests/support/temp_folder.h"
 #include "tests/system/run_support.h"
@@ -136,27 +137,9 @@ TEST_F(RecordedSuite, WeightsOfOtherArmsAreRefusedWithBoth) {
                                          HasSubstr("two.safetensors"))));
 }
 
-/// Arms that are a step behind what they are told.
-void WriteLate(const TreePlace& place) {
-  const auto arms_at = [](int step) {
-    ArmState left, right;
-    left.base_from_gripper = Eigen::Translation3d(0.4 + 0.01 * step, 0.2, 0.3);
-    right.base_from_gripper = Eigen::Translation3d(0.4 + 0.01 * step, -0.2, 0.3);
-    return Arms{left, right};
-  };
-  RecordedEpisode recorded;
-  recorded.cameras = {{"head", 48, 32, 40, 40, 24, 16, Mount::kBase, SyntheticClip::MountFromCamera()}};
-  for (int step = 0; step < 5; ++step) {
-    recorded.arms.push_back(arms_at(std::max(0, step - 1)));
-    recorded.told.push_back(arms_at(step));
-    recorded.pictures.push_back({cv::Mat(32, 48, CV_8UC3, cv::Scalar::all(40 + step))});
-  }
-  WriteRecording(place, recorded, {.scale = 1});
-}
-
 TEST_F(RecordedSuite, ToldArmsAreReplayedWhereThatIsAskedForAndRecorded) {
   const TreePlace place{folder_ / "tree", "carry", "1"};
-  WriteLate(place);
+  WriteLateRecording(place);
   const std::string recording = "recording=" + place.Folder().string();
   for (const auto& [words, x_m] : {std::pair("", 0.4), std::pair(", --told", 0.41)}) {
     const fs::path run = folder_ / (*words == '\0' ? "measured" : "told");
