@@ -1,5 +1,7 @@
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
+#include <algorithm>
 #include <memory>
 #include <nlohmann/json.hpp>
 
@@ -60,8 +62,21 @@ json Json(const JudgeCalibrationReport& report) {
           {"accepted", report.missing.empty() && report.refusals.empty()}};
 }
 
+/// A name that nobody has is a slip, and too few episodes would say of it what more episodes cannot change.
+void DemandTwoJudges(const CalibrateArguments& arguments, const Store& store) {
+  if (arguments.judge == arguments.against)
+    throw InvalidInput("--judge: found '{}' against itself, wanted another than --against", arguments.judge);
+  const std::vector<std::string> judges = store.Judges();
+  for (const auto& [option, name] : {std::pair("--judge", arguments.judge), {"--against", arguments.against}}) {
+    if (std::ranges::find(judges, name) == judges.end())
+      throw InvalidInput("{}: found '{}', wanted one who has judged {}: {}", option, name, arguments.run,
+                         judges.empty() ? "nobody has yet" : fmt::format("{}", fmt::join(judges, ", ")));
+  }
+}
+
 ExitCode Calibrate(const CalibrateArguments& arguments) {
   const Store store = Store::Open(arguments.run, Store::Mode::kReadOnly);
+  DemandTwoJudges(arguments, store);
   const JudgeCalibrationReport report = CalibrateJudge(store, arguments.judge, arguments.against);
   fmt::print("{}", arguments.as_json ? Json(report).dump(2) + "\n" : Text(report));
   if (!report.missing.empty()) return ExitCode::kInconclusive;
@@ -80,7 +95,8 @@ void AddCalibrate(CLI::App& judge, ExitCode& exit_code) {
       ->capture_default_str();
   command->add_flag("--json", arguments->as_json, "for other programs");
   command->footer(
-      "Exit code 0: a gate may count it; 1: it is not good enough; 3: too few episodes to say.\n"
+      "Exit code 0: a gate may count it; 1: it is not good enough; 2: one of the two has judged nothing; 3: too few "
+      "episodes to say.\n"
       "Example:\n  evac judge calibrate out/demo --judge vlm:qwen3-vl-1a2b3c4d");
   command->callback([arguments, &exit_code] { exit_code = Calibrate(*arguments); });
 }

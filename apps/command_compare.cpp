@@ -159,6 +159,9 @@ std::vector<BetState> Bet(const PolicyComparison& comparison, const std::string&
 
 void Compare(const CompareArguments& arguments) {
   const PolicyPlace first = PlaceOf(arguments.first, arguments.run), second = PlaceOf(arguments.second, arguments.run);
+  if (!arguments.run.empty() && first.run != arguments.run && second.run != arguments.run)
+    throw InvalidInput("--run: found {}, but both policies name runs of their own: {} and {}", arguments.run, first.run,
+                       second.run);
   const JudgedRun one = Read(first.run, arguments), two = Read(second.run, arguments);
   const std::string a = PolicyOf(one, first.policy), b = PolicyOf(two, second.policy);
   const bool same_run = std::filesystem::equivalent(first.run, second.run);

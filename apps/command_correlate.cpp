@@ -62,8 +62,9 @@ void AddCorrelate(CLI::App& app, ExitCode& exit_code) {
   CLI::App* command =
       app.add_subcommand("correlate", "Say how well another world's success rates follow the real world's.");
   command->add_option("RUN", arguments->run, "folder of a run: its real world against each other");
-  command->add_option("--pairs", arguments->pairs, "CSV of rates instead: group,task,policy,real_sr,sim_sr")
-      ->type_name("FILE.csv");
+  CLI::Option* pairs =
+      command->add_option("--pairs", arguments->pairs, "CSV of rates instead: group,task,policy,real_sr,sim_sr");
+  pairs->type_name("FILE.csv");
   MmrvConvention& convention = options.correlation.convention;
   command
       ->add_option_function<std::string>(
@@ -88,6 +89,7 @@ void AddCorrelate(CLI::App& app, ExitCode& exit_code) {
   command->add_option("--world", options.world, "compare only this world with the real one")->type_name("NAME");
   command->add_option("--seed", options.correlation.bootstrap.seed, "of the bootstrap")->capture_default_str();
   command->add_flag("--json", arguments->json, "for programs: docs/formats/correlation_json.md");
+  pairs->excludes("--judge", "--world");  // a table has no verdicts, and two columns are its worlds
   command->footer(
       "Examples:\n"
       "  evac correlate out/demo\n"

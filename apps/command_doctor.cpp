@@ -9,6 +9,7 @@
 #include <functional>
 #include <opencv2/core/utility.hpp>
 #include <opencv2/imgcodecs.hpp>
+#include <optional>
 #include <thread>
 
 #include "apps/commands.h"
@@ -152,14 +153,28 @@ bool Passes(const char* what, const std::function<Finding()>& check) {
   return finding.kind != Finding::Kind::kBroken;
 }
 
+/// What needs a place for temporary files, of which there may be none.
+bool FilesPass() {
+  std::optional<ScratchFolder> scratch;
+  const auto find_room = [&]() -> Finding {
+    try {
+      scratch.emplace();
+    } catch (const fs::filesystem_error& error) {
+      return Broken(fmt::format("{}: set TMPDIR to a folder that can be written", error.what()));
+    }
+    return DiskSpace(scratch->path());
+  };
+  const bool has_room = Passes("disk", find_room);
+  if (!scratch) return false;
+  const bool stores = Passes("store", [&] { return StoreWorks(scratch->path()); });
+  return Passes("video", [&] { return Video(scratch->path()); }) && stores && has_room;
+}
+
 ExitCode Doctor() {
-  const ScratchFolder scratch;
   fmt::print("evac {}\n", EVAC_VERSION);
   bool healthy = Passes("versions", Versions);
   healthy &= Passes("threads", Threads);
-  healthy &= Passes("disk", [&] { return DiskSpace(scratch.path()); });
-  healthy &= Passes("store", [&] { return StoreWorks(scratch.path()); });
-  healthy &= Passes("video", [&] { return Video(scratch.path()); });
+  healthy &= FilesPass();
   healthy &= Passes("images", Images);
   healthy &= Passes("multicast", Multicast);
   healthy &= Passes("buffers", LcmBuffers);

@@ -1,4 +1,5 @@
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <cstdio>
@@ -11,6 +12,7 @@
 #include "core/file.h"
 #include "core/store.h"
 #include "core/version.h"
+#include "reports/counted_judges.h"
 #include "reports/gate.h"
 #include "reports/gate_output.h"
 #include "reports/report_files.h"
@@ -25,6 +27,7 @@ struct GateArguments {
   std::string out;  ///< of the files; of pin: the pinned file
   std::string judge = "oracle";
   SummaryOptions options;
+  bool names_seed = false;  ///< somebody asked for that one
   bool json = false;
 };
 
@@ -59,31 +62,45 @@ void Keep(const GateResult& result, const std::string& run) {
   }
 }
 
+bool AskForCorrelation(const GateRules& rules) {
+  return std::ranges::any_of(rules.rules, [](const GateRule& rule) { return rule.test == GateTest::kCorrelation; });
+}
+
 /// Correlations are asked for by few rules; the others need not wait for their bootstrap.
 SummaryOptions OptionsFor(const GateRules& rules, SummaryOptions options) {
-  const bool asks =
-      std::ranges::any_of(rules.rules, [](const GateRule& rule) { return rule.test == GateTest::kCorrelation; });
-  if (!asks) options.bootstrap_replicates = 1;
+  if (!AskForCorrelation(rules)) options.bootstrap_replicates = 1;
   return options;
 }
 
+/// More episodes would decide nothing by a judge who gives no verdicts. Of a run that nobody has judged yet they would.
+void DemandTheJudge(const GateRules& rules, const RunSummary& summary, const GateArguments& arguments) {
+  const auto counts = [&](const std::string& judge) { return IsCounted(judge, summary.options.judge); };
+  const auto needs_none = [](const GateRule& rule) { return rule.test == GateTest::kErrorShare; };
+  if (summary.judges.empty() || std::ranges::any_of(summary.judges, counts)) return;
+  if (std::ranges::all_of(rules.rules, needs_none)) return;
+  throw InvalidInput("{}: field judge: found '{}', wanted one who has judged {}: {}", arguments.rules, rules.judge,
+                     arguments.run, fmt::join(summary.judges, ", "));
+}
+
 /// The stored decision where these rules, this baseline and these data have been decided before; else a new one, kept.
-GateDecision DecisionOf(const GateRules& rules, const GateArguments& arguments) {
-  const RunSummary summary = SummaryOf(arguments.run, rules.judge, OptionsFor(rules, arguments.options));
+GateDecision DecisionOf(const GateRules& rules, const RunSummary& summary, const GateArguments& arguments) {
   const std::optional<PinnedResult> baseline = BaselineOf(arguments, rules.judge);
   const auto looks = Store::Open(arguments.run, Store::Mode::kReadOnly).Looks();
   const GateResult result = Decide(rules, {summary, arguments.run, looks}, baseline ? &*baseline : nullptr);
   const auto& records = summary.data.gates;
   const auto stored = std::ranges::find(records, result.decision.Key(), &GateRecord::key);
-  if (stored != records.end()) return GateDecisionFromJson(stored->document);
+  if (stored != records.end()) {
+    if (arguments.names_seed)
+      fmt::print(stderr, "evac: note: --seed: this was decided before, and that decision stands\n");
+    return GateDecisionFromJson(stored->document);
+  }
   Keep(result, arguments.run);
   return result.decision;
 }
 
-void WriteFiles(const GateRules& rules, const GateDecision& decision, const GateArguments& arguments) {
-  const RunSummary summary = SummaryOf(arguments.run, rules.judge, OptionsFor(rules, arguments.options));
-  const fs::path folder = arguments.out;
-  fs::create_directories(folder);
+/// @param summary  what was decided of: a run in progress has other episodes by now
+void WriteFiles(const RunSummary& summary, const GateDecision& decision, const fs::path& folder) {
+  MakeFolders(folder);
   for (const ReportFile& file : GateFiles(summary, decision)) WriteFileAtomically(folder / file.name, file.bytes);
 }
 
@@ -100,14 +117,27 @@ ExitCode Gate(const GateArguments& arguments) {
     for (const std::string& size : SizesOf(rules, baseline ? &*baseline : nullptr)) fmt::print("{}.\n", size);
     return ExitCode::kOk;
   }
-  const GateDecision decision = DecisionOf(rules, arguments);
+  if (arguments.names_seed && !AskForCorrelation(rules))
+    throw InvalidInput("--seed: no rule of {} is a correlation, and only these draw: wanted none", arguments.rules);
+  const RunSummary summary = SummaryOf(arguments.run, rules.judge, OptionsFor(rules, arguments.options));
+  DemandTheJudge(rules, summary, arguments);
+  const GateDecision decision = DecisionOf(rules, summary, arguments);
   if (arguments.json) {
     fmt::print("{}\n", JsonOf(decision).dump(2, ' ', false, nlohmann::json::error_handler_t::replace));
   } else {
     fmt::print("{}", GateText(decision));
   }
-  if (!arguments.out.empty()) WriteFiles(rules, decision, arguments);
+  if (!arguments.out.empty()) WriteFiles(summary, decision, arguments.out);
   return ExitCodeOf(decision.outcome);
+}
+
+/// A baseline in which nothing succeeded or failed would be found out by the first candidate, long after.
+void DemandOutcomes(const PinnedResult& pinned, const GateArguments& arguments) {
+  for (const PinnedCell& cell : pinned.cells) {
+    if (std::ranges::any_of(cell.outcomes, &PinnedOutcome::Counts)) return;
+  }
+  throw InvalidInput("{}: judge {}: found no episode that succeeded or failed, wanted a judge of this run (evac ls)",
+                     arguments.run, arguments.judge);
 }
 
 void AddPin(CLI::App& gate, ExitCode& exit_code) {
@@ -119,6 +149,7 @@ void AddPin(CLI::App& gate, ExitCode& exit_code) {
   command->add_option("--judge", arguments->judge, "whose verdicts are pinned")->capture_default_str();
   command->callback([arguments, &exit_code] {
     const PinnedResult pinned = PinRun(arguments->run, arguments->judge);
+    DemandOutcomes(pinned, *arguments);
     WriteFileAtomically(arguments->out, PinnedJson(pinned));
     fmt::print("{}\n", pinned.sha256);
     exit_code = ExitCode::kOk;
@@ -140,9 +171,9 @@ void AddGate(CLI::App& app, ExitCode& exit_code) {
   command->add_option("--out", arguments->out, "also junit.xml, summary.md, badge.svg and gate.json, into this folder")
       ->needs(run)
       ->type_name("FOLDER");
-  command->add_option("--seed", arguments->options.bootstrap_seed, "of the bootstrap")
-      ->needs(run)
-      ->capture_default_str();
+  CLI::Option* seed = command->add_option("--seed", arguments->options.bootstrap_seed,
+                                          "of the bootstrap of rules that are correlations");
+  seed->needs(run)->capture_default_str();
   command->add_flag("--json", arguments->json, "for programs: docs/formats/gate_json.md")->needs(run);
   command->footer(
       "Examples:\n"
@@ -153,8 +184,10 @@ void AddGate(CLI::App& app, ExitCode& exit_code) {
       "rules,\n"
       "baseline and data get the same answer. docs/gate.md.");
   AddPin(*command, exit_code);
-  command->callback([arguments, command, &exit_code] {
+  RefuseOptionsBeforeSubcommands(*command);
+  command->callback([arguments, command, seed, &exit_code] {
     if (!command->get_subcommands().empty()) return;  // pin has done it
+    arguments->names_seed = seed->count() > 0;
     if (arguments->rules.empty()) throw InvalidInput("gate: RULES: found nothing, wanted RULES.yaml (see --help)");
     exit_code = Gate(*arguments);
   });

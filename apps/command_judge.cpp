@@ -32,6 +32,8 @@ void RefuseWhatMeansNothing(const JudgeArguments& arguments) {
   if (arguments.judge == "vlm") {
     if (!arguments.weights.empty())
       throw InvalidInput("--weights: a model server has its own, wanted --judge classifier");
+    if (vlm.dry_run && vlm.offline)
+      throw InvalidInput("--offline: asks no server, which costs nothing: wanted it without --dry-run");
     return;
   }
   const std::pair<const char*, bool> given[] = {{"--config", !vlm.config.empty()},
@@ -107,6 +109,7 @@ void AddJudge(CLI::App& app, ExitCode& exit_code) {
   AddCalibrate(*command, exit_code);
   AddBalance(*command, exit_code);
   AddJudgeTrain(*command, exit_code);
+  RefuseOptionsBeforeSubcommands(*command);
   command->callback([command, arguments, &exit_code] {
     if (command->get_subcommands().empty()) exit_code = Rate(*arguments);
   });

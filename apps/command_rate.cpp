@@ -1,11 +1,14 @@
 #include "apps/command_rate.h"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <chrono>
 #include <cstdio>
 #include <filesystem>
 #include <memory>
+#include <optional>
+#include <set>
 #include <thread>
 
 #include "apps/interrupts.h"
@@ -16,6 +19,7 @@
 #include "apps/rate_tables.h"
 #include "core/file.h"
 #include "core/secret.h"
+#include "core/store.h"
 #include "core/version.h"
 #include "judges/rating_server.h"
 #include "judges/rating_study.h"
@@ -34,6 +38,7 @@ std::int64_t Now_ms() {
 struct RateArguments {
   std::string study, file, role = "rater", url, csv, jsonl;
   std::string round_trip, config;
+  std::optional<int> raters;  ///< nothing: nobody asked for so many
   int count = 1;
   bool as_json = false;
   StudyOptions make{};
@@ -41,8 +46,36 @@ struct RateArguments {
   ResolveOptions resolve{};
 };
 
+/// Gold is chosen once: of a name that nobody has, a study would be frozen without any.
+void DemandKnownGold(const StudyOptions& options) {
+  if (options.gold_from.empty()) return;
+  std::set<std::string> judges;
+  for (const std::filesystem::path& run : options.runs) {
+    for (const std::string& judge : Store::Open(run, Store::Mode::kReadOnly).Judges()) judges.insert(judge);
+  }
+  if (judges.contains(options.gold_from)) return;
+  throw InvalidInput("--gold-from: found '{}', wanted one who has judged these runs: {}", options.gold_from,
+                     judges.empty() ? "nobody has yet" : fmt::format("{}", fmt::join(judges, ", ")));
+}
+
+/// What a study was begun with holds for its later waves: raters know how many they are, and their orders stand.
+void KeepWhatTheStudyBeganWith(const RateArguments& arguments, StudyOptions& options) {
+  options.raters_per_clip = arguments.raters.value_or(options.raters_per_clip);
+  if (!std::filesystem::exists(std::filesystem::path(arguments.study) / "study.sqlite")) return;
+  const StudyInfo began = StudyStore::Open(arguments.study, StudyStore::Mode::kReadOnly).info();
+  if (arguments.raters.value_or(began.raters_per_clip) != began.raters_per_clip)
+    throw InvalidInput("--raters: found {}, but {} was begun with {}, and a wave cannot change that", *arguments.raters,
+                       arguments.study, began.raters_per_clip);
+  if (!options.name.empty() && options.name != began.name)
+    throw InvalidInput("--name: found '{}', but {} was begun as '{}', and a wave cannot change that", options.name,
+                       arguments.study, began.name);
+  options.raters_per_clip = began.raters_per_clip;
+}
+
 void New(RateArguments& arguments) {
   StudyOptions options = arguments.make;
+  KeepWhatTheStudyBeganWith(arguments, options);
+  DemandKnownGold(options);
   if (arguments.round_trip.empty() != arguments.config.empty())
     throw InvalidInput("--vae-roundtrip WEIGHTS and --config PAGE go together: found one of the two");
   if (!arguments.round_trip.empty()) {
@@ -134,7 +167,8 @@ void AddNew(CLI::App& rate, const std::shared_ptr<RateArguments>& shared, ExitCo
   CLI::App* command =
       Sub(rate, shared, exit_code, "new", "Freeze the clips of runs into a study, or add a wave to one", New);
   command->add_option("--run", a.make.runs, "folders of runs; real and other worlds side by side")->required();
-  command->add_option("--raters", a.make.raters_per_clip, "votes per clip")->capture_default_str();
+  command->add_option("--raters", a.raters, "votes per clip; of a study that is there, as many as it began with")
+      ->default_str(std::to_string(a.make.raters_per_clip));
   command->add_option("--seed", a.make.seed, "of every rater's order")->capture_default_str();
   command->add_option("--name", a.make.name, "of the study; else its folder's");
   command->add_option("--states", a.make.states, "so many initial states per task, drawn by the seed; 0: all")

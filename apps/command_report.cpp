@@ -1,5 +1,7 @@
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
+#include <algorithm>
 #include <filesystem>
 #include <memory>
 #include <string>
@@ -11,6 +13,7 @@
 #include "core/version.h"
 #include "reports/chart_files.h"
 #include "reports/correlation_output.h"
+#include "reports/counted_judges.h"
 #include "reports/pairs_csv.h"
 #include "reports/png.h"
 #include "reports/rates_page.h"
@@ -24,12 +27,13 @@ namespace fs = std::filesystem;
 struct ReportArguments {
   std::string run, pairs, out, baseline;
   SummaryOptions options;
+  bool names_judge = false;  ///< somebody asked for that one
   bool embed_thumbs = false;
 };
 
 /// Every chart as an SVG and a PNG, for a paper.
 void WriteCharts(const std::vector<ChartFile>& charts, const fs::path& folder) {
-  fs::create_directories(folder);
+  MakeFolders(folder);
   for (const ChartFile& chart : charts) {
     WriteFileAtomically(folder / (chart.name + ".svg"), chart.svg);
     WriteFileAtomically(folder / (chart.name + ".png"), PngOf(chart.svg));
@@ -49,7 +53,7 @@ fs::path WriteRatesReport(const ReportArguments& arguments) {
   const PairsCsv csv = ReadPairsCsv(ReadFile(arguments.pairs), arguments.pairs);
   PrintWarnings(csv.warnings);
   const std::vector<CorrelationGroup> groups = CorrelatePoints(csv.points);
-  fs::create_directories(folder);
+  MakeFolders(folder);
   WriteCharts(ChartFilesOf(groups), folder / "charts");
   WriteFileAtomically(folder / "correlation.json", CorrelationJson(groups));
   const std::string source = fs::path(arguments.pairs).filename().string();
@@ -65,12 +69,21 @@ std::string ThumbnailOf(const fs::path& run, const std::string& file) {
   return ReadFile(path);
 }
 
+/// Nobody need have judged a run that only just began; but who names judges wants their verdicts.
+void DemandVerdicts(const RunSummary& summary, const ReportArguments& arguments) {
+  const auto counts = [&](const std::string& judge) { return IsCounted(judge, summary.options.judge); };
+  if (!arguments.names_judge || std::ranges::any_of(summary.judges, counts)) return;
+  throw InvalidInput("--judge: found '{}', wanted one who has judged {}: {}", arguments.options.judge, arguments.run,
+                     summary.judges.empty() ? "nobody has yet" : fmt::format("{}", fmt::join(summary.judges, ", ")));
+}
+
 /// Everything that is derived from the run, into one folder. @returns the page's path, which is written last.
 fs::path WriteReport(const ReportArguments& arguments) {
   const fs::path folder = arguments.out.empty() ? fs::path(arguments.run) / "report" : fs::path(arguments.out);
   CheckIsFolder(folder);
   RunSummary summary = Summarise(ReadRun(Store::Open(arguments.run, Store::Mode::kReadOnly)), arguments.options);
-  fs::create_directories(folder);
+  DemandVerdicts(summary, arguments);
+  MakeFolders(folder);
   const fs::path run_folder = fs::canonical(arguments.run).lexically_relative(fs::canonical(folder));
   const ReportData report = ReportDataOf(std::move(summary), {.baseline = arguments.baseline, .trust = {}});
   WriteCharts(ChartFilesOf(report), folder / "charts");
@@ -95,7 +108,7 @@ void AddReport(CLI::App& app, ExitCode& exit_code) {
       "--pairs", arguments->pairs,
       "instead of a run: a CSV of rates, group,task,policy,real_sr,sim_sr (docs/formats/pairs_csv.md)");
   pairs->type_name("FILE.csv");
-  command->add_option("--judge", arguments->options.judge, "whose verdicts are counted; with commas, of each episode the first who can tell: oracle,classifier")->capture_default_str();
+  const CLI::Option* judge = command->add_option("--judge", arguments->options.judge, "whose verdicts are counted; with commas, of each episode the first who can tell: oracle,classifier")->capture_default_str();
   command->add_option("--out", arguments->out, "into this folder (default: RUN/report)")->type_name("FOLDER");
   command
       ->add_option("--baseline", arguments->baseline,
@@ -113,7 +126,8 @@ void AddReport(CLI::App& app, ExitCode& exit_code) {
       "Writes index.html, report.json, summary.md, junit.xml, benchmark.json, eval_info.json, badge.svg, rates.csv,\n"
       "verdicts.csv, and every chart as charts/*.svg and *.png. The page links the run's videos relatively: move both "
       "together. docs/read_a_report.md.");
-  command->callback([arguments, &exit_code] {
+  command->callback([arguments, judge, &exit_code] {
+    arguments->names_judge = judge->count() > 0;
     if (arguments->run.empty() == arguments->pairs.empty())
       throw InvalidInput("report: found {}, wanted either a RUN or --pairs FILE.csv",
                          arguments->run.empty() ? "neither" : "both");

@@ -55,10 +55,12 @@ std::string ForShell(const std::string& word) {
   return quoted + "'";
 }
 
+std::string ResumeCommand(const std::string& run) { return "evac resume " + ForShell(run); }
+
 /// What goes on with the run as it goes now. `evac resume` goes by the suite as the run began with it: a deadline that was
 /// changed since, which the hash leaves out, would be the old one again.
 std::string CommandAgain(const RunArguments& arguments, const Suite& suite, const Store& store) {
-  if (store.run().suite_text == suite.text) return "";
+  if (store.run().suite_text == suite.text) return ResumeCommand(arguments.out);
   std::string command = fmt::format("evac run {} --out {}", ForShell(arguments.suite), ForShell(arguments.out));
   for (const std::string& assignment : arguments.assignments) command += " --set " + ForShell(assignment);
   return command;
@@ -94,7 +96,7 @@ ExitCode Resume(const ResumeArguments& arguments) {
   NeedNetworksFor(suite);
   Store store = Store::CreateOrContinue(arguments.run, info);
   FillInRecordedTask(suite);
-  const std::string go_on = arguments.lanes > 0 ? fmt::format("evac resume {} --lanes {}", ForShell(arguments.run), arguments.lanes) : "";
+  const std::string go_on = ResumeCommand(arguments.run) + (arguments.lanes > 0 ? fmt::format(" --lanes {}", arguments.lanes) : "");
   return Evaluate(suite, store, {.shard = shard, .retry_failed = arguments.retry_failed, .go_on = go_on});
 }
 

@@ -27,6 +27,7 @@ ExitCode Validate(const ValidateArguments& arguments) {
   CheckRubrics(suite);
   int episodes = 0;
   for (const SuiteWorld& world : suite.worlds) {
+    if (world.evac) CheckNetwork(world, suite.tasks);
     const std::unique_ptr<World> built = MakeWorld(world, suite, nullptr);
     const bool needs_real_run = world.type == "evac" && !suite.recording;
     for (const Task& task : suite.tasks) {

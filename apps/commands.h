@@ -36,4 +36,17 @@ void AddCollect(CLI::App& app, ExitCode& exit_code);
 void AddPack(CLI::App& app, ExitCode& exit_code);
 void AddVary(CLI::App& app, ExitCode& exit_code);
 
+/// Of a command that does something of its own and has subcommands too, once these are added: its options before one of
+/// them, which reads none, are refused.
+inline void RefuseOptionsBeforeSubcommands(CLI::App& command) {
+  for (CLI::App* subcommand : command.get_subcommands([](const CLI::App*) { return true; })) {
+    subcommand->preparse_callback([&command, subcommand](std::size_t) {
+      for (const CLI::Option* option : command.get_options()) {
+        if (option->count() == 0) continue;
+        throw CLI::ValidationError(option->get_name(), "means nothing before " + subcommand->get_name());
+      }
+    });
+  }
+}
+
 }  // namespace evac

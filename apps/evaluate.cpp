@@ -64,12 +64,6 @@ Plan MakePlan(const Suite& suite, const Shard& shard, const Store& store) {
   return plan;
 }
 
-void RetryFailed(const Shard& shard, Store& store) {
-  for (const Episode& episode : store.Episodes()) {
-    if (IsFailure(episode.stop) && shard.Holds(episode.key.pair)) store.RemoveFailed(episode.key);
-  }
-}
-
 /// What whoever reads the run may want to know, and no reason to refuse it.
 void SayIfAnotherVersionBegan(const Store& store) {
   const std::string began = store.run().evac_version;
@@ -79,13 +73,33 @@ void SayIfAnotherVersionBegan(const Store& store) {
 
 /// What goes on with this run as it was asked for.
 std::string GoOn(const EvaluateOptions& options, const Store& store, bool retry_failed) {
+  const std::string whole = options.part_of.empty() ? "" : fmt::format("the same {} command", options.part_of);
+  if (!whole.empty() && !retry_failed) return whole;
   const std::string command = options.go_on.empty() ? fmt::format("evac resume {}", store.folder().string()) : options.go_on;
-  return command + (retry_failed ? " --retry-failed" : "") + options.shard.Option();
+  return command + (retry_failed ? " --retry-failed" : "") + options.shard.Option() + (whole.empty() ? "" : ", then " + whole);
 }
 
 /// Before whatever may take seconds: who waits at the keyboard is not to wait for it.
 void EndIfInterrupted() {
   if (IsInterrupted()) throw InternalError("interrupted");
+}
+
+/// Makes room for failed episodes to be run again. Their reasons are lost with them: not before their policies were greeted.
+void RetryFailed(const Suite& suite, const Shard& shard, Store& store) {
+  std::vector<EpisodeKey> failed;
+  for (const Episode& episode : store.Episodes()) {
+    if (IsFailure(episode.stop) && shard.Holds(episode.key.pair)) failed.push_back(episode.key);
+  }
+  for (const SuitePolicy& policy : suite.policies) {
+    const auto is_its = [&](const EpisodeKey& key) {
+      return key.pair.policy == policy.name && key.pair.checkpoint == policy.checkpoint;
+    };
+    if (std::ranges::none_of(failed, is_its)) continue;
+    EndIfInterrupted();
+    const RunningPolicy greeted(policy, suite, store.folder(), IsInterrupted);
+  }
+  for (const EpisodeKey& key : failed) store.RemoveFailed(key);
+  store.RemoveOrphans();
 }
 
 /// One run's state while it goes from pairing to pairing.
@@ -216,6 +230,7 @@ void RunJudges(const Suite& suite, Store& store) {
 
 /// @returns why it ended before its last episode, or nothing.
 std::string RunWorlds(const Suite& suite, const EvaluateOptions& options, Store& store) try {
+  if (options.retry_failed) RetryFailed(suite, options.shard, store);
   Evaluation evaluation(suite, options.shard, store);
   evaluation.GreetPolicies();
   for (const SuiteWorld& world : RealFirst(suite.worlds)) {
@@ -240,7 +255,6 @@ std::string Shard::Option() const { return of == 1 ? std::string() : fmt::format
 ExitCode Evaluate(const Suite& suite, Store& store, const EvaluateOptions& options) {
   const CatchInterrupts catch_interrupts;
   SayIfAnotherVersionBegan(store);
-  if (options.retry_failed) RetryFailed(options.shard, store);
   store.RemoveOrphans();
   Declare(suite, store);
   std::string why_ended = RunWorlds(suite, options, store);

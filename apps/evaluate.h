@@ -20,9 +20,10 @@ struct Shard {
 };
 
 struct EvaluateOptions {
-  Shard shard;
+  Shard shard = {};
   bool retry_failed = false;  ///< the shard's failed episodes are removed first, and so run again
   std::string go_on = "";     ///< the command that goes on with this run, without its shard; empty: `evac resume` alone does
+  std::string part_of = "";   ///< the command whose part this run is ("evac fidelity"): it goes on with the run itself
 };
 
 /// Runs every episode of the suite's shard that `store` does not have, judges what is there, and says on stderr what it does.

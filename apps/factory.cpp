@@ -10,6 +10,7 @@
 
 #include "apps/network_parts.h"
 #include "core/config.h"
+#include "core/file.h"
 #include "judges/oracle_judge.h"
 #include "worldmodel/echo_world.h"
 #include "worldmodel/sim/mujoco_world.h"
@@ -48,7 +49,7 @@ std::string Filled(std::string word, const Suite& suite) {
 /// worlds do.
 PolicyProcessOptions ProcessOptions(const SuitePolicy& policy, const Suite& suite, const fs::path& run_folder, const LcmAddress& address) {
   const fs::path log = run_folder / "logs" / (policy.name + "@" + policy.checkpoint + ".log");
-  fs::create_directories(log.parent_path());
+  MakeFolders(log.parent_path());
   PolicyProcessOptions options{
       .command = CommandLine(policy, suite),
       .environment = {{"EVAC_LCM_URL", address.url}, {"EVAC_TOKEN", address.token}, {"EVAC_CHUNK_SIZE", std::to_string(suite.chunk_size)}},

@@ -30,25 +30,39 @@ bool HasVerdict(const std::map<std::string, Verdict>& verdicts, const std::strin
   return verdicts.contains(judge) || verdicts.contains(judge + kVlmSmall);
 }
 
-/// What the next call of the same judge would ask for.
-ExitCode SayWhatItWouldCost(const VlmConfig& config, Store& store, bool again) {
+/// How many requests the next call makes about an episode, probes and all. @param verdicts  that it has
+long RequestsAbout(const Episode& episode, const std::map<std::string, Verdict>& verdicts, const VlmConfig& config,
+                   const VlmJudgeArguments& arguments) {
+  const std::string judge = config.JudgeName();
+  const auto asks = [&](const std::string& name) { return arguments.again || !HasVerdict(verdicts, name); };
+  const long wordings = std::ssize(kVlmWordings);
+  long requests = asks(judge) ? wordings : 0;
+  if (!IsProbed(episode, config.probe_share)) return requests;
+  if (asks(judge + ":flip")) ++requests;
+  if (arguments.retest && asks(judge + ":retest")) requests += wordings;
+  return requests;
+}
+
+/// What the same call without --dry-run would ask for.
+ExitCode SayWhatItWouldCost(const VlmConfig& config, const Store& store, const VlmJudgeArguments& arguments) {
   std::map<std::string, Task> tasks;
   for (Task& task : store.Tasks()) tasks.emplace(task.id, std::move(task));
-  const auto current = store.CurrentVerdicts();
+  auto current = store.CurrentVerdicts();
   long requests = 0, tokens = 0, clips = 0;
   for (const Episode& episode : store.Episodes()) {
-    const auto verdicts = current.find(episode.key.Id());
-    const bool has_one = verdicts != current.end() && HasVerdict(verdicts->second, config.JudgeName());
-    if (IsFailure(episode.stop) || (has_one && !again) || episode.video.empty()) continue;
+    if (IsFailure(episode.stop) || episode.video.empty()) continue;
+    const long asked = RequestsAbout(episode, current[episode.key.Id()], config, arguments);
+    if (asked == 0) continue;
     const auto frames = ReadVlmFrames(store.folder() / episode.video, tasks.at(episode.key.pair.task), config.clip);
-    const long asked = std::ssize(kVlmWordings) + (IsProbed(episode, config.probe_share) ? 1 : 0);
     ++clips;
     requests += asked;
     tokens += asked * (EstimatedTokens(frames) + kTextTokens);
   }
   const VlmSpent estimate{.requests = requests, .prompt_tokens = tokens, .completion_tokens = requests * 250};
   fmt::print("{}: {} clips, {} requests, about {} prompt tokens", config.JudgeName(), clips, requests, tokens);
-  if (config.budget.usd_per_million_prompt_tokens > 0) fmt::print(", about {:.2f} USD", estimate.Usd(config.budget));
+  const VlmBudget& prices = config.budget;
+  if (prices.usd_per_million_prompt_tokens > 0 || prices.usd_per_million_completion_tokens > 0)
+    fmt::print(", about {:.2f} USD", estimate.Usd(prices));
   fmt::print("\n");
   return ExitCode::kOk;
 }
@@ -86,7 +100,7 @@ void ShowProgress(const Verdict& verdict) {
 ExitCode JudgeWithVlm(const VlmJudgeArguments& arguments) {
   const VlmConfig config = VlmConfig::FromFile(arguments.config);
   Store store = Store::Open(arguments.run, Store::Mode::kReadWrite);
-  if (arguments.dry_run) return SayWhatItWouldCost(config, store, arguments.again);
+  if (arguments.dry_run) return SayWhatItWouldCost(config, store, arguments);
   CallCache cache(store.folder() / CallCache::kFile);
   VlmClient client(ClientOptions(config, arguments.offline));
   VlmJudgeOptions options{.run_folder = store.folder(), .offline = arguments.offline, .now = Now};

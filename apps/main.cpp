@@ -1,13 +1,18 @@
 #include <fmt/core.h>
 
+#include <cerrno>
 #include <cstdio>
+#include <cstring>
 
 #include "apps/command_rate.h"
 #include "apps/commands.h"
 #include "core/tensor_file.h"
 #include "core/version.h"
 
-int main(int argc, char** argv) {
+namespace {
+
+/// @returns the exit code of what the words asked for.
+int Main(int argc, char** argv) {
   CLI::App app("evac: find out, without a robot, how well a policy works.", "evac");
   app.set_version_flag("--version", EVAC_VERSION);
   app.require_subcommand(1);
@@ -54,4 +59,16 @@ int main(int argc, char** argv) {
     return static_cast<int>(evac::ExitCode::kInternal);
   }
   return static_cast<int>(exit_code);
+}
+
+}  // namespace
+
+/// Results that a full disk did not take are no results, whatever was decided.
+int main(int argc, char** argv) {
+  constexpr int kInternal = static_cast<int>(evac::ExitCode::kInternal);
+  const int exit_code = Main(argc, argv);
+  const bool is_written = std::fflush(stdout) == 0 && std::ferror(stdout) == 0;
+  if (is_written || exit_code == kInternal) return exit_code;
+  std::fputs(fmt::format("evac: standard output cannot be written: {}\n", std::strerror(errno)).c_str(), stderr);
+  return kInternal;
 }

@@ -44,6 +44,14 @@ Voters VotersOf(const StudyStore& study) {
   return voters;
 }
 
+/// The last verdict of a name counts: under another judge's name people's labels would stand for what that one said.
+void CheckName(const std::string& judge) {
+  const std::string first = judge.substr(0, judge.find(':'));
+  const bool is_taken = first == "oracle" || first == "vlm" || first == "classifier";
+  if (first.empty() || is_taken || judge.find(',') != std::string::npos)
+    throw InvalidInput("--as: found '{}', wanted a name without commas that is none of oracle, vlm and classifier", judge);
+}
+
 bool HasSomebodysWord(const RatedClip& clip) { return !clip.by_rater.empty() || clip.adjudicated; }
 
 void CheckRubrics(const std::vector<RatedClip>& clips) {
@@ -181,6 +189,7 @@ std::int64_t WriteTo(const std::string& run, const std::vector<Told>& all) {
 }  // namespace
 
 Resolved ResolveStudy(const StudyStore& study, const ResolveOptions& options) {
+  CheckName(options.judge);
   RatingTally tally;
   tally.Read(study);
   const std::vector<RatedClip>& clips = tally.rated();

@@ -9,7 +9,7 @@
 namespace evac {
 
 struct ResolveOptions {
-  std::string judge = "human";  ///< the name under which the labels stand in the runs' stores
+  std::string judge = "human";  ///< the name under which the labels stand in the runs' stores; no other judge's
   bool each_rater = false;      ///< every rater's vote as well, as "human:<study>:r3"
   bool mix_rubrics = false;     ///< labels of one task by different rubrics are one judge's
 };
@@ -25,7 +25,7 @@ struct Resolved {
 /// are written as cannot_tell with the reason, never as failures. What is there already is not written again. Where a
 /// run has a verdict of votes that count no more (their raters left, or undid them), cannot_tell takes its place.
 /// Stages are written where somebody told of them: a sheet does not, nor who saw a success and marked none.
-/// @throws InvalidInput if a run has moved, or a task was rated by several rubrics and they were not to be mixed.
+/// @throws InvalidInput for a name of other judges, or if a run has moved, or a task was rated by several rubrics and they were not to be mixed.
 Resolved ResolveStudy(const StudyStore& study, const ResolveOptions& options);
 
 }  // namespace evac

@@ -1,9 +1,12 @@
 #include "core/collection.h"
 
 #include <algorithm>
+#include <charconv>
 #include <cstring>
+#include <limits>
 #include <nlohmann/json.hpp>
 #include <span>
+#include <stdexcept>
 
 #include "core/error.h"
 #include "core/file.h"
@@ -19,7 +22,25 @@ using Json = nlohmann::ordered_json;
 /// 64 bits as text: JSON's numbers are doubles to most readers.
 std::string Digits(std::uint64_t number) { return std::to_string(number); }
 
-std::uint64_t Number(const std::string& digits) { return std::stoull(digits); }
+/// @throws std::invalid_argument unless it is digits alone and fits.
+std::uint64_t Number(const std::string& digits) {
+  std::uint64_t number = 0;
+  const auto [end, error] = std::from_chars(digits.data(), digits.data() + digits.size(), number);
+  if (error != std::errc() || end != digits.data() + digits.size()) throw std::invalid_argument("'" + digits + "'");
+  return number;
+}
+
+/// A field that is a whole number of type T: the library would make one of any number, whatever it is.
+template <typename T>
+T WholeIn(const Json& page, const char* field, const std::string& where) {
+  const Json& value = page.at(field);
+  constexpr auto kMost = static_cast<std::uint64_t>(std::numeric_limits<T>::max());
+  const bool fits = value.is_number_unsigned()
+                        ? value.get<std::uint64_t>() <= kMost
+                        : value.is_number_integer() && value.get<std::int64_t>() >= std::numeric_limits<T>::min();
+  if (!fits) throw InvalidInput("{}: {} is {}, wanted a whole number", where, field, value.dump());
+  return value.get<T>();
+}
 
 /// A CSV cell: quoted where it must be.
 std::string Cell(const std::string& text) {
@@ -115,7 +136,7 @@ std::string CollectedJson(const CollectedEpisode& episode) {
 CollectedEpisode ParseCollected(const std::string& json, const std::string& where) try {
   const Json page = Json::parse(json);
   CollectedEpisode episode;
-  episode.index = page.at("index");
+  episode.index = WholeIn<std::int64_t>(page, "index", where);
   episode.task = page.at("task");
   episode.episode = page.at("episode");
   episode.initial_state = page.at("initial_state");
@@ -126,13 +147,15 @@ CollectedEpisode ParseCollected(const std::string& json, const std::string& wher
   episode.policy = page.at("policy");
   episode.parameters = page.at("parameters").get<std::map<std::string, double>>();
   episode.without = page.at("without");
-  episode.success = page.at("outcome").get<int>() == 1;
+  const int outcome = WholeIn<int>(page, "outcome", where);
+  if (outcome != 0 && outcome != 1) throw InvalidInput("{}: outcome is {}, wanted 0 or 1", where, outcome);
+  episode.success = outcome == 1;
   episode.fate = page.at("fate");
   episode.reason = page.at("reason");
   episode.stop = page.at("stop");
-  episode.frames = page.at("frames");
-  episode.contact_frames = page.at("contact_frames");
-  episode.video_scale = page.at("video_scale");
+  episode.frames = WholeIn<int>(page, "frames", where);
+  episode.contact_frames = WholeIn<int>(page, "contact_frames", where);
+  episode.video_scale = WholeIn<int>(page, "video_scale", where);
   if (episode.video_scale < 1)
     throw InvalidInput("{}: video_scale is {}, wanted 1 or more", where, episode.video_scale);
   const bool diverged = episode.stop == Name(StopReason::kDiverged);

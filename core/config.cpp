@@ -95,6 +95,28 @@ void DemandUtf8(const std::string& text, const std::filesystem::path& file) {
                      static_cast<unsigned char>(text[good]));
 }
 
+/// Whether a line is a document's begin ("---") or end ("..."): these stand so at the first letter and nowhere else.
+bool IsMarker(const std::string& line, const char* marker) {
+  return line.starts_with(marker) && (line.size() == 3 || std::isspace(static_cast<unsigned char>(line[3])));
+}
+
+/// The library reads the first of several documents and is silent about the others.
+void DemandOneDocument(const std::string& text, const std::filesystem::path& file) {
+  std::istringstream lines(text);
+  bool has_content = false, has_ended = false;
+  int number = 0;
+  for (std::string line; std::getline(lines, line);) {
+    ++number;
+    const bool begins = IsMarker(line, "---"), ends = IsMarker(line, "...");
+    const std::size_t word = line.find_first_not_of(" \t\r", begins || ends ? 3 : 0);
+    const bool says = word != std::string::npos && line[word] != '#' && line[word] != '%';
+    if (has_content && (begins || (has_ended && says)))
+      throw InvalidInput("{}:{}: found a second document, wanted one", file.string(), number);
+    has_content = has_content || says;
+    has_ended = has_ended || ends;
+  }
+}
+
 /// An escape ("\_") may stand for such bytes too. And the library writes a carriage return as it is, but reads it as a
 /// part of the line's end where a line feed follows.
 void DemandWritable(const YAML::Node& scalar, const std::filesystem::path& file) {
@@ -106,13 +128,27 @@ void DemandWritable(const YAML::Node& scalar, const std::filesystem::path& file)
                        file.string(), scalar.Mark().line + 1);
 }
 
+constexpr int kMaxDepth = 100, kMaxValues = 250'000;
+
+/// Where the check of a page stands. A value that is named within itself ("a: &x [*x]") has no end, and ten lines of
+/// aliases stand for more values than anybody waits for.
+struct Walk {
+  const std::filesystem::path& file;
+  int depth = 0, values = 0;
+};
+
 /// YAML allows keys that are lists; its parser lets the first of two equal keys win. Neither can be meant.
-void DemandPlain(const YAML::Node& node, const std::filesystem::path& file) {
+void DemandPlain(const YAML::Node& node, Walk& walk) {
+  const std::filesystem::path& file = walk.file;
+  if (walk.depth > kMaxDepth || ++walk.values > kMaxValues)
+    throw InvalidInput("{}:{}: found more than {} values, or some more than {} deep: an alias within what it names?",
+                       file.string(), node.Mark().line + 1, kMaxValues, kMaxDepth);
   std::set<std::string> keys;
   DemandWritable(node, file);
+  ++walk.depth;
   for (const auto& item : node) {
     if (!node.IsMap()) {
-      DemandPlain(item, file);
+      DemandPlain(item, walk);
       continue;
     }
     const int line = item.first.Mark().line + 1;
@@ -121,12 +157,19 @@ void DemandPlain(const YAML::Node& node, const std::filesystem::path& file) {
     DemandWritable(item.first, file);
     if (!keys.insert(item.first.Scalar()).second)
       throw InvalidInput("{}:{}: field {} is given twice", file.string(), line, item.first.Scalar());
-    DemandPlain(item.second, file);
+    DemandPlain(item.second, walk);
   }
+  --walk.depth;
+}
+
+void DemandPlain(const YAML::Node& node, const std::filesystem::path& file) {
+  Walk walk{file};
+  DemandPlain(node, walk);
 }
 
 YAML::Node Parse(const std::string& text, const std::filesystem::path& file) {
   DemandUtf8(text, file);
+  DemandOneDocument(text, file);
   try {
     YAML::Node node = YAML::Load(text);
     if (!node.IsMap())
@@ -168,7 +211,7 @@ Config Config::FromText(const std::string& text, const std::filesystem::path& na
 
 void Config::Set(const std::string& assignment) {
   const std::size_t equals = assignment.find('=');
-  if (equals == std::string::npos || equals == 0)
+  if (equals == std::string::npos || equals == 0 || assignment[equals - 1] == '.')
     throw InvalidInput("--set {}: wanted path.to.field=VALUE", assignment);
   DemandUtf8(assignment, std::filesystem::path("--set"));
   std::vector<std::string> keys;

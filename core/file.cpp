@@ -3,10 +3,10 @@
 #include <fcntl.h>
 #include <unistd.h>
 
+#include <array>
 #include <cerrno>
 #include <cstring>
 #include <fstream>
-#include <sstream>
 
 #include "core/error.h"
 
@@ -34,9 +34,12 @@ std::string ReadFile(const fs::path& path) {
   std::ifstream file(path, std::ios::binary);
   if (!file || fs::is_directory(path))
     throw InvalidInput("{}: cannot be read: {}", path.string(), std::strerror(file ? EISDIR : errno));
-  std::ostringstream bytes;
-  bytes << file.rdbuf();
-  return std::move(bytes).str();
+  std::string bytes;
+  std::array<char, 1 << 16> piece;
+  while (file.read(piece.data(), piece.size()), file.gcount() > 0)
+    bytes.append(piece.data(), static_cast<std::size_t>(file.gcount()));
+  if (file.bad()) throw InvalidInput("{}: cannot be read to its end: {}", path.string(), std::strerror(errno));
+  return bytes;
 }
 
 void SyncAndRename(const fs::path& from, const fs::path& to) {

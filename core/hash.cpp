@@ -49,6 +49,7 @@ std::string Sha256HexOfFile(const std::filesystem::path& path) {
   while (file.read(buffer.data(), buffer.size()), file.gcount() > 0) {
     EVP_DigestUpdate(context.get(), buffer.data(), static_cast<std::size_t>(file.gcount()));
   }
+  if (file.bad()) throw InvalidInput("{}: cannot be read to its end: {}", path.string(), std::strerror(errno));
   return Hex(context.get());
 }
 

@@ -137,6 +137,8 @@ void AppendNumber(std::string& bytes, double number) {
     const double low = static_cast<double>(std::numeric_limits<T>::min()),
                  beyond = std::ldexp(1.0, std::numeric_limits<T>::digits);
     if (!(number >= low && number < beyond)) throw InvalidInput("array: {} does not fit its integer type", number);
+  } else if (std::isfinite(number) && !(std::abs(number) <= static_cast<double>(std::numeric_limits<T>::max()))) {
+    throw InvalidInput("array: {} does not fit its floating-point type", number);
   }
   const T value = static_cast<T>(number);
   bytes.append(reinterpret_cast<const char*>(&value), sizeof value);

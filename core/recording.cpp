@@ -44,15 +44,20 @@ void CheckOptions(const RecordingOptions& options) {
     throw InvalidInput("recording: a camera is named twice");
 }
 
+/// The tree's episode that the folder is, or is the videos of; empty: neither, or a folder that holds all itself.
+fs::path TreeEpisode(const fs::path& folder) {
+  if (fs::exists(folder / "action.npy") || fs::exists(folder / "proprio_stats.h5")) return {};
+  if (IsTreeEpisode(folder)) return folder;
+  return folder.filename() == "videos" && IsTreeEpisode(folder.parent_path()) ? folder.parent_path() : fs::path();
+}
+
 Recording ReadLayout(const fs::path& folder, const RecordingOptions& options) {
   if (fs::exists(folder / "action.npy")) return ReadExampleLayout(folder, options);
   if (fs::exists(folder / "proprio_stats.h5")) {
     return ReadClipLayout({folder.filename().string(), folder, folder, folder / "proprio_stats.h5"}, options);
   }
-  if (IsTreeEpisode(folder)) return ReadClipLayout(TreeFolders(folder), options);
-  if (IsTreeEpisode(folder.parent_path()) && folder.filename() == "videos") {
-    return ReadClipLayout(TreeFolders(folder.parent_path()), options);
-  }
+  if (const fs::path episode = TreeEpisode(folder); !episode.empty())
+    return ReadClipLayout(TreeFolders(episode), options);
   throw InvalidInput(
       "{}: no recording; wanted a folder with action.npy, one with proprio_stats.h5, or an episode of an AgiBot World "
       "tree: ROOT/observations/<task>/<episode>",
@@ -71,6 +76,25 @@ Recording ReadRecording(const fs::path& folder, const RecordingOptions& options)
   recording.every_nth = options.every_nth;
   recording.source += fmt::format(", {} steps of {:.4g} s", recording.arms.size(), recording.period_s);
   return recording;
+}
+
+std::vector<Arms> ToldTrack(const Recording& recording) {
+  if (recording.told.empty()) return recording.arms;
+  std::vector<Arms> track = recording.told;
+  track.front() = recording.arms.front();
+  return track;
+}
+
+std::vector<fs::path> FoldersOf(const fs::path& folder) {
+  const fs::path absolute = fs::weakly_canonical(folder);
+  const fs::path episode = TreeEpisode(absolute);
+  if (episode.empty()) return {absolute};
+  const ClipFolders places = TreeFolders(episode);
+  std::vector<fs::path> folders = {episode};
+  for (const fs::path& part : {places.pages, places.proprio.parent_path()}) {
+    if (fs::is_directory(part)) folders.push_back(part);
+  }
+  return folders;
 }
 
 Recording Thinned(Recording recording, double period_s) {

@@ -49,6 +49,14 @@ struct Recording {
 ///   moves against its mount. `Error::kind` is one word for the reason (docs/formats/recording.md).
 Recording ReadRecording(const std::filesystem::path& folder, const RecordingOptions& options = {});
 
+/// What a model is told of the arms, [T]: where they were at step 0, then where they were told to be, or were if that was
+/// not recorded.
+std::vector<Arms> ToldTrack(const Recording& recording);
+
+/// The folders that hold a recording's files: `folder` alone, or those of an episode in an AgiBot World tree that
+/// exist (of its videos, its cameras' pages, its arms).
+std::vector<std::filesystem::path> FoldersOf(const std::filesystem::path& folder);
+
 /// A recording of the head camera alone, in files of any name.
 struct RecordingFiles {
   std::filesystem::path frame;       ///< PNG: the first image

@@ -127,8 +127,10 @@ double AddVideoCamera(const Context& context, const std::string& name, double pe
 void AddStillCamera(const Context& context, const std::vector<std::string>& names, Recording& recording) {
   const fs::path frame = context.folders.images / "frame.png";
   if (names != std::vector<std::string>{"head"} || !fs::exists(frame)) {
-    throw InvalidInput("{}: missing: camera {} has no video", VideoOf(context.folders, names.back()).string(),
-                       names.back())
+    // The last of those without: the first one has none either, but its first frame could do.
+    std::string missing = names.front();
+    for (const std::string& name : names) missing = fs::exists(VideoOf(context.folders, name)) ? missing : name;
+    throw InvalidInput("{}: missing: camera {} has no video", VideoOf(context.folders, missing).string(), missing)
         .Called("missing_camera");
   }
   recording.first_images = {ReadPng(frame)};

@@ -37,6 +37,11 @@ std::string ReadText(const Config& page, const std::string& key) {
   return text;
 }
 
+/// Of two ways to say the same only one may be there: which of them was meant?
+void DemandNone(const Config& page, const std::string& given, std::initializer_list<const char*> others) {
+  for (const char* other : others) page.Require(!page.Has(other), other, "none where " + given + " is given");
+}
+
 /// Axes as OpenCV's: z towards the point looked at, x right, y down. `up` is what is up in the picture.
 Eigen::Matrix3d LookAt(const Config& page, const Vector3d& position_m) {
   const Vector3d forward = ReadVector(page, "look_at_m") - position_m;
@@ -52,6 +57,7 @@ Eigen::Matrix3d LookAt(const Config& page, const Vector3d& position_m) {
 
 Eigen::Matrix3d ReadRotation(const Config& page, const Vector3d& position_m) {
   if (!page.Has("quat_xyzw")) return LookAt(page, position_m);
+  DemandNone(page, "quat_xyzw", {"look_at_m", "up"});
   const auto q = page.Get<std::vector<double>>("quat_xyzw");
   const bool unit = q.size() == 4 && std::abs(Eigen::Vector4d(q.data()).norm() - 1) < 1e-3;
   page.Require(unit, "quat_xyzw", "four numbers x, y, z, w of length 1");
@@ -62,6 +68,7 @@ void ReadIntrinsics(const Config& page, Camera& camera) {
   camera.cx_px = page.Get<double>("cx_px", camera.width_px / 2.0);
   camera.cy_px = page.Get<double>("cy_px", camera.height_px / 2.0);
   if (page.Has("fovy_deg")) {
+    DemandNone(page, "fovy_deg", {"fx_px", "fy_px"});
     const auto fovy_deg = page.Get<double>("fovy_deg");
     page.Require(fovy_deg > 1 && fovy_deg < 170, "fovy_deg", "degrees between 1 and 170");
     camera.fx_px = camera.fy_px = camera.height_px / 2.0 / std::tan(fovy_deg / 2 * kDegree);

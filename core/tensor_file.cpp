@@ -195,8 +195,14 @@ TensorFileWriter::TensorFileWriter(const fs::path& path, std::span<const TensorD
   file_ = ::open(partial_.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0644);
   if (file_ < 0) throw SystemError(partial_, "write");
   const std::uint64_t length = header.size();
-  Write(&length, sizeof length);
-  Write(header.data(), header.size());
+  try {
+    Write(&length, sizeof length);
+    Write(header.data(), header.size());
+  } catch (const TensorError&) {  // what is not constructed is not destroyed either
+    ::close(file_);
+    ::unlink(partial_.c_str());
+    throw;
+  }
   for (const TensorDeclaration& tensor : tensors) missing_ += tensor.ByteCount();
 }
 

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "core/hash.h"
+#include "core/recording.h"
 
 namespace evac {
 namespace {
@@ -78,7 +79,9 @@ std::string HashOf(const Config& page, const Suite& suite, bool with_models) {
       text << "file " << i << " of " << policy.name << "@" << policy.checkpoint << " " << HashOfTree(policy.files[i])
            << "\n";
   }
-  if (suite.recording) text << "recording " << HashOfTree(*suite.recording) << "\n";
+  if (suite.recording) {
+    for (const fs::path& folder : FoldersOf(*suite.recording)) text << "recording " << HashOfTree(folder) << "\n";
+  }
   return Sha256Hex(text.str());
 }
 

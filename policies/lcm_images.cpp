@@ -28,6 +28,11 @@ cv::Size JpegSize(std::span<const std::uint8_t> bytes) {
   std::size_t at = 2;  // behind the start-of-image marker
   while (at + 9 <= bytes.size() && bytes[at] == 0xFF) {
     const int marker = bytes[at + 1];
+    if (marker == 0xFF) {  // one that fills up
+      ++at;
+      continue;
+    }
+    if (marker < 0xC0 || (marker >= 0xD0 && marker <= 0xD9)) break;  // no length follows: in no header
     const bool is_frame = marker >= 0xC0 && marker <= 0xCF && marker != 0xC4 && marker != 0xC8 && marker != 0xCC;
     if (is_frame) return {bytes[at + 7] << 8 | bytes[at + 8], bytes[at + 5] << 8 | bytes[at + 6]};
     at += 2 + static_cast<std::size_t>(bytes[at + 2] << 8 | bytes[at + 3]);

@@ -136,8 +136,15 @@ struct LcmPolicy::Impl {
     lane.answer = Failure{StopReason::kPolicyTimeout,
                           fmt::format("no answer to {} within {:.1f} s (sent {} times; deadline {} s){}", what,
                                       waited_s, lane.sendings, Deadline_s(lane), heard)};
-    const bool was_silent = !last_heard || *last_heard < lane.answerable_at;
-    if (was_silent && options.restart) options.restart();
+    RestartIfSilentSince(lane.answerable_at);
+  }
+
+  /// One that was started again since then owes no answer: of those that it leaves waiting, the first restarts it.
+  void RestartIfSilentSince(Clock::time_point asked) {
+    const auto is_later = [asked](const std::optional<Clock::time_point>& when) { return when && *when >= asked; };
+    if (!options.restart || is_later(last_heard) || is_later(restarted)) return;
+    restarted = Clock::now();
+    options.restart();
   }
 
   std::optional<std::string> WhyGone() const { return options.why_gone ? options.why_gone() : std::nullopt; }
@@ -223,7 +230,7 @@ struct LcmPolicy::Impl {
   std::int64_t next_episode = 0;
   std::set<std::int64_t> gave_up;                     ///< episodes that ended by timeout
   std::map<std::string, std::int64_t> last_sequence;  ///< by server
-  std::optional<Clock::time_point> last_heard;
+  std::optional<Clock::time_point> last_heard, restarted;
   Clock::time_point last_answer;  ///< to a start or a request of this Act, or when it began
   int noise = 0;  ///< undecodable replies since the last Act
   Counters counters;

@@ -25,7 +25,8 @@ struct LcmPolicyOptions {
   Pacing pacing{};
   /// Asked while waiting: why nobody will ever answer (PolicyProcess::WhyGone), so that nobody waits for the deadline.
   std::function<std::optional<std::string>()> why_gone{};
-  /// Called when the policy was silent for a whole deadline: it hangs (PolicyProcess::Restart). May be empty.
+  /// Called when the policy was silent for a whole deadline, once for all who wait: it hangs (PolicyProcess::Restart).
+  /// May be empty.
   std::function<void()> restart{};
   /// Asked while waiting: the user wants an end. Who waits gets a Failure at once; nobody is to keep it. May be empty.
   std::function<bool()> interrupted{};

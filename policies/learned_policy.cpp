@@ -79,12 +79,14 @@ struct LearnedPolicy::Network {
   LearnedNet net;
 };
 
-LearnedPolicy::LearnedPolicy(const std::filesystem::path& weights, int chunk_size) : chunk_size_(chunk_size) {
+LearnedPolicy::LearnedPolicy(const std::filesystem::path& weights, int chunk_size, std::string as_task)
+    : chunk_size_(chunk_size), as_task_(std::move(as_task)) {
   if (chunk_size < 1 || chunk_size > kLearnedChunk)
     throw InvalidInput("learned: found chunk size {}, wanted 1 … {}, what the network says at once", chunk_size,
                        kLearnedChunk);
   WeightFile file(weights, kLearnedFormat);
   network_ = std::make_unique<const Network>(file, Stem(weights));
+  if (!as_task_.empty()) IndexOfTask(as_task_, "");
 }
 
 LearnedPolicy::~LearnedPolicy() = default;
@@ -100,12 +102,19 @@ PolicySpec LearnedPolicy::Spec() const {
   return spec;
 }
 
+std::int64_t LearnedPolicy::IndexOfTask(const std::string& name, const char* remedy) const {
+  const std::vector<std::string>& tasks = network_->shape.tasks;
+  const auto known = std::find(tasks.begin(), tasks.end(), name);
+  if (known == tasks.end())
+    throw InvalidInput("learned@{}: task {} is none it learned, wanted one of {}{}", network_->name, name,
+                       fmt::join(tasks, ", "), remedy);
+  return known - tasks.begin();
+}
+
 void LearnedPolicy::Reset(SceneId scene, const Task& task, std::uint64_t) {
   const LearnedShape& shape = network_->shape;
-  const auto known = std::find(shape.tasks.begin(), shape.tasks.end(), task.id);
-  if (known == shape.tasks.end())
-    throw InvalidInput("learned@{}: task {} is none it learned, wanted one of {}", network_->name, task.id,
-                       fmt::join(shape.tasks, ", "));
+  const std::int64_t task_index =
+      as_task_.empty() ? IndexOfTask(task.id, "; --task takes any task for one of these") : IndexOfTask(as_task_, "");
   if (task.arms != shape.arms)
     throw InvalidInput("learned@{}: task {} has arms {}, in training they were {}", network_->name, task.id,
                        fmt::join(task.arms, ", "), fmt::join(shape.arms, ", "));
@@ -114,7 +123,7 @@ void LearnedPolicy::Reset(SceneId scene, const Task& task, std::uint64_t) {
                        task.period_s, network_->period_s);
   Episode episode;
   episode.task = task;
-  episode.task_index = known - shape.tasks.begin();
+  episode.task_index = task_index;
   for (const Camera& trained : network_->cameras) {
     const auto found =
         std::find_if(task.cameras.begin(), task.cameras.end(), [&](const Camera& c) { return c.name == trained.name; });

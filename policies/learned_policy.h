@@ -20,8 +20,11 @@ class LearnedPolicy : public Policy {
  public:
   /// @param weights     of `evac train policy`
   /// @param chunk_size  targets per chunk, the first of those that the network says
-  /// @throws InvalidInput naming the file and what about it is wrong; or a chunk longer than the network's.
-  LearnedPolicy(const std::filesystem::path& weights, int chunk_size);
+  /// @param as_task     one of the tasks it learned: every task is taken for this one, whatever its name (a recorded
+  ///                    suite's is named after its recording); empty: tasks go by their own names
+  /// @throws InvalidInput naming the file and what about it is wrong; a chunk longer than the network's; an `as_task`
+  ///   that it did not learn.
+  LearnedPolicy(const std::filesystem::path& weights, int chunk_size, std::string as_task = "");
   ~LearnedPolicy() override;
 
   std::string Name() const override { return "learned"; }
@@ -45,9 +48,12 @@ class LearnedPolicy : public Policy {
   /// The first moment: as in training, where a recording's first frame counts.
   static void Begin(const Arms& arms, Episode& episode);
   ActionChunk Answer(Episode& episode, const Observation& observation) const;
+  /// Among those it learned. @throws InvalidInput if it is none of them.
+  std::int64_t IndexOfTask(const std::string& name, const char* remedy) const;
 
   std::unique_ptr<const Network> network_;
   int chunk_size_;
+  std::string as_task_;
   std::map<SceneId, Episode> episodes_;
 };
 

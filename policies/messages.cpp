@@ -100,6 +100,10 @@ Camera FromWire(const camera_t& wire) {
   const std::string where = fmt::format("camera {}", wire.name);
   const double pinhole[] = {wire.fx_px, wire.fy_px, wire.cx_px, wire.cy_px};
   CheckFinite(pinhole, where, "fx fy cx cy");
+  if (wire.width_px < 1 || wire.height_px < 1 || wire.fx_px <= 0 || wire.fy_px <= 0) {
+    throw InvalidInput("{}: size {}x{}, fx_px {}, fy_px {}, wanted all above 0", where, wire.width_px, wire.height_px,
+                       wire.fx_px, wire.fy_px);
+  }
   if (wire.mount < camera_t::BASE || wire.mount > camera_t::RIGHT_GRIPPER) {
     throw InvalidInput("{}: mount is {}, wanted 0 (base), 1 (left gripper) or 2 (right gripper)", where, wire.mount);
   }

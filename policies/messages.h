@@ -41,7 +41,7 @@ camera_t ToWire(const Camera& camera);
 spec_t ToWire(const PolicySpec& spec);
 
 /// Each throws InvalidInput with field, found and wanted. `where` begins the message: "target 3 of 16, right arm".
-/// Accepted are finite numbers and quaternions whose norm is within 1e-3 of 1.
+/// Accepted are finite numbers, quaternions whose norm is within 1e-3 of 1, and cameras of some size and focal length.
 ArmState FromWire(const arm_state_t& arm, const std::string& where);
 Camera FromWire(const camera_t& camera);
 PolicySpec FromWire(const spec_t& spec);

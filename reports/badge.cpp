@@ -22,14 +22,16 @@ struct Badge {
   const char* colour = kGrey;
 };
 
-/// Fail before inconclusive before pass.
-int Weight(GateOutcome outcome) {
-  return outcome == GateOutcome::kFail ? 2 : outcome == GateOutcome::kInconclusive ? 1 : 0;
+/// Fail before inconclusive before pass; a pass of older data is none of these.
+int Weight(const ShownGate& gate) {
+  const GateOutcome outcome = gate.decision.outcome;
+  if (outcome == GateOutcome::kFail) return gate.is_current ? 4 : 3;
+  if (outcome == GateOutcome::kInconclusive) return 2;
+  return gate.is_current ? 0 : 1;
 }
 
 Badge OfGates(const std::vector<ShownGate>& gates) {
-  const auto worst =
-      std::ranges::max_element(gates, {}, [](const ShownGate& gate) { return Weight(gate.decision.outcome); });
+  const auto worst = std::ranges::max_element(gates, {}, Weight);
   Badge badge{Name(worst->decision.outcome), kGrey};
   const auto& rules = worst->decision.rules;
   const auto rule = std::ranges::find_if(rules, [&](const RuleDecision& one) {

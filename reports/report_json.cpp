@@ -55,10 +55,10 @@ Json PairsJson(const RunSummary& summary, const PairTable& table) {
                {"both_fail", table.both_fail},
                {"uncounted", table.uncounted},
                {"unpaired", table.unpaired},
-               {"effective_pairs", table.effective_pairs},
-               {"mcnemar_p_exact", table.Counted() > 0 ? Json(table.test.p_exact) : Json(nullptr)},
-               {"agreement", JsonOf(table.agreement)},
-               {"flips", Json::array()}};
+               {"effective_pairs", table.effective_pairs}};
+  Put(json, "mcnemar_p_exact", table.Counted() > 0 ? Number(table.test.p_exact) : Undefined{"no pairs"});
+  json["agreement"] = JsonOf(table.agreement);
+  json["flips"] = Json::array();
   for (const EpisodePair& pair : table.pairs) {
     const JudgedEpisode& real = summary.episodes[pair.real];
     const JudgedEpisode& other = summary.episodes[pair.other];

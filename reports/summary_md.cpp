@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cctype>
 
 #include "reports/counted_judges.h"
@@ -13,6 +14,14 @@ namespace evac {
 namespace {
 
 constexpr std::size_t kReserve = 4000;  // for provenance and the closing line
+
+/// Inside a tag, where Markdown's marks mean nothing, but an empty line would end the tag.
+std::string TagText(std::string_view text) {
+  std::string safe = Escaped(text);
+  std::ranges::replace_if(
+      safe, [](char c) { return c == '\n' || c == '\t'; }, ' ');
+  return safe;
+}
 
 /// Text that stops growing at a limit and knows how many rows it left out.
 class Bounded {
@@ -78,7 +87,7 @@ void AddFindings(const RunSummary& summary, Bounded& page) {
 void AddCounterExamples(const GateDecision& decision, Bounded& page) {
   for (const RuleDecision& rule : decision.rules) {
     if (rule.counter_examples.empty() || page.IsFull()) continue;
-    page.Add(fmt::format("<details><summary>{}: {} where only the baseline succeeded</summary>\n\n", Escaped(rule.name),
+    page.Add(fmt::format("<details><summary>{}: {} where only the baseline succeeded</summary>\n\n", TagText(rule.name),
                          Counted(rule.flips_worse, "initial state")));
     page.Add("| task | initial state | seed | candidate | baseline |\n|---|---|---|---|---|\n");
     for (const CounterExample& example : rule.counter_examples) {
@@ -108,7 +117,7 @@ void AddFlips(const RunSummary& summary, const WorldComparison& comparison, Boun
   for (const PairTable& table : comparison.tables) flips += table.real_only + table.other_only;
   if (flips == 0 || page.IsFull()) return;
   page.Add(fmt::format("<details><summary>{} between {} and {}</summary>\n\n", Counted(flips, "flip"),
-                       Escaped(comparison.real), Escaped(comparison.other)));
+                       TagText(comparison.real), TagText(comparison.other)));
   page.Add(fmt::format("| task | policy | initial state | seed | {} | {} |\n|---|---|---|---|---|---|\n",
                        MarkdownText(comparison.real), MarkdownText(comparison.other)));
   for (const PairTable& table : comparison.tables) AddFlipsOf(summary, table, page);

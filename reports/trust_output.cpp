@@ -104,7 +104,7 @@ Json TaskJson(const TaskTrust& task, const TrustReport& report) {
   json["bias"] = JsonOf(task.bias);
   json["same_outcome"] = JsonOf(task.same);
   json["kappa"] = JsonOf(task.agreement.kappa);
-  json["mcnemar_p_exact"] = task.pairs.n() > 0 ? Json(task.test.p_exact) : Json(nullptr);
+  Put(json, "mcnemar_p_exact", task.pairs.n() > 0 ? Number(task.test.p_exact) : Undefined{"no pairs"});
   json["pearson"] = JsonOf(task.correlation);
   json["more_pairs"] = task.more ? Json(*task.more) : Json(nullptr);
   if (!task.more) json["more_pairs_reason"] = task.more.reason();

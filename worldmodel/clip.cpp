@@ -112,7 +112,7 @@ Camera Cropped(const Camera& camera, const Crop& crop, const cv::Size& picture_p
 
 ClipSource ReadClipSource(const Recording& recording, const EpisodeTruth* truth, int shrink) {
   ClipSource source;
-  source.arms = recording.told.empty() ? recording.arms : recording.told;
+  source.arms = ToldTrack(recording);
   const std::size_t steps = source.arms.size();
   for (const Camera& camera : recording.cameras)
     source.cameras.push_back(Resized(camera, camera.width_px / shrink, camera.height_px / shrink));

@@ -58,6 +58,12 @@ void Show(const Pictures& pictures, std::span<const Arms> targets, const std::ve
 
 }  // namespace
 
+void CheckViews(const Task& task, int views, const std::string& who) {
+  if (task.cameras.size() == static_cast<std::size_t>(views)) return;
+  throw InvalidInput("{}: task {} has {} cameras, the network imagines {} views", who, task.id, task.cameras.size(),
+                     views);
+}
+
 EvacWorld::EvacWorld(Imaginer imaginer, FirstScene first_scene, EvacWorldOptions options)
     : imaginer_(std::move(imaginer)), first_scene_(std::move(first_scene)), options_(std::move(options)) {
   if (options_.threads < 1 || options_.threads > 256)
@@ -69,9 +75,7 @@ WorldStep EvacWorld::Reset(SceneId scene, const Task& task, const InitialState& 
   if (std::abs(task.period_s - period_s) > 1e-6)
     throw InvalidInput("world {}: its frames are {:.4g} s apart, those of task {} {:.4g} s", options_.name, period_s,
                        task.id, task.period_s);
-  if (task.cameras.size() != static_cast<std::size_t>(imaginer_.config().views))
-    throw InvalidInput("world {}: task {} has {} cameras, the network imagines {} views", options_.name, task.id,
-                       task.cameras.size(), imaginer_.config().views);
+  CheckViews(task, imaginer_.config().views, "world " + options_.name);
   const InitialScene start = first_scene_(task, initial);
   CheckFits(task, start, options_.name);
   const nn::LibraryThreads threads(ThreadsPerScene());

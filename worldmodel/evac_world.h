@@ -13,6 +13,10 @@ namespace evac {
 /// The first frame of an initial state in the real world. @throws Error if nobody has seen it.
 using FirstScene = std::function<InitialScene(const Task& task, const InitialState& initial)>;
 
+/// @param who  for the message: "world evac".
+/// @throws InvalidInput unless the task has a camera for each view that the network imagines.
+void CheckViews(const Task& task, int views, const std::string& who);
+
 struct EvacWorldOptions {
   std::string name = "evac";
   int threads = 2;  ///< in all

@@ -83,9 +83,12 @@ void AddImagine(CLI::App& app, ExitCode& exit_code) {
   AddInputs(*command, *arguments);
   AddShared(*command, *arguments);
   auto maps_only = std::make_shared<bool>(false);
-  command->add_flag("--maps-only", *maps_only,
-                    "write OUT/maps/frame_%05d.png alone, what the network would be told; needs no weights");
+  CLI::Option* maps =
+      command->add_flag("--maps-only", *maps_only,
+                        "write OUT/maps/frame_%05d.png alone, what the network would be told; needs no weights");
   AddModel(*command, *arguments);
+  maps->excludes("--statistics", "--solver", "--steps", "--eta", "--cfg", "--cfg-rescale", "--seed", "--dtype",
+                 "--device", "--threads", "--png", "--restart");  // nothing is imagined
   command->footer(
       "Examples:\n"
       "  evac imagine --maps-only --recording path/to/recording --out out/maps\n"

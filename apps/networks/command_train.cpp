@@ -5,15 +5,11 @@
 #include <opencv2/imgproc.hpp>
 
 #include "apps/commands.h"
-#include "apps/interrupts.h"
 #include "apps/network_parts.h"
 #include "apps/networks/codec_identity.h"
 #include "apps/networks/packed_clips.h"
-#include "apps/networks/train_arguments.h"
-#include "apps/networks/training_page.h"
+#include "apps/networks/run_training.h"
 #include "core/file.h"
-#include "worldmodel/nn/memory.h"
-#include "worldmodel/nn/threads.h"
 #include "worldmodel/train/train_forecast.h"
 #include "worldmodel/train/train_world.h"
 
@@ -24,30 +20,15 @@ namespace fs = std::filesystem;
 
 using Arguments = std::shared_ptr<TrainArguments>;
 
-/// @param run  (const train::JobPlace&, const Options&) → how it ended
-template <class Options, class Run>
-ExitCode RunTraining(const TrainArguments& arguments, const char* section, const char* file, const Run& run) {
-  Options options;
-  ReadTrainingPage(arguments.training, section, arguments.settings, SettingsOf(options));
-  Override(arguments, options.job.trainer);
-  const CatchInterrupts catch_interrupts;
-  TrainingProgress progress(stderr);
-  const train::JobPlace place = PlaceOf(arguments, progress);
-  CheckHoldouts(place.shards);
-  nn::KeepFreedMemory();
-  const nn::LibraryThreads threads(LibraryThreadsOf(place, options.job));
-  return End(run(place, options), arguments.out, file);
-}
-
 ExitCode RunCodec(const TrainArguments& arguments) {
   const auto run = [&](const train::JobPlace& place, const train::CodecOptions& options) {
     return TrainCodec(place, options, arguments.init);
   };
-  return RunTraining<train::CodecOptions>(arguments, "codec", "codec.safetensors", run);
+  return RunTraining<train::CodecOptions>(arguments, {"codec", "codec.safetensors"}, run);
 }
 
 ExitCode RunForecast(const TrainArguments& arguments) {
-  return RunTraining<train::ForecastOptions>(arguments, "forecast", "forecast.safetensors", train::TrainForecast);
+  return RunTraining<train::ForecastOptions>(arguments, {"forecast", "forecast.safetensors"}, train::TrainForecast);
 }
 
 /// OUT/strips/step_00001200.png
@@ -70,7 +51,7 @@ ExitCode RunWorld(const TrainArguments& arguments) {
   const auto run = [&](const train::JobPlace& place, const train::WorldOptions& options) {
     return TrainWorld(place, options, start, look);
   };
-  return RunTraining<train::WorldOptions>(arguments, "world", "weights.safetensors", run);
+  return RunTraining<train::WorldOptions>(arguments, {"world", "weights.safetensors"}, run);
 }
 
 CLI::Option* AddInit(CLI::App& command, TrainArguments& arguments, const char* what) {

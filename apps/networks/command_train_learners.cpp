@@ -9,32 +9,16 @@
 #include "apps/network_parts.h"
 #include "apps/networks/judge_run_clips.h"
 #include "apps/networks/judge_shard_clips.h"
-#include "apps/networks/train_arguments.h"
+#include "apps/networks/run_training.h"
 #include "apps/networks/train_judge.h"
 #include "apps/networks/train_policy.h"
-#include "apps/networks/training_page.h"
 #include "worldmodel/nn/memory.h"
-#include "worldmodel/nn/threads.h"
 
 /// evac train judge, evac train policy: the small networks beside the world model.
 namespace evac {
 namespace {
 
-/// What both commands do around their training. @param section  of the training page
-/// @param train  (place, options) → the summary
-template <class Options, class Train>
-ExitCode RunLearner(const TrainArguments& arguments, const std::string& section, const Train& train) {
-  Options options;
-  ReadTrainingPage(arguments.training, section, arguments.settings, SettingsOf(options));
-  Override(arguments, options.job.trainer);
-  const CatchInterrupts catch_interrupts;
-  TrainingProgress progress(stderr);
-  const train::JobPlace place = PlaceOf(arguments, progress);
-  CheckHoldouts(place.shards);
-  nn::KeepFreedMemory();
-  const nn::LibraryThreads threads(1);
-  return End(train(place, options), arguments.out, (section + ".safetensors").c_str());
-}
+const TrainingKind kJudge{"judge", "judge.safetensors", true}, kPolicy{"policy", "policy.safetensors", true};
 
 std::optional<ShardCodec> CodecOf(const TrainArguments& arguments, const train::JobPlace& place) {
   if (arguments.codec.empty()) return std::nullopt;
@@ -77,8 +61,8 @@ ExitCode CalibrateOnly(const TrainArguments& arguments) {
 
 ExitCode RunJudge(const TrainArguments& arguments) {
   if (arguments.calibrate_only) return CalibrateOnly(arguments);
-  return RunLearner<JudgeTrainingOptions>(
-      arguments, "judge", [&](const train::JobPlace& place, const JudgeTrainingOptions& options) {
+  return RunTraining<JudgeTrainingOptions>(
+      arguments, kJudge, [&](const train::JobPlace& place, const JudgeTrainingOptions& options) {
         return TrainJudge(place, options, ShardJudgeData(arguments, place).data);
       });
 }
@@ -89,14 +73,14 @@ struct LabelledArguments {
 };
 
 ExitCode RunJudgeFromLabels(const LabelledArguments& arguments) {
-  return RunLearner<JudgeTrainingOptions>(arguments.training, "judge",
-                                          [&](const train::JobPlace& place, JudgeTrainingOptions options) {
-                                            options.longest = 1;  // runs' clips are as long as those it will judge
-                                            LabelledRuns runs = arguments.runs;
-                                            runs.seed = options.job.trainer.seed;
-                                            const LabelledClips clips = ReadLabelledClips(runs, place.say);
-                                            return TrainJudge(place, options, {*clips.learn, *clips.holdout});
-                                          });
+  const auto run = [&](const train::JobPlace& place, JudgeTrainingOptions options) {
+    options.longest = 1;  // runs' clips are as long as those it will judge
+    LabelledRuns runs = arguments.runs;
+    runs.seed = options.job.trainer.seed;
+    const LabelledClips clips = ReadLabelledClips(runs, place.say);
+    return TrainJudge(place, options, {*clips.learn, *clips.holdout});
+  };
+  return RunTraining<JudgeTrainingOptions>(arguments.training, kJudge, run);
 }
 
 /// What is wrong with the side of a picture, or nothing.
@@ -108,8 +92,8 @@ std::string ComplaintOfSide(const std::string& text) {
 }
 
 ExitCode RunPolicy(const TrainArguments& arguments) {
-  return RunLearner<PolicyOptions>(
-      arguments, "policy", [&](const train::JobPlace& place, const PolicyOptions& options) {
+  return RunTraining<PolicyOptions>(
+      arguments, kPolicy, [&](const train::JobPlace& place, const PolicyOptions& options) {
         const std::optional<ShardCodec> codec = CodecOf(arguments, place);
         return TrainPolicy(place, options, codec ? &*codec : nullptr, arguments.keep_steps);
       });

@@ -89,6 +89,7 @@ void CheckTrainedFor(const SuiteEvac& evac, const nn::ModelConfig& config, const
     const std::string of_task = fmt::format("{}: task {}", who, task.id);
     trained.CheckCameras(NamesOf(task.cameras), of_task);
     trained.CheckArms(task.arms, of_task);
+    CheckViews(task, config.views, who);
   }
 }
 

@@ -57,7 +57,7 @@ class Measuring {
     RequireSameParts();
     StateReality(out_, suite_);
     TakeRealityOf(store);
-    const ExitCode exit_code = Evaluate(suite_, store, {});
+    const ExitCode exit_code = Evaluate(suite_, store, {.part_of = "evac fidelity"});
     if (exit_code != ExitCode::kOk) return exit_code;
     OracleJudge oracle(store);  // whatever judges the suite asks for: it says what is true
     JudgeWithProgress(oracle, store, {});

@@ -82,7 +82,7 @@ std::vector<Recording> ReadAll(const fs::path& folder, const SuiteWorld& model, 
 
 /// Where the arms were told to be where that is recorded, else where they were.
 std::vector<Arms> ActionsOf(const Recording& recording) {
-  const std::vector<Arms>& track = recording.told.empty() ? recording.arms : recording.told;
+  const std::vector<Arms> track = ToldTrack(recording);
   return {track.begin() + 1, track.end()};
 }
 

@@ -10,6 +10,7 @@
 #include "worldmodel/action_statistics.h"
 #include "worldmodel/conditioning.h"
 #include "worldmodel/nn/model_config.h"
+#include "worldmodel/trained_for.h"
 
 namespace evac {
 
@@ -26,7 +27,7 @@ struct SamplerArguments {
   int threads = 0;  ///< 0: one per core
 };
 
-/// What both modes of `evac imagine` are told; the maps alone need neither weights nor sampler.
+/// What both modes of `evac imagine` are told; the maps alone need no weights, and no sampler.
 struct ImagineArguments {
   ImagineInputs inputs;
   std::string weights;  ///< a checkpoint
@@ -58,6 +59,11 @@ ActionStatistics StatisticsOf(const ImagineArguments& arguments);
 /// How the maps of pictures of this size are drawn.
 PoseMapOptions MapOptions(const ImagineArguments& arguments, const nn::ModelConfig& config);
 
+/// ReadImagineStart, where what nobody asked for otherwise is as the network was trained; `inputs` says so then.
+/// @throws InvalidInput also for what the network was not trained for.
+ImagineStart StartAsTrained(ImagineInputs& inputs, const nn::ModelConfig& config, const PoseMapOptions& drawn,
+                            const TrainedFor& trained);
+
 /// How many frames there are to imagine.
 std::size_t FrameCount(const ImagineStart& start, const nn::ModelConfig& config, std::size_t chunks);
 
@@ -73,8 +79,8 @@ class MapPainter {
   PoseMapOptions options_;
 };
 
-/// OUT/maps/frame_%05d.png: needs no weights.
-ExitCode ImagineMaps(const ImagineArguments& arguments);
+/// OUT/maps/frame_%05d.png: needs no weights; of weights that are named it reads what they were trained for.
+ExitCode ImagineMaps(ImagineArguments arguments);
 
 /// OUT/imagined.mp4 and imagined.json, maps, and frames if asked. Killed at any moment and called again, it goes on
 /// after the last whole chunk and writes the same bytes.

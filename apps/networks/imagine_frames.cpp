@@ -18,7 +18,6 @@
 #include "worldmodel/nn/memory.h"
 #include "worldmodel/nn/threads.h"
 #include "worldmodel/nn/weights.h"
-#include "worldmodel/shard_writer.h"
 #include "worldmodel/trained_for.h"
 
 namespace evac {
@@ -73,20 +72,6 @@ ImaginerOptions OptionsOf(const ImagineArguments& arguments, const nn::ModelConf
   options.conditioning.statistics = StatisticsOf(arguments);
   options.conditioning.pose_map = MapOptions(arguments, config);
   return options;
-}
-
-/// What nobody asked for otherwise is read as the network was trained.
-void FillIn(ImagineInputs& inputs, const TrainedFor& trained) {
-  if (inputs.cameras.empty()) inputs.cameras = trained.cameras;
-  inputs.period_s = trained.period_s.value_or(inputs.period_s);
-  inputs.read_told = trained.arms_read == "told";
-}
-
-void CheckFits(const ImagineStart& start, const ImaginerOptions& options, const TrainedFor& trained) {
-  trained.CheckCameras(NamesOf(start.scene.cameras), start.source);
-  trained.CheckArms(start.arm_names, start.source);
-  trained.CheckPeriod(start.period_s, start.source);
-  trained.CheckPoseMap(PoseMapWords(options.conditioning.pose_map), "--config and --scaled-maps");
 }
 
 /// Chunk by chunk, those that are there already skipped.
@@ -181,11 +166,9 @@ ExitCode ImagineFrames(ImagineArguments arguments) {
   const nn::ModelConfig config = ModelSizes(arguments);
   FillIn(arguments.sampler, config);
   const TrainedFor trained = TrainedFor::Read(arguments.weights);
-  FillIn(arguments.inputs, trained);
   ImaginerOptions options = OptionsOf(arguments, config);
   if (trained.period_s) options.conditioning.stride = *trained.period_s * kStatisticsFrames_hz;
-  const ImagineStart start = ReadImagineStart(arguments.inputs, static_cast<std::size_t>(config.views));
-  CheckFits(start, options, trained);
+  const ImagineStart start = StartAsTrained(arguments.inputs, config, options.conditioning.pose_map, trained);
   nn::KeepFreedMemory();
   const nn::LibraryThreads threads(arguments.sampler.threads);
   auto model = std::make_unique<const nn::EvacModel>(Load(arguments, config));

@@ -13,7 +13,7 @@ namespace {
 namespace fs = std::filesystem;
 using Json = nlohmann::json;
 
-/// The words that say the same again, from anywhere. @param extra  those that stand only where they are not the default
+/// The words that say the same again, from anywhere, but for where to (--out).
 std::vector<std::string> CommandWords(const ImagineArguments& arguments, const ImagineStart& start) {
   std::vector<std::string> words = {"evac", "imagine"};
   const auto say = [&](const char* option, const std::string& value) {

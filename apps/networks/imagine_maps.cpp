@@ -9,6 +9,7 @@
 #include "core/geometry.h"
 #include "worldmodel/conditioning.h"
 #include "worldmodel/evac_config.h"
+#include "worldmodel/shard_writer.h"
 #include "worldmodel/trained_for.h"
 
 namespace evac {
@@ -81,10 +82,24 @@ std::size_t WriteMaps(const MapPainter& painter, std::size_t frames, const std::
   return frames;
 }
 
-ExitCode ImagineMaps(const ImagineArguments& arguments) {
+ImagineStart StartAsTrained(ImagineInputs& inputs, const nn::ModelConfig& config, const PoseMapOptions& drawn,
+                            const TrainedFor& trained) {
+  if (inputs.cameras.empty()) inputs.cameras = trained.cameras;
+  inputs.period_s = trained.period_s.value_or(inputs.period_s);
+  inputs.read_told = trained.arms_read == "told";
+  ImagineStart start = ReadImagineStart(inputs, static_cast<std::size_t>(config.views));
+  trained.CheckCameras(NamesOf(start.scene.cameras), start.source);
+  trained.CheckArms(start.arm_names, start.source);
+  trained.CheckPeriod(start.period_s, start.source);
+  trained.CheckPoseMap(PoseMapWords(drawn), "--config and --scaled-maps");
+  return start;
+}
+
+ExitCode ImagineMaps(ImagineArguments arguments) {
   const nn::ModelConfig config = ModelSizes(arguments);
   const PoseMapOptions options = MapOptions(arguments, config);
-  const ImagineStart start = ReadImagineStart(arguments.inputs, static_cast<std::size_t>(config.views));
+  const TrainedFor trained = arguments.weights.empty() ? TrainedFor() : TrainedFor::Read(arguments.weights);
+  const ImagineStart start = StartAsTrained(arguments.inputs, config, options, trained);
   const MapPainter painter(start, config, options);
   const std::size_t frames = WriteMaps(painter, FrameCount(start, config, arguments.chunks), arguments.out);
   fmt::print("{}: {} maps of {}x{}, {:.4g} s apart\n", (arguments.out / "maps").string(), frames,

@@ -64,7 +64,7 @@ ImagineStart ReadImagineStart(const ImagineInputs& inputs, std::size_t views) {
   CheckNamed(inputs);
   Recording recording = Read(inputs, views);
   const int automatic = std::max(1, static_cast<int>(std::lround(inputs.period_s / recording.period_s)));
-  std::vector<Arms>& track = recording.told.empty() ? recording.arms : recording.told;
+  std::vector<Arms> track = ToldTrack(recording);
   ImagineStart start;
   start.stride = inputs.stride > 0 ? inputs.stride : automatic;
   start.source = recording.source;

@@ -16,6 +16,7 @@
 #include "core/names.h"
 #include "core/seed.h"
 #include "core/store_lock.h"
+#include "reports/csv.h"
 #include "worldmodel/clip.h"
 #include "worldmodel/evac_config.h"
 #include "worldmodel/nn/threads.h"
@@ -270,8 +271,7 @@ void MakeShard(std::size_t number, const PackArguments& arguments, const Packing
 
 void WriteLists(const PackArguments& arguments, const Packing& packing) {
   std::string table = "folder,kind,sentence\n";
-  for (const LeftOut& one : packing.left_out)
-    table += fmt::format("{},{},{}\n", Json(one.folder.string()).dump(), one.kind, Json(one.sentence).dump());
+  for (const LeftOut& one : packing.left_out) table += CsvLine({one.folder.string(), one.kind, one.sentence});
   WriteFileAtomically(arguments.out / "left_out.csv", table);
   WriteFileAtomically(arguments.out / "statistics.yaml", StatisticsPage(packing.clip.statistics));
 }
@@ -299,7 +299,7 @@ void WriteIndex(const PackArguments& arguments, const Packing& packing) {
   const Json page = {{"format", "evac-shards"},    {"version", 1},        {"recipe", packing.recipe},
                      {"tasks", packing.tasks},     {"recordings", recordings}, {"states", states},
                      {"behaviours", behaviours},   {"fates", fates},      {"shards", shards}};
-  WriteFileAtomically(arguments.out / "shards.json", page.dump(1) + "\n");
+  WriteFileAtomically(arguments.out / "shards.json", page.dump(1, ' ', false, Json::error_handler_t::replace) + "\n");
 }
 
 }  // namespace

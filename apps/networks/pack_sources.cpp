@@ -57,7 +57,7 @@ PackSource Examine(const fs::path& folder, const SourceOptions& options) {
   source.name = place ? place->task + "/" + place->episode : folder.filename().string();
   source.task = TaskOf(folder, source.row);
   source.state = source.row ? source.row->initial_state : source.name;
-  source.track = recording.told.empty() ? recording.arms : recording.told;
+  source.track = ToldTrack(recording);
   source.frames = source.track.size();
   source.lag.Add(recording.told, recording.arms);
   if (source.frames < options.least_frames) {

@@ -14,6 +14,7 @@ namespace {
 
 /// p <= alpha for p-values that may equal alpha exactly but for rounding.
 constexpr double kRounding = 1e-12;
+constexpr double kMostTrials = 0x1.0p62;
 
 void RequireShare(double share, const char* name) {
   if (!(share >= 0 && share <= 1)) throw InvalidInput("statistics: {} is {}, wanted 0 <= {} <= 1", name, share, name);
@@ -28,7 +29,10 @@ void Check(const Promise& promise) {
   RequireInside(promise.power, "power");
 }
 
-SampleSize RoundedUp(double exact) { return {.exact = exact, .n = static_cast<std::int64_t>(std::ceil(exact - 1e-9))}; }
+SampleSize RoundedUp(double exact) {
+  if (!(exact < kMostTrials)) return {.exact = Undefined{"more than can be counted"}, .n = 0};
+  return {.exact = exact, .n = static_cast<std::int64_t>(std::ceil(exact - 1e-9))};
+}
 
 double TwoSided(const Promise& promise) { return TwoSidedZ(1 - promise.alpha); }
 double OneSidedSum(const Promise& promise) { return NormalQuantile(1 - promise.alpha) + NormalQuantile(promise.power); }
@@ -164,13 +168,13 @@ SampleSize PairsForMcNemar(const FlipRates& rates, const Promise& promise, std::
   if (rates.only_first == rates.only_second) return {.exact = Undefined{"both flips are equally frequent"}, .n = 0};
   McNemarRejections rejections(rates, promise.alpha);
   const Undefined too_many{fmt::format("more than {} pairs", most)};
-  std::int64_t enough = 2;
-  while (enough < most && rejections.Power(enough) < promise.power) enough = std::min(most, enough * 2);
-  if (rejections.Power(enough) < promise.power) return {.exact = too_many, .n = 0};
-  // The power is a saw: from where it held last, walk down to the last size at which it does not.
-  std::int64_t n = std::min(most, enough + enough / 4);
-  while (n > 0 && rejections.Power(n) >= promise.power) --n;
-  if (n == std::min(most, enough + enough / 4)) return {.exact = too_many, .n = 0};
+  const auto holds = [&](std::int64_t pairs) { return rejections.Power(pairs) >= promise.power; };
+  const auto beyond = [&](std::int64_t pairs) { return std::min(most, pairs + pairs / 4); };
+  std::int64_t enough = 2;  // the power is a saw: it may hold here and not a little further on
+  while (enough < most && !(holds(enough) && holds(beyond(enough)))) enough = std::min(most, enough * 2);
+  if (!holds(beyond(enough))) return {.exact = too_many, .n = 0};
+  std::int64_t n = beyond(enough);  // from there down to the last size at which it does not hold
+  while (n > 0 && holds(n)) --n;
   return {.exact = static_cast<double>(n + 1), .n = n + 1};
 }
 

@@ -76,6 +76,18 @@ double AverageClusterSize(std::span<const Count> clusters) {
   return (trials - squares / trials) / (static_cast<double>(clusters.size()) - 1);
 }
 
+/// How many trials the cluster has that a trial is in, on average: what the variance of the pooled rate grows with. The
+/// size where all are equal; more than the plain mean where they are not.
+double SizeAsTrialsSeeIt(std::span<const Count> clusters) {
+  double trials = 0, squares = 0;
+  for (const Count& cluster : clusters) {
+    const double n = static_cast<double>(cluster.trials);
+    trials += n;
+    squares += n * n;
+  }
+  return squares / trials;
+}
+
 double LinearisedSe(std::span<const Count> clusters, double rate) {
   double residuals = 0, trials = 0;
   for (const Count& cluster : clusters) {
@@ -161,13 +173,12 @@ ClusterStatistics StatisticsOfClusters(std::span<const Count> all_clusters) {
   if (has_repeats) result.effective_trials = static_cast<double>(result.clusters);  // nothing shows yet that it is more
   if (clusters.size() < 2) return result;
 
-  const double size = AverageClusterSize(clusters);
   result.cluster_se = LinearisedSe(clusters, rate);
-  result.icc = AnovaIcc(clusters, rate, size);
+  result.icc = AnovaIcc(clusters, rate, AverageClusterSize(clusters));
   result.design_effect = Undefined{result.icc.reason()};
   if (!has_repeats) result.effective_trials = Undefined{result.icc.reason()};
   if (!result.icc) return result;
-  const double design_effect = 1 + (size - 1) * *result.icc;
+  const double design_effect = 1 + (SizeAsTrialsSeeIt(clusters) - 1) * *result.icc;
   result.design_effect = design_effect;
   result.effective_trials = trials / std::max(design_effect, 1.0);
   return result;

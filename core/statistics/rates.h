@@ -35,7 +35,8 @@ Estimate HoeffdingInterval(std::int64_t successes, std::int64_t trials, double c
 struct ClusterStatistics {
   Number rate = Undefined{"no trials"};  ///< pooled: sum of successes / sum of trials
   Number icc = Undefined{"no trials"};   ///< ICC(1) by one-way ANOVA; below 0 where clusters are more alike than chance
-  Number design_effect = Undefined{"no trials"};     ///< 1 + (m - 1) ICC, m the (average) number of trials per cluster
+  Number design_effect = Undefined{"no trials"};     ///< 1 + (m - 1) ICC, m the size of the cluster a trial is in, on
+                                                     ///< average: sum n² / sum n
   Number effective_trials = Undefined{"no trials"};  ///< trials / design effect, at most trials; of repeats that cannot
                                                      ///< show it (one cluster, all outcomes equal), their clusters
   Number cluster_se = Undefined{"no trials"};        ///< of the rate: linearised ratio, with G / (G - 1)

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "core/error.h"
 #include "core/statistics/special.h"
@@ -65,7 +66,8 @@ double FlipsEValue(std::int64_t only_first, std::int64_t only_second) {
     throw InvalidInput("statistics: {} and {} discordant pairs, wanted none below 0", only_first, only_second);
   }
   const double b = static_cast<double>(only_first), c = static_cast<double>(only_second);
-  return std::exp((b + c) * std::log(2.0) + LogBeta(0.5 + b, 0.5 + c) - LogBeta(0.5, 0.5));
+  const double e_value = std::exp((b + c) * std::log(2.0) + LogBeta(0.5 + b, 0.5 + c) - LogBeta(0.5, 0.5));
+  return std::min(e_value, std::numeric_limits<double>::max());  // smaller is an e-value too; JSON has no infinity
 }
 
 SequentialTest TwoRatesSequential(const std::vector<bool>& first, const std::vector<bool>& second,

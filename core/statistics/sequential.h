@@ -46,7 +46,7 @@ class FlipsBet {
  private:
   std::int64_t only_first_ = 0, only_second_ = 0;
 };
-/// The same, for b and c flips at once.
+/// The same, for b and c flips at once; at most the largest finite number.
 double FlipsEValue(std::int64_t only_first, std::int64_t only_second);
 
 /// A test as it went, one entry per step.

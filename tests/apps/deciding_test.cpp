@@ -76,6 +76,8 @@ TEST_F(Deciding, ComparedRunsMayBeFoldersOfTheirOwn) {
   EXPECT_THROW(Printed(AddCompare, {"compare", a, a}), Error) << "against itself";
   EXPECT_THROW(Printed(AddCompare, {"compare", Run(), b}), Error) << "a run with several policies";
   EXPECT_THROW(Printed(AddCompare, {"compare", "visual_pick@good", b}), Error) << "no folder";
+  EXPECT_THROW(Printed(AddCompare, {"compare", a, b, "--run", "elsewhere"}), Error) << "nobody is looked for there";
+  EXPECT_NO_THROW(Printed(AddCompare, {"compare", a, "visual_pick@poor", "--run", Run()}));
   EXPECT_THROW(Compare({"--world", "moon"}), Error);
   EXPECT_THROW(Compare({"--judge", "nobody"}), Error);
 }
@@ -128,6 +130,20 @@ TEST_F(Deciding, AWrongFileImportsNothing) {
                                      "--run", Run()}),
                Error);
   EXPECT_TRUE(Store::Open(Run(), Store::Mode::kReadOnly).RealTrials().empty());
+}
+
+TEST_F(Deciding, AJudgeIsHeldAgainstAnotherAndBothHaveJudged) {
+  for (const auto& [judge, truth, words] : {std::tuple("oracle", "oracle", "'oracle' against itself"),
+                                            {"orakel", "oracle", "--judge: found 'orakel', wanted one who has judged"},
+                                            {"oracle", "human", "--against: found 'human', wanted one who has judged"}}) {
+    try {
+      Printed(AddJudge, {"judge", "calibrate", Run(), "--judge", judge, "--against", truth});
+      ADD_FAILURE() << "wanted an error for " << judge << " against " << truth;
+    } catch (const Error& error) {
+      EXPECT_EQ(error.exit_code(), ExitCode::kInvalidInput);
+      EXPECT_THAT(error.what(), HasSubstr(words));
+    }
+  }
 }
 
 TEST_F(Deciding, APlanNeedsNoRun) {

@@ -48,12 +48,13 @@ class ASmallServer : public testing::Test {
     std::ofstream(page_) << fmt::format("name: gloomy\nbase_url: {}/v1\nmodel: gloom\nprobe_share: 1\n", server_.Url());
   }
 
-  std::string Judge(bool again = false, bool dry_run = false) const {
+  std::string Judge(bool again = false, bool dry_run = false, bool retest = false) const {
     VlmJudgeArguments arguments;
     arguments.run = run_.folder();
     arguments.config = page_;
     arguments.again = again;
     arguments.dry_run = dry_run;
+    arguments.retest = retest;
     testing::internal::CaptureStdout();
     const ExitCode code = JudgeWithVlm(arguments);
     const std::string printed = testing::internal::GetCapturedStdout();
@@ -85,6 +86,19 @@ TEST_F(ASmallServer, IsAskedOnceAboutEachEpisodeAndNotAnewAtEveryCall) {
   EXPECT_THAT(second, HasSubstr("0 rated, 2 had a verdict already"));
   EXPECT_THAT(second, HasSubstr(":flip: 0 rated, 2 had a verdict already"));
   EXPECT_EQ(server_.Seen().size(), asked + 2) << "only who it is and whether it sees";
+}
+
+TEST_F(ASmallServer, WhatARetestWouldTakeIsSaidBefore) {
+  EXPECT_THAT(Judge(false, true, true), HasSubstr("2 clips, 14 requests"));
+  Judge();
+  EXPECT_THAT(Judge(false, true, true), HasSubstr("2 clips, 6 requests")) << "the judge itself has been asked";
+  Judge(false, false, true);
+  EXPECT_THAT(Judge(false, true, true), HasSubstr("0 clips, 0 requests"));
+}
+
+TEST_F(ASmallServer, WhoseAnswersAloneCostSomethingHasItsPriceSaidBefore) {
+  std::ofstream(page_, std::ios::app) << "budget: {usd_per_million_completion_tokens: 10}\n";
+  EXPECT_THAT(Judge(false, true), HasSubstr("about 0.02 USD")) << "8 requests of 250 tokens";
 }
 
 TEST_F(ASmallServer, IsAskedAnewWhereThatIsWanted) {

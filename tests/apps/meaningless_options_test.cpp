@@ -56,6 +56,11 @@ TEST_F(MeaninglessOption, OfAClassifierIsRefusedOfAVisionLanguageModel) {
               HasSubstr("--weights: a model server has its own"));
 }
 
+TEST_F(MeaninglessOption, ACostIsNotSaidOfAnswersThatCostNothing) {
+  EXPECT_THAT(Judge({"--judge", "vlm", "--config", "qwen.yaml", "--dry-run", "--offline"}),
+              HasSubstr("--offline: asks no server"));
+}
+
 TEST_F(MeaninglessOption, OfARunIsRefusedOfATableOfRates) {
   const std::string csv = Beside("rates.csv").string(), out = Beside("page").string();
   std::ofstream(csv) << "group,task,policy,real_sr,sim_sr\n,t,a,0.2,0.5\n,t,b,0.6,0.5\n,t,c,0.8,0.9\n";
@@ -66,6 +71,31 @@ TEST_F(MeaninglessOption, OfARunIsRefusedOfATableOfRates) {
     EXPECT_THROW(Printed(AddReport, words), CLI::ExcludesError) << option.front();
   }
   EXPECT_FALSE(std::filesystem::exists(out));
+  for (const std::vector<std::string>& option : {std::vector<std::string>{"--judge", "human"}, {"--world", "sim"}}) {
+    std::vector<std::string> words = {"correlate", "--pairs", csv};
+    words.insert(words.end(), option.begin(), option.end());
+    EXPECT_THROW(Printed(AddCorrelate, words), CLI::ExcludesError) << option.front();
+  }
+}
+
+TEST_F(MeaninglessOption, OfImaginingIsRefusedWhereMapsAloneAreDrawn) {
+  const std::string out = Beside("maps").string();
+  for (const std::vector<std::string>& option :
+       {std::vector<std::string>{"--png"}, {"--restart"}, {"--seed", "3"}, {"--steps", "10"}, {"--dtype", "bf16"}}) {
+    std::vector<std::string> words = {"imagine", "--maps-only", "--recording", Run(), "--out", out};
+    words.insert(words.end(), option.begin(), option.end());
+    EXPECT_THROW(Printed(AddImagine, words), CLI::ExcludesError) << option.front();
+  }
+  EXPECT_FALSE(std::filesystem::exists(out));
+}
+
+TEST_F(MeaninglessOption, BeforeASubcommandThatReadsNoneIsRefused) {
+  const std::string out = Beside("pinned.json").string();
+  EXPECT_THROW(Printed(AddJudge, {"judge", "--again", "calibrate", Run(), "--judge", "oracle"}), CLI::ValidationError);
+  EXPECT_THROW(Printed(AddGate, {"gate", "rules.yaml", "pin", Run(), "--out", out}), CLI::ValidationError);
+  EXPECT_FALSE(std::filesystem::exists(out));
+  Printed(AddGate, {"gate", "pin", Run(), "--out", out});
+  EXPECT_TRUE(std::filesystem::exists(out));
 }
 
 TEST_F(MeaninglessOption, OfADecisionIsRefusedWhereAGateOnlySaysHowManyEpisodesItTakes) {

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include "apps/rate_tables.h"
+#include "core/error.h"
 #include "core/store.h"
 #include "tests/judges/rating_support.h"
 
@@ -59,11 +60,13 @@ TEST_F(Resolving, ASheetSaysNothingOfStages) {
   Resolve(true);
   EXPECT_EQ(Told().at("human").label, Label::kFailure);
   EXPECT_THAT(Told().at("human").stages, IsEmpty());
+  int raters = 0;
   for (const auto& [judge, verdict] : Told()) {
-    if (judge.starts_with("human:")) {
-      EXPECT_THAT(verdict.stages, IsEmpty()) << judge;
-    }
+    if (!judge.starts_with("human:")) continue;
+    EXPECT_THAT(verdict.stages, IsEmpty()) << judge;
+    ++raters;
   }
+  EXPECT_EQ(raters, 2);
 }
 
 TEST_F(Resolving, ASuccessWithoutAnyStageMarkedSaysNothingOfStages) {
@@ -154,6 +157,18 @@ TEST_F(Resolving, WhatNobodyOfTheStudyEverVotedOnIsLeftToWhoSaidIt) {
   }
   EXPECT_EQ(Resolve(true).written, 0);
   EXPECT_EQ(Told().at("human").label, Label::kSuccess);
+}
+
+TEST_F(Resolving, UnderTheNameOfAnotherJudgeOrOfNoneNothingIsWritten) {
+  Import("ann", "failure");
+  Import("bob", "failure");
+  const std::map<std::string, Verdict> before = Told();
+  for (const char* taken : {"oracle", "classifier:0123456789ab", "vlm:qwen", "", ":r1", "human,oracle"})
+    EXPECT_THROW(ResolveStudy(store, {.judge = taken}), Error) << taken;
+  EXPECT_EQ(Told().size(), before.size());
+  EXPECT_EQ(Told().at("oracle").label, before.at("oracle").label);
+  ResolveStudy(store, {.judge = "people"});
+  EXPECT_EQ(Told().at("people").label, Label::kFailure);
 }
 
 TEST_F(Resolving, WhatAnAdjudicatorDecidedStandsWhoeverLeft) {

@@ -71,6 +71,19 @@ TEST(Collection, ABrokenRowIsRefusedByName) {
   }
 }
 
+TEST(Collection, ARowsNumbersAreTakenAsTheyStandOrNotAtAll) {
+  for (const auto& [field, found] : std::vector<std::pair<std::string, std::string>>{
+           {"frames", "1e300"}, {"frames", "80.9"}, {"frames", "4294967377"}, {"outcome", "0.5"}, {"outcome", "2"},
+           {"index", "18446744073709551615"}, {"state_seed", "\"-5\""}, {"world_seed", "\"3 or 4\""}}) {
+    std::string text = CollectedJson(Row());
+    const std::size_t at = text.find("\"" + field + "\":") + field.size() + 3;
+    text.replace(at, text.find_first_of(",}", at) - at, found);
+    EXPECT_THAT(MessageOf([&] { ParseCollected(text, "rows/a/1.json"); }),
+                AllOf(HasSubstr("rows/a/1.json: "), HasSubstr(field.ends_with("seed") ? "seed" : field)))
+        << found;
+  }
+}
+
 TEST(Collection, OnlyAnEpisodeThatDivergedHasNoFrames) {
   CollectedEpisode row = Row();
   row.stop = row.fate = "diverged";

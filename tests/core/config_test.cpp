@@ -109,6 +109,27 @@ TEST(Config, WhatIsNoMappingIsRefusedWithItsLine) {
   EXPECT_THAT(MessageOf([] { Config::FromFile("no/such/page.yaml"); }), HasSubstr("no/such/page.yaml"));
 }
 
+TEST(Config, ASecondDocumentIsRefusedAndNotForgotten) {
+  for (const char* text : {"a: 1\n---\nb: 2\n", "# c\n---\na: 1\n--- # next\nb: 2\n", "a: 1\n...\nb: 2\n"})
+    EXPECT_THAT(MessageOf([&] { Config::FromText(text, "p.yaml"); }), HasSubstr("found a second document")) << text;
+  for (const char* text : {"---\na: 1\n", "%YAML 1.2\n# c\n--- \na: 1\n...\n# end\n", "a: |\n  ---\n  x\nb: ---x\n"})
+    EXPECT_TRUE(Config::FromText(text, "p.yaml").Has("a")) << text;
+}
+
+TEST(Config, AliasesWithoutEndAreRefused) {
+  for (const char* text : {"b: 1\na: &x [*x]\n", "b: 1\na: &x {c: [1, *x]}\n"})
+    EXPECT_THAT(MessageOf([&] { Config::FromText(text, "p.yaml"); }), AllOf(HasSubstr("p.yaml:2"), HasSubstr("alias")));
+  std::string laughs = "a0: &a0 [x, x, x, x, x, x, x, x, x, x]\n";  // ten to the power of nine
+  for (int i = 1; i < 9; ++i) {
+    laughs += fmt::format("a{0}: &a{0} [", i);
+    for (int times = 0; times < 10; ++times) laughs += fmt::format("*a{}, ", i - 1);
+    laughs += "]\n";
+  }
+  EXPECT_THAT(MessageOf([&] { Config::FromText(laughs, "p.yaml"); }), HasSubstr("more than 250000 values"));
+  const Config page = Config::FromText("a: &x [1, 2]\nb: *x\n", "p.yaml");
+  EXPECT_THAT(page.Get<std::vector<double>>("b"), ElementsAre(1, 2));
+}
+
 TEST(Config, BytesThatAreNoUtf8AreRefusedWithTheirLine) {
   EXPECT_THAT(MessageOf([] { Config::FromText("a: 1\nc\xEF mmand: 2\n", "p.yaml"); }),
               AllOf(HasSubstr("p.yaml:2"), HasSubstr("0xef"), HasSubstr("UTF-8")));
@@ -151,7 +172,7 @@ TEST(Config, AnAssignmentReplacesAFieldAnItemOrAddsAField) {
 
 TEST(Config, AnAssignmentWithoutAPlaceOrAValueIsRefused) {
   for (const char* assignment :
-       {"lanes", "=4", "absent.x=1", "worlds.2.name=a", "worlds.9=a", "worlds.x=a", "lanes.x=1", "a=[1"}) {
+       {"lanes", "=4", "absent.x=1", "worlds.2.name=a", "worlds.9=a", "worlds.x=a", "lanes.x=1", "lanes.=1", "a=[1"}) {
     Config page = Page();
     const std::string before = page.Canonical();
     EXPECT_THAT(MessageOf([&] { page.Set(assignment); }), HasSubstr(assignment));

@@ -49,6 +49,12 @@ TEST(File, WhatCannotBeReadIsNamedWithTheReason) {
               AllOf(HasSubstr(folder.path().string()), HasSubstr("Is a directory")));
 }
 
+/// A part of a file must not pass for the whole.
+TEST(File, WhatBreaksOffWhileItIsReadIsNoFile) {
+  EXPECT_THAT(MessageOf([] { ReadFile("/proc/self/mem"); }),
+              AllOf(HasSubstr("/proc/self/mem"), HasSubstr("cannot be read to its end")));
+}
+
 TEST(File, WhatCannotBeWrittenIsNamedAndTheOldFileStays) {
   const TempFolder folder;
   EXPECT_THAT(MessageOf([&] { WriteFileAtomically(folder / "missing/f", "x"); }),

@@ -29,6 +29,7 @@ TEST(Sha256, WhatCannotBeReadHasNone) {
   const TempFolder folder;
   EXPECT_THROW(Sha256HexOfFile(folder / "missing"), Error);
   EXPECT_THROW(Sha256HexOfFile(folder.path()), Error);
+  EXPECT_THROW(Sha256HexOfFile("/proc/self/mem"), Error) << "opens, and fails when it is read";
 }
 
 }  // namespace

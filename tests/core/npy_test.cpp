@@ -103,6 +103,8 @@ TEST(Npy, OtherTypesAndBrokenHeadersAreRefusedByName) {
 TEST(Npy, AValueThatDoesNotFitItsTypeIsNotWritten) {
   EXPECT_THROW(NpyBytes({"|u1", {1}, {256}}), Error);
   EXPECT_THROW(NpyBytes({"<i4", {1}, {std::nan("")}}), Error);
+  EXPECT_THROW(NpyBytes({"<f4", {1}, {1e39}}), Error) << "no infinity instead of it";
+  EXPECT_NO_THROW(NpyBytes({"<f4", {2}, {-3.4e38, std::nan("")}}));
   EXPECT_THROW(NpyBytes({"<f8", {2}, {1}}), Error);
 }
 

@@ -240,6 +240,7 @@ TEST(Recording, WhatIsMissingIsNamed) {
   EXPECT_THAT(ErrorOf(clip), HasSubstr("hand_right_extrinsic_params_aligned.json"));
   fs::remove(clip / "head_color.mp4");
   EXPECT_THAT(ErrorOf(clip, {.cameras = {"head"}}), HasSubstr("head_color.mp4: missing"));
+  EXPECT_THAT(ErrorOf(clip), HasSubstr("head_color.mp4: missing: camera head")) << "the hand's video is there";
 }
 
 TEST(Recording, AClipWithOnlyAFirstFrameIsReadAtThirtyHertz) {
@@ -364,6 +365,22 @@ TEST(Recording, ItsTaskAcceptsEveryRecordedStep) {
   EXPECT_EQ(WhatIsWrong(ActionChunk{{recording.arms.begin() + 1, recording.arms.end()}}, task, 100), std::nullopt);
   EXPECT_EQ(WhatIsWrong(Observation{recording.first_images, recording.arms[0], true}, task), std::nullopt);
   EXPECT_EQ(InitialSceneOf(recording).cameras.size(), 1u);
+}
+
+TEST(Recording, AModelIsToldWhereTheArmsWereAtFirstAndThenWhereTheyWereToldToBe) {
+  const auto at_x_m = [](double x_m) {
+    ArmState arm;
+    arm.base_from_gripper.translation().x() = x_m;
+    return Arms{arm};
+  };
+  Recording recording;
+  recording.arms = {at_x_m(0.1), at_x_m(0.2), at_x_m(0.3)};
+  EXPECT_EQ(ToldTrack(recording)[1][0].base_from_gripper.translation().x(), 0.2);
+  recording.told = {at_x_m(0.15), at_x_m(0.25), at_x_m(0.35)};
+  const std::vector<Arms> track = ToldTrack(recording);
+  ASSERT_EQ(track.size(), 3u);
+  EXPECT_EQ(track[0][0].base_from_gripper.translation().x(), 0.1);
+  EXPECT_EQ(track[2][0].base_from_gripper.translation().x(), 0.35);
 }
 
 TEST(Recording, TheRealExamplesAreReadWhole) {

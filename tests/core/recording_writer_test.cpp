@@ -103,6 +103,7 @@ TEST(RecordingWriter, TheSameEpisodeGivesTheSameBytes) {
     WriteRecording(place, OneArmEpisode(), {});
     std::string all;
     for (const auto& file : ReadRecording(place.Folder()).files) all += Sha256HexOfFile(file) + "\n";
+    EXPECT_NE(all, "");
     return all;
   };
   EXPECT_EQ(hashes("a"), hashes("b"));

@@ -110,6 +110,13 @@ TEST(TaskPage, AQuaternionTurnsACameraAsTheSameLookDoes) {
   EXPECT_TRUE(turned.mount_from_camera.isApprox(looking.mount_from_camera, 1e-12));
 }
 
+TEST(TaskPage, ACameraThatIsToldTwoThingsIsRefused) {
+  EXPECT_THAT(ComplaintAbout(Replaced(kPage, "fovy_deg: 40", "fovy_deg: 40, fx_px: 90, fy_px: 90")),
+              AllOf(HasSubstr("push.yaml"), HasSubstr("fx_px"), HasSubstr("'90'"), HasSubstr("fovy_deg is given")));
+  EXPECT_THAT(ComplaintAbout(Replaced(kPage, "up: [0, 0, 1]", "up: [0, 0, 1], quat_xyzw: [0, 0, 0, 1]")),
+              AllOf(HasSubstr("look_at_m"), HasSubstr("quat_xyzw is given")));
+}
+
 TEST(TaskPage, EveryComplaintNamesFileFieldAndWhatWasFound) {
   EXPECT_THAT(ComplaintAbout(Replaced(kPage, "max_chunks: 4", "max_chunk: 4")),
               AllOf(HasSubstr("push.yaml"), HasSubstr("max_chunk"), HasSubstr("max_chunks")));
@@ -119,7 +126,7 @@ TEST(TaskPage, EveryComplaintNamesFileFieldAndWhatWasFound) {
   EXPECT_THAT(ComplaintAbout(Replaced(kPage, ", above: 0.1", "")), AllOf(HasSubstr("above"), HasSubstr("below")));
   EXPECT_THAT(ComplaintAbout(Replaced(kPage, "displacement", "distanse")),
               AllOf(HasSubstr("distanse"), HasSubstr("distance")));
-  EXPECT_THAT(ComplaintAbout(Replaced(kPage, "displacement", "distance")), HasSubstr("b"));
+  EXPECT_THAT(ComplaintAbout(Replaced(kPage, "displacement", "distance")), HasSubstr("all_of.0.b"));
   EXPECT_THAT(ComplaintAbout(Replaced(kPage, "max: [1, 1, 1]", "max: [1, -2, 1]")), HasSubstr("max"));
   EXPECT_THAT(ComplaintAbout(Replaced(kPage, "look_at_m: [0, 0, 0]", "look_at_m: [1, 0, 1]")), HasSubstr("look_at_m"));
   EXPECT_THAT(ComplaintAbout(Replaced(kPage, "up: [0, 0, 1]", "up: [1, 0, 1]")), HasSubstr("up"));

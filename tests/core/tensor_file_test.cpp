@@ -2,6 +2,7 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <sys/resource.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -88,6 +89,24 @@ TEST_F(TensorFileOnDisk, WhatAKilledWriterLeftGoesWithTheNextWriterOfTheSamePath
   WriteTensorFile(folder_ / "a", {}, {});
   EXPECT_FALSE(std::filesystem::exists(folder_ / left));
   for (const std::string& name : others) EXPECT_TRUE(std::filesystem::exists(folder_ / name)) << name;
+}
+
+TEST_F(TensorFileOnDisk, AFileWhoseHeaderDoesNotFitOnTheDiskLeavesNothing) {
+  const auto handler = std::signal(SIGXFSZ, SIG_IGN);
+  rlimit limit{};
+  ASSERT_EQ(::getrlimit(RLIMIT_FSIZE, &limit), 0);
+  const rlimit little{4, limit.rlim_max};
+  ASSERT_EQ(::setrlimit(RLIMIT_FSIZE, &little), 0);
+  std::string message = "no error";
+  try {
+    TensorFileWriter(folder_ / "a", std::vector<TensorDeclaration>{{"x", TensorType::kU8, {1}}}, {});
+  } catch (const TensorError& error) {
+    message = error.what();
+  }
+  ASSERT_EQ(::setrlimit(RLIMIT_FSIZE, &limit), 0);
+  std::signal(SIGXFSZ, handler);
+  EXPECT_THAT(message, HasSubstr("cannot write"));
+  EXPECT_TRUE(std::filesystem::is_empty(folder_));
 }
 
 TEST_F(TensorFileOnDisk, AMissingFileIsNamed) {

@@ -1,5 +1,6 @@
 #include <cstdio>
 
+#include "core/collection.h"
 #include "core/file.h"
 #include "core/npy.h"
 #include "core/store.h"
@@ -64,8 +65,8 @@ void MakePageSeeds(const fs::path& folder) {
   }
 }
 
-/// CORPUS/npy_fuzz: one array per type. CORPUS/recording_fuzz: a camera's pages, each after the letter that says which
-/// it is. CORPUS/proprio_fuzz and CORPUS/video_fuzz: a track and a video of four steps.
+/// CORPUS/npy_fuzz: one array per type. CORPUS/recording_fuzz: a camera's pages and a collection's row, each after the
+/// letter that says which it is. CORPUS/proprio_fuzz and CORPUS/video_fuzz: a track and a video of four steps.
 void MakeCorpus(const fs::path& corpus) {
   for (const std::string dtype : {"<f8", "<f4", "<i8", "<i4", "|u1"}) {
     evac::WriteText(corpus / "npy_fuzz" / dtype.substr(1), evac::NpyBytes({dtype, {2, 3}, {1, 2, 3, 4, 5, 6}}));
@@ -77,6 +78,8 @@ void MakeCorpus(const fs::path& corpus) {
   };
   seed("i", "head_intrinsic_params.json");
   seed("e", "head_extrinsic_params_aligned.json");
+  evac::WriteText(corpus / "recording_fuzz/row.json",
+                  "r" + evac::CollectedJson({.task = "take_bottle", .parameters = {{"noise_m", 0.01}}, .frames = 80}));
   for (const char* target : {"proprio_fuzz", "video_fuzz"}) fs::create_directories(corpus / target);
   fs::rename(clip / "proprio_stats.h5", corpus / "proprio_fuzz" / "four_steps.h5");
   fs::rename(clip / "head_color.mp4", corpus / "video_fuzz" / "four_frames.mp4");

@@ -347,10 +347,13 @@ TEST(StudyTruth, VerdictsAndClipsCannotBeChangedOrDeleted) {
   RatingDesk desk(store, {});
   AtTheDesk ann(store, desk);
   ann.Say(ann.Next().body.at("presentation"), "success");
-  const std::string file = (study.folder() / "study.sqlite").string();
-  for (const char* sql : {"UPDATE verdicts SET label='failure'", "DELETE FROM verdicts", "UPDATE clips SET is_real=0",
-                          "DELETE FROM clips"})
-    EXPECT_NE(std::system(fmt::format("sqlite3 '{}' \"{}\" 2>/dev/null", file, sql).c_str()), 0) << sql;
+  sqlite::Connection raw = sqlite::Connection::OpenReadWrite(study.folder() / "study.sqlite");
+  const std::pair<const char*, const char*> refusals[] = {{"UPDATE verdicts SET label='failure'", "never changed"},
+                                                          {"DELETE FROM verdicts", "never deleted"},
+                                                          {"UPDATE clips SET is_real=0", "a study is frozen"},
+                                                          {"DELETE FROM clips", "a study is frozen"}};
+  for (const auto& [sql, refusal] : refusals)
+    EXPECT_THAT([&] { raw.RunScript(sql); }, testing::ThrowsMessage<Error>(HasSubstr(refusal))) << sql;
   EXPECT_EQ(store.VerdictTable().rows.size(), 1u);
 }
 

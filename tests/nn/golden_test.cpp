@@ -22,7 +22,7 @@ struct Answer {
 };
 
 Answer RunCheck(const fs::path& folder) {
-  const std::string command = fmt::format("{}/evac_golden_check '{}' 2>&1", EVAC_BIN_DIR, folder.string());
+  const std::string command = fmt::format("'{}/evac_golden_check' '{}' 2>&1", EVAC_BIN_DIR, folder.string());
   Answer answer;
   FILE* pipe = ::popen(command.c_str(), "r");
   std::array<char, 4096> buffer{};

@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include "tests/nn/support.h"
+#include "tests/support/temp_folder.h"
 #include "worldmodel/nn/weight_keys.h"
 
 namespace evac::nn {
@@ -14,9 +15,6 @@ namespace fs = std::filesystem;
 
 class MeanOfWeights : public testing::Test {
  protected:
-  MeanOfWeights() { fs::create_directories(folder_); }
-  ~MeanOfWeights() override { fs::remove_all(folder_); }
-
   fs::path Written(const std::string& name, std::uint64_t seed, const TensorMetadata& metadata) const {
     RandomWeights random(seed);
     SaveWeights(folder_ / name, random, config_, {.metadata = metadata});
@@ -24,7 +22,8 @@ class MeanOfWeights : public testing::Test {
   }
 
   const ModelConfig config_ = TinyConfig();
-  const fs::path folder_ = fs::path(testing::TempDir()) / (std::string("mean_of_weights_") + testing::UnitTest::GetInstance()->current_test_info()->name());
+  const TempFolder temp_;
+  const fs::path folder_ = temp_.path();
 };
 
 TEST_F(MeanOfWeights, IsOfEveryParameter) {

@@ -10,6 +10,7 @@
 #include <optional>
 
 #include "tests/nn/support.h"
+#include "tests/support/temp_folder.h"
 #include "worldmodel/nn/weight_keys.h"
 
 namespace evac::nn {
@@ -36,14 +37,6 @@ std::string MessageOf(Function function) {
 
 class Weights : public ::testing::Test {
  protected:
-  void SetUp() override {
-    folder_ = fs::path(::testing::TempDir()) /
-              (std::string("weights_") + ::testing::UnitTest::GetInstance()->current_test_info()->name());
-    fs::remove_all(folder_);
-    fs::create_directories(folder_);
-  }
-  void TearDown() override { fs::remove_all(folder_); }
-
   fs::path Saved(std::uint64_t seed = 1, const SaveOptions& options = {}) const {
     const fs::path path = folder_ / ("seed" + std::to_string(seed) + ".safetensors");
     RandomWeights weights(seed);
@@ -62,7 +55,8 @@ class Weights : public ::testing::Test {
     return MessageOf([&] { LoadModel(path, config_); });
   }
 
-  fs::path folder_;
+  const TempFolder temp_;
+  const fs::path folder_ = temp_.path();
   ModelConfig config_ = TinyConfig();
 };
 

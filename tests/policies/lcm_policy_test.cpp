@@ -385,6 +385,19 @@ TEST_F(LcmPolicyTest, OneThatIsSilentForAWholeDeadlineIsRestartedAndOneThatAnswe
   EXPECT_EQ(restarts, 1);
 }
 
+TEST_F(LcmPolicyTest, OneThatLeavesSeveralWaitingIsRestartedOnceAndAgainIfItGoesOn) {
+  int restarts = 0;
+  LcmPolicyOptions options = Hasty(wire::OwnAddress());
+  options.restart = [&] { ++restarts; };
+  LcmPolicy policy(options);
+  for (int round = 1; round <= 2; ++round) {
+    for (const SceneId scene : {0, 1, 2}) policy.Reset(scene, wire::TwoCameraTask(), 1);
+    for (const Acted& acted : Ask(policy, {0, 1, 2}, wire::TwoCameraTask()))
+      EXPECT_THAT(Told(acted), HasSubstr("policy_timeout"));
+    EXPECT_EQ(restarts, round);
+  }
+}
+
 TEST_F(LcmPolicyTest, AStartMayTakeLongerThanAnAnswer) {
   LcmPolicyOptions options = Hasty(wire::OwnAddress());
   options.start_s = 0.6;

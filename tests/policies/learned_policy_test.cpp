@@ -225,6 +225,25 @@ TEST(LearnedPolicy, RefusesTasksCamerasAndRobotsItWasNotTrainedFor) {
   EXPECT_THAT(complaint(task), HasSubstr("has a period of 0.2 s, in training it was 0.1 s"));
 }
 
+TEST(LearnedPolicy, AnyTaskIsTakenForTheOneThatItIsToldToActIn) {
+  const TempFolder folder;
+  const fs::path weights = Weights(folder / "step.safetensors");
+  Task recorded = Trained(), toast = Trained();
+  recorded.id = "327-648642";
+  toast.id = "take_toast";
+  const Observation seen = wire::ObservationFor(Trained(), 5);
+  const auto does = [&](LearnedPolicy policy, const Task& task) {
+    policy.Reset(0, task, 1);
+    return Numbers(Ask(policy, seen));
+  };
+  EXPECT_EQ(does(LearnedPolicy(weights, 8, "take_toast"), recorded), does(LearnedPolicy(weights, 8), toast));
+  EXPECT_NE(does(LearnedPolicy(weights, 8, "take_toast"), recorded), does(LearnedPolicy(weights, 8), Trained()));
+  EXPECT_THAT([&] { LearnedPolicy(weights, 8).Reset(0, recorded, 1); },
+              ThrowsMessage<Error>(HasSubstr("; --task takes any task for one of these")));
+  EXPECT_THAT([&] { LearnedPolicy(weights, 8, "take_ham"); },
+              ThrowsMessage<Error>(HasSubstr("task take_ham is none it learned")));
+}
+
 TEST(LearnedPolicy, WeightsThatDoNotFitAreRefusedWithWhatDiffers) {
   const TempFolder folder;
   const auto complaint = [&](const char* field, const std::string& value) {

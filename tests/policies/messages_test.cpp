@@ -95,6 +95,16 @@ TEST(Messages, ACameraAndADeclarationComeBackAsTheyWere) {
   EXPECT_EQ(FromWire(ToWire(spec)), spec);
 }
 
+TEST(Messages, ACameraWithoutSizeOrFocalLengthIsRefused) {
+  const camera_t whole = ToWire(wire::TwoCameraTask().cameras[0]);
+  camera_t flat = whole, blind = whole, mirrored = whole;
+  flat.height_px = 0;
+  blind.fx_px = 0;
+  mirrored.fy_px = -60;
+  EXPECT_NO_THROW(FromWire(whole));
+  for (const camera_t& camera : {flat, blind, mirrored}) EXPECT_THROW(FromWire(camera), Error);
+}
+
 TEST(Messages, ATaskComesBackWithWhatAPolicyMayKnow) {
   Task task = wire::TwoCameraTask();
   task.workspace_m = Eigen::AlignedBox3d(Eigen::Vector3d(0, -1, 0), Eigen::Vector3d(1, 1, 0.8));
@@ -143,6 +153,31 @@ TEST(Messages, AnImageThatIsNotWhatItSaysIsRefused) {
   huge.width_px = 1 << 20;
   unknown.encoding = 7;
   for (const image_t& image : {wrong_size, cut, huge, unknown}) EXPECT_THROW(ImageOf(image), Error);
+}
+
+/// A JPEG of 16x24 whose first segment is shifted by `between`, with another size where that segment would end if what
+/// stands before its length were its length.
+image_t WithTwoSizes(const std::vector<std::uint8_t>& between) {
+  image_t jpeg{};
+  PutImage(Gradient(16, 24), 95, jpeg);
+  const std::vector<std::uint8_t> other = {0xFF, 0xC0, 0, 17, 8, 0, 32, 0, 48};  // a frame of 48x32
+  jpeg.data.insert(jpeg.data.begin() + 2, between.begin(), between.end());
+  const std::size_t end = 4 + static_cast<std::size_t>(jpeg.data[4] << 8 | jpeg.data[5]);
+  if (jpeg.data.size() < end) jpeg.data.resize(end);
+  jpeg.data.insert(jpeg.data.begin() + static_cast<std::ptrdiff_t>(end), other.begin(), other.end());
+  jpeg.num_bytes = static_cast<int>(jpeg.data.size());
+  jpeg.height_px = 32;
+  jpeg.width_px = 48;
+  return jpeg;
+}
+
+TEST(Messages, AJpegThatHidesItsSizeFromWhoLooksBeforeDecodingIsRefused) {
+  for (const std::vector<std::uint8_t>& between : {std::vector<std::uint8_t>{0xFF}, {0xFF, 0x01}, {0xFF, 0x00}})
+    EXPECT_THROW(ImageOf(WithTwoSizes(between)), Error) << static_cast<int>(between.back());
+  image_t filled{};
+  PutImage(Gradient(16, 24), 95, filled);
+  filled.data.insert(filled.data.begin() + 2, 0xFF);
+  EXPECT_EQ(ImageOf(filled).size(), cv::Size(24, 16)) << "the standard allows it";
 }
 
 }  // namespace

@@ -5,6 +5,7 @@
 #include <nlohmann/json.hpp>
 
 #include "core/file.h"
+#include "reports/badge.h"
 #include "reports/csv.h"
 #include "reports/report_files.h"
 #include "reports/summary_md.h"
@@ -17,6 +18,7 @@ namespace evac {
 namespace {
 
 using Json = nlohmann::json;
+using testing::AllOf;
 using testing::ElementsAre;
 using testing::HasSubstr;
 using testing::Not;
@@ -177,6 +179,22 @@ TEST_F(XmlOfReports, TheBadgeIsXmlAndSaysTheRateOfTheOnlyPolicy) {
   EXPECT_THAT(FilesOf(LargeRun().Summary()).at("badge.svg"), HasSubstr("4 policies, 160 episodes"));
 }
 
+TEST(Badge, IsGreenOnlyIfEveryGatePassedOnJustTheseData) {
+  const auto shown = [](const char* name, GateOutcome outcome, bool is_current) {
+    ShownGate gate;
+    gate.decision.name = name;
+    gate.decision.outcome = outcome;
+    gate.is_current = is_current;
+    return gate;
+  };
+  const RunSummary& summary = LargeRun().Summary();
+  const ShownGate passed = shown("a", GateOutcome::kPass, true), stale = shown("b", GateOutcome::kPass, false);
+  const ShownGate failed = shown("c", GateOutcome::kFail, true), failed_then = shown("a", GateOutcome::kFail, false);
+  EXPECT_THAT(BadgeSvg(summary, {passed}), HasSubstr("#1a7f37"));
+  EXPECT_THAT(BadgeSvg(summary, {passed, stale}), AllOf(HasSubstr("pass, of older data"), Not(HasSubstr("#1a7f37"))));
+  EXPECT_THAT(BadgeSvg(summary, {failed_then, failed}), HasSubstr("#cf222e")) << "what holds now comes first";
+}
+
 TEST(Xml, WhatXmlCannotHoldIsReplaced) {
   EXPECT_EQ(XmlText("a\x01<\xFF\xEF\xBF\xBF"), "a\xEF\xBF\xBD&lt;\xEF\xBF\xBD\xEF\xBF\xBD");
   EXPECT_EQ(XmlAttribute("a\nb\tc\""), "a&#10;b&#9;c&quot;");
@@ -210,6 +228,21 @@ TEST(SummaryMarkdown, HostileNamesStayInTheirCells) {
   EXPECT_GT(rows, 6);
 }
 
+/// GitHub reads a tag's text as HTML up to the first empty line: what follows one would be Markdown.
+TEST(SummaryMarkdown, ANameOfSeveralLinesStaysInItsFold) {
+  RuleDecision rule;
+  rule.name = "not worse\n\n# Passed\n";
+  rule.outcome = GateOutcome::kFail;
+  rule.flips_worse = 1;
+  rule.counter_examples = {{"a", "41-0000", 1, "c.mp4", "b.mp4"}};
+  GateDecision decision;
+  decision.name = "main";
+  decision.rules = {rule};
+  const std::string page = SummaryMarkdown(HostileRun(), {{decision, true}});
+  EXPECT_THAT(page, HasSubstr("<summary>not worse  # Passed : 1 initial state where"));
+  EXPECT_THAT(page, Not(HasSubstr("\n# Passed")));
+}
+
 TEST(SummaryMarkdown, IsNeverLongerThanItsLimitAndSaysWhatIsLeftOut) {
   std::vector<SampleCell> cells;
   const std::string name(8000, 'x');
@@ -239,7 +272,8 @@ TEST(ReportFiles, ReportJsonFitsItsPublishedSchema) {
          "jsonschema.Draft202012Validator(json.load(open(sys.argv[1]))).validate(json.load(open(sys.argv[2])))",
          EVAC_SOURCE_DIR "/docs/formats/report.schema.json", (folder / "report.json").string()});
   };
-  for (const RunSummary& summary : {LargeRun().Summary(), HostileRun()}) {
+  const RunSummary unpaired = SampleRun({{"a", "pick", "1", "uu", "sf"}}).Summary();
+  for (const RunSummary& summary : {LargeRun().Summary(), HostileRun(), unpaired}) {
     const CommandResult result = validate(FilesOf(summary).at("report.json"));
     EXPECT_EQ(result.exit_code, 0) << result.err.substr(0, 3000);
   }

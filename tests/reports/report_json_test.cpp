@@ -39,6 +39,7 @@ TEST(ReportJson, UndefinedIsNullWithAReasonAndNeverZero) {
   EXPECT_TRUE(json["rates"][0]["success_rate"]["value"].is_null());
   EXPECT_TRUE(json["comparisons"][0]["correlation"]["pearson"]["value"].is_null());
   EXPECT_TRUE(json["comparisons"][0]["pairs"][0]["mcnemar_p_exact"].is_null());
+  EXPECT_EQ(json["comparisons"][0]["pairs"][0]["mcnemar_p_exact_reason"], "no pairs");
 }
 
 TEST(ReportJson, HoldsTheSchemaTheFlipsAndWhereTheNumbersComeFrom) {

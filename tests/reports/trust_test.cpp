@@ -190,6 +190,10 @@ TEST(TrustOutput, JsonHoldsEveryNumberWithItsReason) {
   EXPECT_EQ(task.at("pairs").at("model_only"), 1);
   EXPECT_TRUE(task.at("pearson").at("value").is_null());
   EXPECT_TRUE(task.at("policies").at(0).at("predicted").contains("value_reason"));
+  const TrustReport unpaired{"sim", "the world real", "oracle", {}, TrustOf(Input("sf--", "--sf"))};
+  const auto none = TrustJson(unpaired).at("tasks").at(0);
+  EXPECT_TRUE(none.at("mcnemar_p_exact").is_null());
+  EXPECT_EQ(none.value("mcnemar_p_exact_reason", ""), "no pairs");
 }
 
 TEST(PlanFor, AnswersInWordsAndATableForTheUsersNumbers) {

@@ -25,14 +25,19 @@ inline std::string CookieSetBy(const std::string& head) {
   return head.substr(at + header.size(), head.find(';', at) - at - header.size());
 }
 
-/// A TCP connection to this machine, or -1.
+/// A TCP connection to this machine, or -1. Where nobody listens, a connection may be given that very port and meet
+/// itself: that is none, and in the way of a server that is started there again.
 inline int ConnectTo(int port) {
   const int socket = ::socket(AF_INET, SOCK_STREAM, 0);
   sockaddr_in address{};
   address.sin_family = AF_INET;
   address.sin_port = htons(static_cast<std::uint16_t>(port));
   inet_pton(AF_INET, "127.0.0.1", &address.sin_addr);
-  if (::connect(socket, reinterpret_cast<sockaddr*>(&address), sizeof address) == 0) return socket;
+  sockaddr_in own{};
+  socklen_t size = sizeof own;
+  if (::connect(socket, reinterpret_cast<sockaddr*>(&address), sizeof address) == 0 &&
+      ::getsockname(socket, reinterpret_cast<sockaddr*>(&own), &size) == 0 && own.sin_port != address.sin_port)
+    return socket;
   close(socket);
   return -1;
 }

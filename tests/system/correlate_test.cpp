@@ -138,6 +138,16 @@ TEST(ReportCommand, WantsARunOrATable) {
   EXPECT_EQ(RunCommand({Binary("evac"), "report", "run", "--pairs", "rates.csv", "--out", "out"}).exit_code, 2);
 }
 
+TEST(ReportCommand, AFolderThatCannotBeMadeIsNamed) {
+  const TempFolder folder;
+  const std::string table = (folder / "rates.csv").string();
+  std::ofstream(table) << "group,task,policy,real_sr,sim_sr\n,t,a,0.2,0.5\n";
+  const CommandResult result =
+      RunCommand({Binary("evac"), "report", "--pairs", table, "--out", table + "/page"});
+  EXPECT_EQ(result.exit_code, 4);
+  EXPECT_NE(result.err.find("evac: " + table + ": cannot be made: "), std::string::npos) << result.err;
+}
+
 TEST(CorrelateCommand, WarnsOnStderrAndRefusesWithCodeTwo) {
   const TempFolder folder;
   std::ofstream(folder / "high.csv") << "group,task,policy,real_sr,sim_sr\n,t,a,85,80\n";

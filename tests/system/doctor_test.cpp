@@ -27,5 +27,11 @@ TEST(Doctor, WithoutANetworkItSaysWhatToDo) {
               AllOf(ContainsRegex("FAIL multicast .*ip route add 224.0.0.0/4 dev lo"), HasSubstr("ok   store")));
 }
 
+TEST(Doctor, WithoutAPlaceForTemporaryFilesItSaysSoAndLooksAtTheRest) {
+  const CommandResult result = RunCommand({"/usr/bin/env", "TMPDIR=/nowhere", Binary("evac"), "doctor"});
+  EXPECT_EQ(result.exit_code, 1) << result.err;
+  EXPECT_THAT(result.out, AllOf(ContainsRegex("FAIL disk .*set TMPDIR"), HasSubstr("ok   images")));
+}
+
 }  // namespace
 }  // namespace evac

@@ -134,6 +134,11 @@ TEST_F(ImaginedRun, WeightsThatWereTrainedForSomethingElseAreRefusedBeforeTheFir
     EXPECT_THAT(result.err, HasSubstr("small.safetensors"));
     EXPECT_FALSE(fs::exists(folder_ / "run" / "videos"));
     fs::remove_all(folder_ / "run");
+    std::vector<std::string> words = {Binary("evac"), "validate", kImagined};
+    for (const std::string& setting : Settings(settings)) words.insert(words.end(), {"--set", setting});
+    const CommandResult validated = RunCommand(words);
+    EXPECT_EQ(validated.exit_code, 2) << validated.out << "what a run refuses is not valid";
+    EXPECT_THAT(validated.err, HasSubstr(refusal));
   }
 }
 

@@ -13,6 +13,7 @@
 #include "tests/support/command.h"
 #include "tests/support/synthetic_recording.h"
 #include "tests/support/temp_folder.h"
+#include "tests/system/process_support.h"
 #include "tests/system/run_support.h"
 #include "worldmodel/evac_config.h"
 #include "worldmodel/nn/weights.h"
@@ -174,6 +175,17 @@ TEST_F(FidelityRun, ReplaysInRealityStartFromTheSceneThatTheirActionsAreOf) {
   EXPECT_THAT(later.err, HasSubstr("counterfactual_shifted: its replays began in other scenes than their actions are of"));
   EXPECT_THAT(later.err, HasSubstr("/counterfactual_never_closes: 1 episodes taken over"));
   EXPECT_TRUE(FirstPlaceOfTheBottleIn(folder_ / "later" / "counterfactual_shifted").isApprox(bottle, 1e-6));
+}
+
+TEST_F(FidelityRun, InterruptedItSaysThatTheSameCommandGoesOn) {
+  const fs::path out = folder_ / "out", log = folder_ / "log";
+  const pid_t pid = StartCommand(Words(out), log);
+  ASSERT_TRUE(system_test::WaitUntil([&] { return fs::exists(out / "closed" / "evac.sqlite"); })) << ReadFile(log);
+  ::kill(pid, SIGINT);
+  int status = 0;
+  ASSERT_EQ(::waitpid(pid, &status, 0), pid);
+  EXPECT_TRUE(WIFEXITED(status) && WEXITSTATUS(status) == 4) << status;
+  EXPECT_THAT(ReadFile(log), HasSubstr("evac: interrupted\n      go on with: the same evac fidelity command\n"));
 }
 
 TEST_F(FidelityRun, AClassifierJudgesTheClipsAndSaysHowFarItIs) {

@@ -151,6 +151,32 @@ TEST_F(GateCommand, SequentialBetsAreKeptInTheRunOnceForEachDataSet) {
   EXPECT_GT(looks[0].e_value, 20);
 }
 
+TEST_F(GateCommand, ARunThatTheJudgeHasNotJudgedIsNoBaseline) {
+  const CommandResult nobody = Evac({"gate", "pin", Path("main"), "--judge", "orakel", "--out", Path("nobody.json")});
+  EXPECT_EQ(nobody.exit_code, 2) << nobody.out;
+  EXPECT_THAT(nobody.err, HasSubstr("judge orakel: found no episode that succeeded or failed"));
+  EXPECT_FALSE(std::filesystem::exists(folder_ / "nobody.json"));
+}
+
+TEST_F(GateCommand, AJudgeWhoGaveNoVerdictIsInvalidAndNotInconclusive) {
+  WriteFileAtomically(folder_ / "gate.yaml", "judge: orakel\ngates: [{name: r, test: ci_lower, world: sim, at_least: 0.5}]");
+  const CommandResult unknown = Gate("main");
+  EXPECT_EQ(unknown.exit_code, 2) << unknown.out;
+  EXPECT_THAT(unknown.err, HasSubstr("field judge: found 'orakel', wanted one who has judged " + Path("main") + ": oracle"));
+  WriteFileAtomically(folder_ / "gate.yaml", "judge: orakel\ngates: [{name: e, test: error_share, world: sim, at_most: 0}]");
+  EXPECT_EQ(Gate("main").exit_code, 0) << "errors need no judge";
+  const CommandResult report = Evac({"report", Path("main"), "--judge", "orakel"});
+  EXPECT_EQ(report.exit_code, 2) << report.out;
+  EXPECT_THAT(report.err, HasSubstr("--judge: found 'orakel', wanted one who has judged"));
+  EXPECT_FALSE(std::filesystem::exists(folder_ / "main/report"));
+}
+
+TEST_F(GateCommand, ASeedIsRefusedWhereNoRuleDraws) {
+  const CommandResult seeded = Gate("main", {"--seed", "3"});
+  EXPECT_EQ(seeded.exit_code, 2) << seeded.out;
+  EXPECT_THAT(seeded.err, HasSubstr("--seed: no rule of " + Path("gate.yaml") + " is a correlation"));
+}
+
 TEST_F(GateCommand, WithoutARunItSaysHowManyEpisodesTheRulesTake) {
   const CommandResult result = Evac({"gate", Path("gate.yaml"), "--baseline", Path("baseline.json")});
   EXPECT_EQ(result.exit_code, 0) << result.err;
@@ -169,6 +195,11 @@ TEST_F(GateCommand, GatesARealRun) {
   const CommandResult itself = Gate("run");
   EXPECT_EQ(itself.exit_code, 3) << "4 pairs show nothing" << itself.out << itself.err;
   EXPECT_THAT(itself.out, AllOf(HasSubstr("4 pairs, 0 better / 0 worse"), HasSubstr("PASS          errors")));
+  WriteFileAtomically(folder_ / "gate.yaml", "gates: [{name: r, test: correlation, world: sim, at_least: 0.7}]");
+  const CommandResult first = Gate("run", {"--seed", "3"}), second = Gate("run", {"--seed", "4"});
+  EXPECT_EQ(second.out, first.out);
+  EXPECT_EQ(first.err, "");
+  EXPECT_THAT(second.err, HasSubstr("--seed: this was decided before"));
 }
 
 }  // namespace

@@ -9,8 +9,10 @@
 #include <opencv2/imgcodecs.hpp>
 #include <set>
 
+#include "apps/networks/imagine_start.h"
 #include "core/file.h"
 #include "core/hash.h"
+#include "core/recording_writer.h"
 #include "core/tensor_file.h"
 #include "core/video.h"
 #include "tests/support/command.h"
@@ -30,6 +32,33 @@ namespace fs = std::filesystem;
 using testing::AllOf;
 using testing::HasSubstr;
 using testing::Not;
+
+TEST(ImagineStart, ArmsBeginWhereTheyWereAndGoWhereTheyWereTold) {
+  const TempFolder folder;
+  const auto arms_at = [](double x_m) {
+    ArmState left, right;
+    left.base_from_gripper = Eigen::Translation3d(x_m, 0.2, 0.3);
+    right.base_from_gripper = Eigen::Translation3d(x_m, -0.2, 0.3);
+    return Arms{left, right};
+  };
+  RecordedEpisode recorded;
+  recorded.cameras = {{"head", 48, 32, 40, 40, 24, 16, Mount::kBase, SyntheticClip::MountFromCamera()}};
+  for (int step = 0; step < 3; ++step) {
+    recorded.arms.push_back(arms_at(0.40 + 0.01 * step));
+    recorded.told.push_back(arms_at(0.45 + 0.01 * step));
+    recorded.pictures.push_back({cv::Mat(32, 48, CV_8UC3, cv::Scalar::all(40))});
+  }
+  const TreePlace place{folder.path(), "327", "648642"};
+  WriteRecording(place, recorded, {.scale = 1});
+  ImagineInputs inputs;
+  inputs.recording = place.Folder().string();
+  inputs.stride = 1;
+  inputs.read_told = true;
+  const ImagineStart start = ReadImagineStart(inputs, 1);
+  ASSERT_EQ(start.arms.size(), 3u);
+  EXPECT_NEAR(start.arms[0][0].base_from_gripper.translation().x(), 0.40, 1e-9);
+  EXPECT_NEAR(start.arms[1][1].base_from_gripper.translation().x(), 0.46, 1e-9);
+}
 
 /// A network of milliseconds: chunks of 3 after a memory of 2, one view of 32x64.
 constexpr const char* kTiny = R"(
@@ -240,6 +269,20 @@ TEST_F(ImagineCommand, WeightsOfOtherArmsThanTheRecordingsAreRefused) {
   nn::SaveWeights(folder_ / "tiny.safetensors", weights, ReadEvacConfig(folder_ / "tiny.yaml"),
                   {.metadata = {{"arms", "right"}}});
   ExpectRefused(Frames("refused"), "found arms left, right, wanted right");
+  ExpectRefused(Words("refused", {"--maps-only", "--weights", folder_ / "tiny.safetensors"}),
+                "found arms left, right, wanted right");
+}
+
+TEST_F(ImagineCommand, MapsOfWeightsThatAreNamedAreThoseThatTheirFramesAreImaginedFrom) {
+  nn::RandomWeights weights(5);
+  nn::SaveWeights(folder_ / "tiny.safetensors", weights, ReadEvacConfig(folder_ / "tiny.yaml"),
+                  {.metadata = {{"period_s", "0.0333333"}}});
+  const CommandResult maps = RunCommand(Words("maps", {"--maps-only", "--weights", folder_ / "tiny.safetensors"}));
+  ASSERT_EQ(maps.exit_code, 0) << maps.err;
+  ASSERT_EQ(RunCommand(Frames("frames")).exit_code, 0);
+  const auto of_maps = Files("maps"), of_frames = Files("frames");
+  ASSERT_EQ(of_maps.size(), 7u) << "every step of 30 Hz";
+  for (const auto& [name, hash] : of_maps) EXPECT_EQ(of_frames.at(name), hash) << name;
 }
 
 TEST_F(ImagineCommand, TheVideoShowsEachPictureAboveItsMapAndTheSidecarSaysHowItWasMade) {

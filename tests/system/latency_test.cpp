@@ -19,6 +19,7 @@ std::vector<Episode> Episodes(const std::filesystem::path& run) {
   const Store store = Store::Open(run, Store::Mode::kReadOnly);
   std::vector<Episode> episodes = store.Episodes();
   for (Episode& episode : episodes) store.LoadSteps(episode);
+  EXPECT_FALSE(episodes.empty());
   return episodes;
 }
 

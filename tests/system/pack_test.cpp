@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstring>
 #include <limits>
+#include <optional>
 #include <set>
 
 #include "apps/collect_recipe.h"
@@ -13,6 +14,7 @@
 #include "core/hash.h"
 #include "core/tensor_file.h"
 #include "harness/suite.h"
+#include "reports/csv.h"
 #include "tests/support/command.h"
 #include "tests/support/late_recording.h"
 #include "tests/support/synthetic_recording.h"
@@ -116,6 +118,23 @@ TEST_F(PackCommand, LeavesBrokenRecordingsOutAndCountsThemByKind) {
                                 HasSubstr("1 moving_camera"), HasSubstr("1 not_finite"), HasSubstr("1 short_video")));
   const std::string table = ReadFile(folder_ / "out/left_out.csv");
   EXPECT_THAT(table, AllOf(HasSubstr("short_video"), HasSubstr("5 frames, wanted one for each of the 9 steps")));
+}
+
+TEST_F(PackCommand, ListsRecordingsWhateverTheirFoldersAreCalled) {
+  Add("caf\xE9", Good());
+  SyntheticClip cut = Good();
+  cut.frames = 5;
+  Add("the \"second\", cut", cut);
+  const CommandResult result = RunCommand(Words("out"));
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_THAT(ReadFile(folder_ / "out/shards.json"), HasSubstr("\"caf\xEF\xBF\xBD\"")) << "JSON is UTF-8";
+  const std::string table = ReadFile(folder_ / "out/left_out.csv");
+  CsvReader rows(table, "left_out.csv");
+  ASSERT_TRUE(rows.Next()) << "a header";
+  const std::optional<CsvRow> row = rows.Next();
+  ASSERT_TRUE(row && row->cells.size() == 3) << table;
+  EXPECT_THAT(row->cells[0], HasSubstr("data/the \"second\", cut"));
+  EXPECT_EQ(row->cells[1], "short_video");
 }
 
 TEST_F(PackCommand, WithNothingToPackSaysWhyAndExitsWith2) {

@@ -58,7 +58,7 @@ TEST_F(PolicyProgramsTest, AnOptionOutranksTheEnvironment) {
 
 TEST_F(PolicyProgramsTest, APolicyThatIsKilledFailsItsEpisodeAndIsThereForTheNext) {
   PolicyProcess process(Options(
-      {"sh", "-c", fmt::format("echo $$ > {0}/pid; exec {1} hold", folder_.path().string(), Binary("evac-policy"))}));
+      {"sh", "-c", fmt::format("echo $$ > '{0}/pid'; exec '{1}' hold", folder_.path().string(), Binary("evac-policy"))}));
   LcmPolicy policy({.address = address_, .deadline_s = 60});
   policy.Handshake(HarnessSpec(task_, 16), 60);
   policy.Reset(0, task_, 1);

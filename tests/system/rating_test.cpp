@@ -161,6 +161,14 @@ TEST(RatingSession, WrongWordsAreRefusedWithWhatWasWanted) {
   ASSERT_EQ(Rate({"new", study, "--run", run.folder().string(), "--height", "64"}).exit_code, 0);
   EXPECT_THAT(Rate({"new", study, "--run", run.folder().string()}).err,
               HasSubstr("every clip of these runs is in it already"));
+  EXPECT_THAT(Rate({"new", study, "--run", run.folder().string(), "--raters", "5"}).err,
+              HasSubstr("--raters: found 5, but " + study + " was begun with 3"));
+  EXPECT_THAT(Rate({"new", study, "--run", run.folder().string(), "--name", "other"}).err,
+              HasSubstr("--name: found 'other'"));
+  const std::string unknown = study + "_unknown";
+  EXPECT_THAT(Rate({"new", unknown, "--run", run.folder().string(), "--gold-from", "orakel"}).err,
+              HasSubstr("--gold-from: found 'orakel', wanted one who has judged these runs: oracle"));
+  EXPECT_FALSE(std::filesystem::exists(unknown)) << "no study is frozen without the gold that was asked for";
   EXPECT_THAT(Rate({"invite", study, "--role", "king"}).err, HasSubstr("wanted rater, adjudicator or lead"));
   EXPECT_THAT(Rate({"export", study}).err, HasSubstr("--csv"));
   EXPECT_THAT(Rate({"invite", study, "--count", "2", "--url", "https://rate.lab.org"}).out,

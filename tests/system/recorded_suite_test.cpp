@@ -2,10 +2,12 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <set>
 
 #include "apps/factory.h"
 #include "apps/network_parts.h"
 #include "core/error.h"
+#include "core/file.h"
 #include "core/recording_writer.h"
 #include "core/store.h"
 #include "tests/support/command.h"
@@ -135,6 +137,31 @@ TEST_F(RecordedSuite, WeightsOfOtherArmsAreRefusedWithBoth) {
   EXPECT_THAT([&] { CheckNetwork(suite.worlds.front(), suite.tasks); },
               ThrowsMessage<Error>(AllOf(HasSubstr("world evac: task pour: found arms left, right, wanted right"),
                                          HasSubstr("two.safetensors"))));
+}
+
+TEST_F(RecordedSuite, ATaskOfFewerCamerasThanTheNetworkHasViewsIsRefusedBeforeTheFirstEpisode) {
+  WriteWeights("two", {});
+  Suite suite = Filled(kEvac);
+  suite.tasks.front().cameras.pop_back();
+  EXPECT_THAT([&] { CheckNetwork(suite.worlds.front(), suite.tasks); },
+              ThrowsMessage<Error>(HasSubstr("world evac: task pour has 1 cameras, the network imagines 2 views")));
+}
+
+TEST_F(RecordedSuite, ItsHashCoversWhatLiesElsewhereInTheTree) {
+  const TreePlace place{folder_ / "tree", "carry", "1"};
+  WriteLateRecording(place);
+  const fs::path page = WriteSuite(kEcho);
+  const auto hash = [&] { return ReadSuite(page, {"recording=" + place.Folder().string()}).hash; };
+  std::set<std::string> hashes = {hash()};
+  EXPECT_EQ(ReadSuite(page, {"recording=" + (place.Folder() / "videos").string()}).hash, *hashes.begin());
+  fs::path last;
+  for (const char* part : {"observations", "parameters", "proprio_stats"}) {
+    for (const auto& entry : fs::recursive_directory_iterator(place.root / part)) {
+      if (entry.is_regular_file()) last = entry.path();
+    }
+    WriteText(last, ReadFile(last) + " ");
+    EXPECT_TRUE(hashes.insert(hash()).second) << last << " was changed and the hash is the same";
+  }
 }
 
 TEST_F(RecordedSuite, ToldArmsAreReplayedWhereThatIsAskedForAndRecorded) {

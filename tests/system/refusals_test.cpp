@@ -69,7 +69,7 @@ TEST_F(Refusals, ASecondPolicyThatDoesNotFitOrIsNotThereEndsTheRunBeforeTheFirst
 TEST_F(Refusals, AProgramThatIsNoPolicyIsRefusedAfterItsTimeToStart) {
   const CommandResult result = Run({"policies.0.command=[sleep, \"60\"]", "transport={start_s: 1}"});
   EXPECT_EQ(result.exit_code, 2);
-  EXPECT_THAT(result.err, HasSubstr("1"));
+  EXPECT_THAT(result.err, HasSubstr("no policy answered within 1 s on "));
 }
 
 TEST_F(Refusals, APolicyThatHangsFailsItsEpisodesAndTheBudgetEndsTheRunSayingSo) {

@@ -133,6 +133,35 @@ TEST(Resume, WhoRanWithOtherTimesThanTheRunBeganWithIsToldTheCommandThatKeepsThe
   EXPECT_EQ(good.exit_code, 0) << good.err;
 }
 
+TEST(Resume, FailedEpisodesKeepTheirReasonsWhereTheirPolicyCannotBeStartedAgain) {
+  const TempFolder folder;
+  const fs::path script = folder / "policy.sh";
+  std::ofstream(script) << "exec '" << Binary("faulty-policy") << "' --fault error\n";
+  const std::string run = (folder / "run").string();
+  const CommandResult ended =
+      RunCommand(RunWords(kFaults, run, {"policies.0.command=[/bin/sh, " + script.string() + "]", "error_budget=0"}));
+  EXPECT_EQ(ended.exit_code, 4) << ended.err;
+  const std::string before = List(run);
+  EXPECT_THAT(before, HasSubstr("policy_error"));
+
+  fs::remove(script);
+  const CommandResult retried = RunCommand({Binary("evac"), "resume", run, "--retry-failed"});
+  EXPECT_EQ(retried.exit_code, 2) << retried.err;
+  EXPECT_EQ(List(run), before);
+}
+
+TEST(Resume, TheCommandThatGoesOnIsReadBackByAShell) {
+  const TempFolder folder;
+  const std::string run = (folder / "my run").string();
+  const CommandResult ended = RunCommand(
+      RunWords(kFaults, run, {"policies.0.command=[faulty-policy, --fault, error]", "error_budget=0"}));
+  EXPECT_EQ(ended.exit_code, 4);
+  EXPECT_THAT(ended.err, HasSubstr("go on with: evac resume '" + run + "' --retry-failed\n"));
+  const CommandResult again = RunCommand({Binary("evac"), "resume", run});
+  EXPECT_EQ(again.exit_code, 4);
+  EXPECT_THAT(again.err, HasSubstr("go on with: evac resume '" + run + "' --retry-failed\n"));
+}
+
 TEST(Resume, ARunThatAnotherVersionBeganGoesOnAndSaysSo) {
   const TempFolder folder;
   const Suite suite = ReadSuite(kFaults, {"initial_states.count=1"});

@@ -1,5 +1,7 @@
 #pragma once
 
+#include <gtest/gtest.h>
+
 #include <filesystem>
 #include <map>
 #include <string>
@@ -21,9 +23,11 @@ inline std::vector<std::string> RunWords(const std::string& suite, const std::fi
   return words;
 }
 
-/// Every episode with its reasons and its video's hash.
+/// Every episode with its reasons and its video's hash. Fails the test if it cannot be told: two empty texts are equal.
 inline std::string List(const std::filesystem::path& run) {
-  return RunCommand({Binary("evac"), "ls", run.string(), "--json"}).out;
+  const CommandResult listed = RunCommand({Binary("evac"), "ls", run.string(), "--json"});
+  EXPECT_EQ(listed.exit_code, 0) << listed.err;
+  return listed.out;
 }
 
 }  // namespace evac::system_test

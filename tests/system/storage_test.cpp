@@ -86,6 +86,16 @@ TEST(Storage, AnOutputThatCannotBeWrittenIsOneMessage) {
   EXPECT_EQ(Lines(result.err, ""), 1) << result.err;
 }
 
+TEST(Storage, ResultsThatAFullDiskDidNotTakeAreNoSuccess) {
+  for (const char* command : {"plan", "plan --json"}) {
+    const std::string words = "exec \"$0\" " + std::string(command) + " >/dev/full";
+    const CommandResult result = RunCommand({"/bin/sh", "-c", words, Binary("evac")});
+    EXPECT_EQ(result.exit_code, 4) << command;
+    EXPECT_THAT(result.err, HasSubstr("No space left"));
+    EXPECT_EQ(Lines(result.err, "evac: "), 1) << result.err;
+  }
+}
+
 TEST(Storage, ARunThatAnotherProcessWritesIsRefusedWithItsNumberAndGoesOnUnharmed) {
   const TempFolder folder;
   const pid_t first = StartCommand(RunWords(kFaults, folder / "run"), folder / "log");

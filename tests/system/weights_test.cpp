@@ -1,3 +1,4 @@
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -7,6 +8,7 @@
 
 #include "core/hash.h"
 #include "core/tensor_file.h"
+#include "tests/support/temp_folder.h"
 #include "tests/system/process_support.h"
 
 namespace evac {
@@ -30,14 +32,8 @@ image_encoder: {width: 32, layers: 1, head_width: 16, patch_px: 14, image_px: 28
 class WeightsCommand : public ::testing::Test {
  protected:
   void SetUp() override {
-    folder_ = fs::path(::testing::TempDir()) /
-              (std::string("weights_command_") + ::testing::UnitTest::GetInstance()->current_test_info()->name());
-    fs::remove_all(folder_);
-    fs::create_directories(folder_);
     std::ofstream(folder_ / "tiny.yaml") << kTinyPage;
   }
-  void TearDown() override { fs::remove_all(folder_); }
-
   struct Answer {
     int exit_code = -1;
     std::string text;
@@ -45,8 +41,9 @@ class WeightsCommand : public ::testing::Test {
   /// `evac weights …` in the test's folder, both streams.
   Answer Evac(const std::string& arguments) const {
     const std::string log = (folder_ / "log").string();
-    const int status = std::system(
-        ("cd " + folder_.string() + " && " EVAC_BIN_DIR "/evac weights " + arguments + " >" + log + " 2>&1").c_str());
+    const std::string command = fmt::format("cd '{}' && '{}/evac' weights {} >'{}' 2>&1", folder_.string(),
+                                            EVAC_BIN_DIR, arguments, log);
+    const int status = std::system(command.c_str());
     std::ostringstream text;
     text << std::ifstream(log).rdbuf();
     return {WEXITSTATUS(status), text.str()};
@@ -57,7 +54,8 @@ class WeightsCommand : public ::testing::Test {
   }
   std::string Hash(const std::string& file) const { return Sha256HexOfFile(folder_ / file); }
 
-  fs::path folder_;
+  const TempFolder temp_;
+  const fs::path folder_ = temp_.path();
 };
 
 TEST_F(WeightsCommand, InitMakesTheSameFileOfASeedAndItFits) {
@@ -101,14 +99,13 @@ TEST_F(WeightsCommand, MeanFitsAndSaysWhatItIsOf) {
 
 TEST_F(WeightsCommand, ConvertReadsWhatTorchSavedInEveryLayout) {
   Init("f32.safetensors");
-  const std::string script = "python3 " EVAC_SOURCE_DIR "/tests/support/torch_checkpoint.py ";
+  const std::string script = EVAC_SOURCE_DIR "/tests/support/torch_checkpoint.py";
   if (std::system("python3 -c 0 2>/dev/null") != 0) GTEST_SKIP() << "there is no python3 to write checkpoints with";
   for (const std::string layout : {"state_dict", "module", "plain"}) {
     const std::string pt = layout + ".pt", out = layout + ".safetensors";
-    ASSERT_EQ(
-        std::system(
-            (script + (folder_ / "f32.safetensors").string() + " " + (folder_ / pt).string() + " " + layout).c_str()),
-        0);
+    const std::string command = fmt::format("python3 '{}' '{}' '{}' {}", script,
+                                            (folder_ / "f32.safetensors").string(), (folder_ / pt).string(), layout);
+    ASSERT_EQ(std::system(command.c_str()), 0);
     const Answer answer = Evac("convert " + pt + " " + out + " --config tiny.yaml");
     ASSERT_EQ(answer.exit_code, 0) << answer.text;
     const TensorFile before = TensorFile::Open(folder_ / "f32.safetensors"), after = TensorFile::Open(folder_ / out);
@@ -142,7 +139,7 @@ TEST_F(WeightsCommand, BadFilesEndInOneMessageAndExitCode2) {
   EXPECT_EQ(Evac("inspect nowhere.safetensors").exit_code, 2);
   EXPECT_THAT(Evac("init there.safetensors --config tiny.yaml").text, HasSubstr("is there already"));
   const std::string hostile = EVAC_SOURCE_DIR "/tests/fuzz/corpus/checkpoint_fuzz/hostile";
-  const Answer answer = Evac("inspect " + hostile);
+  const Answer answer = Evac("inspect '" + hostile + "'");
   EXPECT_EQ(answer.exit_code, 2);
   EXPECT_THAT(answer.text, HasSubstr("'posix.system'"));
 }

@@ -46,7 +46,7 @@ TEST(WrittenPolicies, TheOneInPythonRunsItsTasksByThePagesOwnCommands) {
   WriteText(folder / "wander/wander.py", BlockOfPage("python", "# wander.py"));
   WriteText(folder / "wander/wander.yaml", BlockOfPage("yaml", "# wander.yaml"));
   const std::string commands = BlockOfPage("bash", "pip install lcm");
-  const std::string path = fmt::format("export PATH={}:$PATH\ncd {}\n", fs::path(Binary("evac")).parent_path().string(),
+  const std::string path = fmt::format("export PATH='{}':$PATH\ncd '{}'\n", fs::path(Binary("evac")).parent_path().string(),
                                        folder.path().string());
   const CommandResult tried = RunCommand({"/bin/bash", "-ec", path + commands.substr(0, commands.find("lcm-gen"))});
   if (tried.exit_code != 0) GTEST_SKIP() << "Python's LCM bindings cannot be had here: " << tried.out << tried.err;

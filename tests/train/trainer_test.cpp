@@ -165,11 +165,14 @@ TEST(Trainer, GoesOnAfterAnyKillAsIfNothingHadHappened) {
   Trainer(whole.Parameters(), Quick(60), whole_folder.path()).Run({.loss = [&](const StepPlace& p) { return whole.Loss(p); }});
   struct Killed {};
   Tensor last;
+  std::int64_t reached = 0;
   for (const std::int64_t kill_at : {7, 20, 21, 59, 1000}) {
     Regression killed;  // as a new process: nothing is left but the folder
     TrainerOptions options = Quick(60);
     options.checkpoint_every_s = 0;
     Trainer trainer(killed.Parameters(), options, killed_folder.path());
+    EXPECT_EQ(trainer.step(), reached) << "what was done before is not done again";
+    reached = kill_at;
     try {
       trainer.Run({.loss = [&](const StepPlace& place) {
         if (place.step == kill_at) throw Killed();

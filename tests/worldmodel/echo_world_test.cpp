@@ -89,8 +89,9 @@ TEST_F(EchoWorldTest, WhereThereIsNoVideoTheFirstFrameStays) {
   world.Reset(0, TaskFromRecording(still), kStart, 1);
   const ActionChunk chunk = Chunk(1, 4);
   const std::vector<SceneChunk> batch = {{0, &chunk}};
-  for (const WorldStep& step : Steps(world.Advance(batch).at(0)))
-    EXPECT_NEAR(GreyOf(step), SyntheticClip::FrameGrey(0), 3);
+  const std::vector<WorldStep> steps = Steps(world.Advance(batch).at(0));
+  ASSERT_EQ(steps.size(), 4u);
+  for (const WorldStep& step : steps) EXPECT_NEAR(GreyOf(step), SyntheticClip::FrameGrey(0), 3);
 }
 
 TEST_F(EchoWorldTest, ATaskWithOtherArmsOrCamerasIsRefused) {

@@ -311,8 +311,9 @@ TEST(ChunkCache, SeveralProcessesMayShareAFolder) {
     ::waitpid(child, &status, 0);
     EXPECT_TRUE(WIFEXITED(status) && WEXITSTATUS(status) == 0);
   }
-  for (const fs::path& file : FilesBelow(folder.path()))
-    EXPECT_EQ(file.extension(), ".safetensors") << "nothing half done";
+  const auto files = FilesBelow(folder.path());
+  EXPECT_FALSE(files.empty());
+  for (const fs::path& file : files) EXPECT_EQ(file.extension(), ".safetensors") << "nothing half done";
 }
 
 TEST(ChunkCache, WantsToKnowWhichNetworkItIsFor) {

@@ -163,6 +163,7 @@ std::optional<std::string> DrawProcess::HearAnswer() {
 }
 
 std::string DrawProcess::HowItDied() {
+  if (pid_ < 0) return "had ended before";  // a signal to process -1 is one to everybody
   int status = 0;
   ::kill(pid_, SIGKILL);  // if it closed the socket and lives on
   ::waitpid(pid_, &status, 0);

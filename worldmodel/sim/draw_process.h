@@ -21,7 +21,7 @@ class DrawProcess {
   DrawProcess& operator=(const DrawProcess&) = delete;
 
   DrawingBoard& board() { return *board_; }
-  pid_t pid() const { return pid_; }
+  pid_t pid() const { return pid_; }  ///< -1 once it was found dead
 
   /// Sends a model that orders may name from now on: the first is base 0.
   /// @returns how the process died, nothing if it did not. @throws InternalError if the process refuses.

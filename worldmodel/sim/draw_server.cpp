@@ -10,6 +10,7 @@
 #include <cstdio>
 #include <memory>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include "core/error.h"
@@ -108,8 +109,9 @@ class DrawServer {
   explicit DrawServer(DrawingBoard& board) : board_(board) { OpenOpenGl(); }
 
   void Learn() {
-    models_.emplace_back(mj_loadModel(fmt::format("/proc/self/fd/{}", kModelFd).c_str(), nullptr));
-    if (!models_.back()) throw InternalError("cannot render: a scene of MuJoCo did not arrive whole");
+    ModelPtr model(mj_loadModel(fmt::format("/proc/self/fd/{}", kModelFd).c_str(), nullptr));
+    if (!model) throw InternalError("cannot render: a scene of MuJoCo did not arrive whole");
+    models_.push_back(std::move(model));
   }
 
   void Draw() {

@@ -1,6 +1,7 @@
 #include "worldmodel/sim/scene_page.h"
 
 #include <algorithm>
+#include <cmath>
 #include <string_view>
 
 #include "core/config.h"
@@ -14,7 +15,8 @@ constexpr double kFloorBelowTableM = 0.75;  // scenes/robot.xml
 
 std::vector<double> ReadNumbers(const Config& page, const std::string& key, std::size_t count) {
   auto numbers = page.Get<std::vector<double>>(key);
-  page.Require(numbers.size() == count, key, fmt::format("{} numbers", count));
+  const bool finite = std::all_of(numbers.begin(), numbers.end(), [](double number) { return std::isfinite(number); });
+  page.Require(numbers.size() == count && finite, key, fmt::format("{} finite numbers", count));
   return numbers;
 }
 
@@ -28,6 +30,8 @@ Home ReadHome(const Config& page) {
   page.AllowOnly({"inside", "position_m", "quat_xyzw", "closure"});
   const auto xyz = ReadNumbers(page, "position_m", 3);
   const auto quat = ReadNumbers(page, "quat_xyzw", 4);
+  const bool unit = std::abs(Eigen::Vector4d(quat.data()).norm() - 1) < 1e-3;
+  page.Require(unit, "quat_xyzw", "four numbers x, y, z, w of length 1");
   Home home{page.Get<std::string>("inside", ""),
             FromXyzQuat({xyz[0], xyz[1], xyz[2]}, {quat[0], quat[1], quat[2], quat[3]}),
             page.Get<double>("closure", 0.0)};

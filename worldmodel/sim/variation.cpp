@@ -96,6 +96,9 @@ void Scatter(mjModel& model, const Clutter& clutter, SplitMix64 random) {
   std::vector<Eigen::Vector2d> places_m = clutter.places_m;
   for (const std::string& name : clutter.bodies) {
     const int body = IdOf(model, mjOBJ_BODY, name);
+    if (IsOfThing(model, body))
+      throw InvalidInput("scene {}: clutter '{}' is free to move, wanted a fixed body (free ones are `objects`)",
+                         model.names, name);
     const std::size_t chosen = random.Below(places_m.size());
     const Eigen::Vector2d jitter_m(random.Uniform(-1, 1), random.Uniform(-1, 1));
     const double half_yaw = random.Uniform(-std::numbers::pi, std::numbers::pi) / 2;

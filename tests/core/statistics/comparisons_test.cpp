@@ -253,6 +253,7 @@ TEST(Sequential, TheFlipsBetIsAFairGame) {
   bet.Add(true, true);
   EXPECT_EQ(bet.e_value(), FlipsEValue(7, 0));
   EXPECT_GT(bet.e_value(), 20);
+  EXPECT_TRUE(std::isfinite(FlipsEValue(2000, 0))) << "2^2000 is no number of a JSON file";
   EXPECT_THROW(FlipsEValue(-1, 0), Error);
 }
 

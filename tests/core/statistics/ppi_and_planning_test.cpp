@@ -98,7 +98,17 @@ TEST(Planning, TheSizeIsTheFirstThatIsEnough) {
   EXPECT_EQ(RatersFor(0.5, 0.9), 0);
 }
 
+/// All 8 pairs must flip one way at alpha .01: 8 do in 82 % of cases, 9 to 11 more seldom, 12 may spare one.
+TEST(Planning, APowerThatHoldsAndFallsAgainIsLookedForFurtherOn) {
+  const FlipRates rates{0.975, 0.025};
+  EXPECT_GE(McNemarPower(8, rates, 0.01), 0.8);
+  EXPECT_LT(McNemarPower(10, rates, 0.01), 0.8);
+  EXPECT_EQ(PairsForMcNemar(rates, {.alpha = 0.01}).n, 12);
+}
+
 TEST(Planning, WhatNoSizeCanShowIsUndefinedAndNonsenseIsRefused) {
+  EXPECT_EQ(TrialsPerPolicy(0.5, 0.5 + 1e-12).exact.reason(), "more than can be counted");
+
   EXPECT_FALSE(TrialsPerPolicy(0.4, 0.4).exact);
   EXPECT_FALSE(PairsForMcNemar({0.1, 0.1}).exact);
   EXPECT_FALSE(PairsForMcNemar({0.101, 0.1}, {}, 200).exact) << "more than 200";

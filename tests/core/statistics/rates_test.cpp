@@ -89,6 +89,15 @@ TEST(ClusteredRate, CountsClustersWhereTrialsWithinThemAreCopies) {
   EXPECT_EQ(clustered.n, 30);
 }
 
+TEST(ClusteredRate, CountsWhatItsTrialsRestOnWhereClustersDifferInSize) {
+  const std::vector<Count> copies = {{0, 1}, {1, 1}, {1, 1}, {1, 1}, {0, 1}, {10, 10}};  // a state tried ten times
+  const ClusterStatistics statistics = StatisticsOfClusters(copies);
+  EXPECT_NEAR(*statistics.icc, 1, 1e-12);
+  EXPECT_NEAR(*statistics.design_effect, 105.0 / 15, 1e-12) << "sum of squares over sum";
+  EXPECT_NEAR(*statistics.effective_trials, 225.0 / 105, 1e-12) << "fewer than the states, as most rest on one";
+  EXPECT_LT(ClusteredWilsonInterval(copies).interval->low, 0.3);
+}
+
 TEST(ClusteredRate, IsNeverSurerThanItsTrials) {
   const std::vector<Count> alternating = {{1, 2}, {1, 2}, {1, 2}, {1, 2}};  // more even than chance: ICC below 0
   EXPECT_LT(*StatisticsOfClusters(alternating).icc, 0);

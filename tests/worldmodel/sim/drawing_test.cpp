@@ -1,12 +1,14 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <signal.h>
+#include <sys/resource.h>
 
 #include <atomic>
 #include <thread>
 
 #include "core/error.h"
 #include "tests/worldmodel/sim/sim_test_support.h"
+#include "worldmodel/sim/draw_process.h"
 #include "worldmodel/sim/renderer.h"
 
 namespace evac::test {
@@ -14,6 +16,7 @@ namespace {
 
 using namespace evac::sim;
 using ::testing::HasSubstr;
+using ::testing::Optional;
 
 /// A scene at its start, seen by the task's head camera.
 struct View {
@@ -50,6 +53,28 @@ TEST(Renderer, GoesOnWithAnotherProcessWhenTheFirstIsKilled) {
   EXPECT_TRUE(AreEqual(toast.Drawn(renderer), other));
   EXPECT_TRUE(AreEqual(bottle.Drawn(renderer), before));
   EXPECT_NE(renderer.DrawingPid(), first);
+}
+
+TEST(Renderer, DrawsAgainAfterNoOtherProcessCouldBeStarted) {
+  Renderer renderer;
+  View bottle("take_bottle");
+  const cv::Mat before = bottle.Drawn(renderer);
+  rlimit descriptors{};
+  ASSERT_EQ(::getrlimit(RLIMIT_NOFILE, &descriptors), 0);
+  const rlimit none_left{1, descriptors.rlim_max};
+  ASSERT_EQ(::kill(renderer.DrawingPid(), SIGKILL), 0);
+  ASSERT_EQ(::setrlimit(RLIMIT_NOFILE, &none_left), 0);
+  EXPECT_THROW(bottle.Drawn(renderer), Error);
+  ASSERT_EQ(::setrlimit(RLIMIT_NOFILE, &descriptors), 0);
+  EXPECT_TRUE(AreEqual(bottle.Drawn(renderer), before));
+}
+
+TEST(DrawProcess, AskedAfterItsEndItSaysSoAndSignalsNobody) {
+  DrawProcess process;
+  ASSERT_EQ(::kill(process.pid(), SIGKILL), 0);
+  EXPECT_THAT(process.Draw(), Optional(HasSubstr("was ended by signal 9")));
+  ASSERT_EQ(process.pid(), -1);
+  EXPECT_THAT(process.Draw(), Optional(HasSubstr("had ended before")));
 }
 
 TEST(Renderer, DrawsTheSameBesideOthers) {

@@ -14,6 +14,7 @@
 #include "core/error.h"
 #include "core/file.h"
 #include "judges/oracle_judge.h"
+#include "tests/support/temp_folder.h"
 #include "tests/worldmodel/sim/scripted_pick.h"
 #include "tests/worldmodel/sim/sim_test_support.h"
 
@@ -247,11 +248,9 @@ TEST(MujocoWorld, AGreenBottleIsWhereTheCalibratedCamerasSayItIs) {
 }
 
 /// The bottle's task in a scene with a pendulum that is driven instead of damped: within two seconds no number is
-/// finite.
-Task TaskThatBlowsUp() {
+/// finite. Its files are written into the folder.
+Task TaskThatBlowsUp(const std::filesystem::path& folder) {
   const std::filesystem::path scenes = std::filesystem::path(EVAC_SOURCE_DIR) / "worldmodel/sim/scenes";
-  const std::filesystem::path folder = std::filesystem::path(::testing::TempDir()) / "blows_up";
-  std::filesystem::create_directories(folder);
   std::string scene = ReadFile(scenes / "take_bottle.xml");
   scene.insert(scene.find("</worldbody>"),
                R"(<body pos="0 0 -2"><inertial pos="0.1 0 0" mass="0.1" diaginertia="0.001 0.001 0.001"/>
@@ -262,8 +261,9 @@ Task TaskThatBlowsUp() {
 }
 
 TEST(MujocoWorld, PhysicsThatDivergesFailsItsOwnSceneOnly) {
+  const TempFolder folder;
   MujocoWorld world = MakeWorld("sim", 2);
-  const Task bad = WithTinyPictures(TaskThatBlowsUp()), good = WithTinyPictures(ReadTask("take_bottle"));
+  const Task bad = WithTinyPictures(TaskThatBlowsUp(folder.path())), good = WithTinyPictures(ReadTask("take_bottle"));
   const ArmState home = world.Reset(0, bad, State(1), 1).observation.arms[0];
   world.Reset(1, good, State(1), 1);
   const ActionChunk rest{std::vector<Arms>(20, {home}), false};
@@ -295,6 +295,15 @@ TEST(MujocoWorld, WhatItCannotShowIsRefusedByName) {
   Task misspelt = ReadTask("take_bottle");
   misspelt.page.replace(misspelt.page.find("body: bottle"), 12, "body: flask ");
   EXPECT_THAT(complaint_about(misspelt), HasSubstr("flask"));
+  Task unturned = ReadTask("take_bottle");
+  unturned.page.replace(unturned.page.find("quat_xyzw: [1, 0, 0, 0]"), 23, "quat_xyzw: [0, 0, 0, 0]");
+  EXPECT_THAT(complaint_about(unturned), HasSubstr("quat_xyzw"));
+  Task nowhere = ReadTask("take_bottle");
+  nowhere.page.replace(nowhere.page.find("position_m: [0.30, 0.0"), 22, "position_m: [.nan, 0.0");
+  EXPECT_THAT(complaint_about(nowhere), HasSubstr("position_m"));
+  Task scattered = ReadTask("take_bottle");
+  scattered.page.replace(scattered.page.find("bodies: [clutter_mug"), 20, "bodies: [bottle");
+  EXPECT_THAT(complaint_about(scattered), HasSubstr("clutter 'bottle' is free to move"));
   Task unnamed = ReadTask("take_bottle");
   unnamed.page.replace(unnamed.page.find("includes: [robot.xml]"), 21, "includes: []");
   EXPECT_THAT(complaint_about(unnamed), HasSubstr("robot.xml"));

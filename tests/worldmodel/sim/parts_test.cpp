@@ -6,6 +6,7 @@
 
 #include "core/error.h"
 #include "core/file.h"
+#include "tests/support/temp_folder.h"
 #include "tests/worldmodel/sim/scripted_pick.h"
 #include "tests/worldmodel/sim/sim_test_support.h"
 #include "worldmodel/sim/arm_control.h"
@@ -74,7 +75,8 @@ TEST(Profile, BothShippedPagesAreReadAndDiffer) {
 }
 
 TEST(Profile, ItsHashIsOfWhatItSaysNotOfHowItIsWritten) {
-  const auto path = std::filesystem::path(::testing::TempDir()) / "profile.yaml";
+  const TempFolder folder;
+  const std::filesystem::path path = folder / "profile.yaml";
   const std::string page = ReadFile(ProfilePage("real"));
   WriteFileAtomically(path, "# another comment\n" + page);
   EXPECT_EQ(ReadProfile(path).hash, ReadProfile(ProfilePage("real")).hash);
@@ -83,7 +85,8 @@ TEST(Profile, ItsHashIsOfWhatItSaysNotOfHowItIsWritten) {
 }
 
 TEST(Profile, AnImpossibleValueIsRefusedWithItsField) {
-  const auto path = std::filesystem::path(::testing::TempDir()) / "wrong.yaml";
+  const TempFolder folder;
+  const std::filesystem::path path = folder / "wrong.yaml";
   const std::string page = ReadFile(ProfilePage("real"));
   WriteFileAtomically(path, std::string(page).replace(page.find("mass: 1.2"), 9, "mass: -12"));
   try {
