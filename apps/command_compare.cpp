@@ -125,20 +125,29 @@ std::string NameOfLooks(const ComparedWorld& compared, const JudgedRun& first, c
                      compared.world, judge, other_judge == judge ? "" : " and " + other_judge);
 }
 
+std::vector<ComparisonRow> RowsOf(const PolicyComparison& comparison) {
+  std::vector<ComparisonRow> rows = comparison.tasks;
+  if (rows.size() > 1) rows.push_back(comparison.all);
+  return rows;
+}
+
+/// Before a look is kept of any world.
+void DemandPairs(const PolicyComparison& comparison) {
+  for (const ComparisonRow& row : RowsOf(comparison)) {
+    if (row.is_paired) continue;
+    throw InvalidInput("compare: --sequential bets on pairs, but {} shares {} of {} and {} initial states",
+                       row.task.empty() ? "all tasks together" : row.task, row.shared, row.first_episodes,
+                       row.second_episodes);
+  }
+}
+
 /// This look's bets, and what was kept under `name` of the looks before in `run`; only what has changed since is a new
 /// look.
 std::vector<BetState> Bet(const PolicyComparison& comparison, const std::string& name, const std::string& run) {
-  std::vector<ComparisonRow> rows = comparison.tasks;
-  if (rows.size() > 1) rows.push_back(comparison.all);
   const std::vector<SequentialLook> before = Store::Open(run, Store::Mode::kReadOnly).Looks();
   std::vector<SequentialLook> added;
   std::vector<BetState> bets;
-  for (const ComparisonRow& row : rows) {
-    if (!row.is_paired) {
-      throw InvalidInput("compare: --sequential bets on pairs, but {} shares {} of {} and {} initial states",
-                         row.task.empty() ? "all tasks together" : row.task, row.shared, row.first_episodes,
-                         row.second_episodes);
-    }
+  for (const ComparisonRow& row : RowsOf(comparison)) {
     BetState bet{row.task, row.shared, row.flips, FlipsEValue(row.flips.only_first, row.flips.only_second), 1, 0};
     SequentialLook look{name, row.task, row.shared, row.flips.only_first, row.flips.only_second, bet.e_value};
     bool is_new = true;
@@ -166,14 +175,18 @@ void Compare(const CompareArguments& arguments) {
   const std::string a = PolicyOf(one, first.policy), b = PolicyOf(two, second.policy);
   const bool same_run = std::filesystem::equivalent(first.run, second.run);
   if (same_run && a == b) throw InvalidInput("compare: {} against itself", a);
-  Json all = {{"schema", 1}, {"worlds", Json::array()}};
+  std::vector<ComparedWorld> worlds;
   for (const std::string& world : WorldsOfBoth(one, two, arguments.world)) {
     ComparedPolicy left = Side(one, a, world), right = Side(two, b, world);
     if (a == b) {
       left.name = first.run + ":" + a;
       right.name = second.run + ":" + b;
     }
-    ComparedWorld compared{world, arguments.judge, ComparePolicies(left, right, arguments.options), {}};
+    worlds.push_back({world, arguments.judge, ComparePolicies(left, right, arguments.options), {}});
+    if (arguments.sequential) DemandPairs(worlds.back().comparison);
+  }
+  Json all = {{"schema", 1}, {"worlds", Json::array()}};
+  for (ComparedWorld& compared : worlds) {
     if (arguments.sequential) compared.bets = Bet(compared.comparison, NameOfLooks(compared, one, two), first.run);
     if (!arguments.json) fmt::print("{}{}", all["worlds"].empty() ? "" : "\n", ComparisonText(compared));
     all["worlds"].push_back(ComparisonJson(compared));

@@ -208,8 +208,9 @@ class Evaluation {
   bool End(const Summary& summary) {
     why_ended_ = summary.interrupted
                      ? std::string("interrupted")
-                     : fmt::format("the error budget is spent: {} episodes failed, {} of {} may (error_budget {}); the last: {}", plan_.failed,
-                                   plan_.allowed, plan_.total, suite_.error_budget, summary.last_failure);
+                     : fmt::format("the error budget is spent: {} episodes failed, {} of {} may (error_budget {}){}", plan_.failed,
+                                   plan_.allowed, plan_.total, suite_.error_budget,
+                                   summary.last_failure.empty() ? "" : "; the last: " + summary.last_failure);
     return false;
   }
 

@@ -1,6 +1,8 @@
 #include "core/file.h"
 
 #include <fcntl.h>
+#include <sys/file.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include <array>
@@ -27,6 +29,49 @@ void SyncFolder(const fs::path& folder) { Sync(folder.empty() ? fs::path(".") : 
 
 /// What a file is called until it is whole.
 fs::path PartOf(const fs::path& path) { return path.string() + ".tmp"; }
+
+/// The part of a file, of this writer alone: others that write the same file wait until it has its final name.
+class OwnPart {
+ public:
+  explicit OwnPart(const fs::path& whole) : whole_(whole), path_(PartOf(whole)) {
+    while (!Take()) ::close(descriptor_);
+  }
+  ~OwnPart() { ::close(descriptor_); }
+  OwnPart(const OwnPart&) = delete;
+  OwnPart& operator=(const OwnPart&) = delete;
+
+  /// Also over what a process left that was killed here.
+  void Fill(std::string_view bytes) const {
+    const auto size = static_cast<off_t>(bytes.size());
+    while (!bytes.empty()) {
+      const ssize_t written = ::write(descriptor_, bytes.data(), bytes.size());
+      if (written < 0 && errno != EINTR) Fail();
+      bytes.remove_prefix(written < 0 ? 0 : static_cast<std::size_t>(written));
+    }
+    if (::ftruncate(descriptor_, size) != 0) Fail();
+  }
+
+  const fs::path& path() const { return path_; }
+
+ private:
+  [[noreturn]] void Fail() const {
+    throw InternalError("{}: cannot be written: {}", whole_.string(), std::strerror(errno));
+  }
+
+  /// @returns false if another writer renamed it while this one waited.
+  bool Take() {
+    descriptor_ = ::open(path_.c_str(), O_WRONLY | O_CREAT | O_CLOEXEC, 0666);
+    if (descriptor_ < 0) Fail();
+    while (::flock(descriptor_, LOCK_EX) != 0 && errno == EINTR) {
+    }
+    struct stat mine = {}, there = {};
+    ::fstat(descriptor_, &mine);
+    return ::stat(path_.c_str(), &there) == 0 && mine.st_ino == there.st_ino && mine.st_dev == there.st_dev;
+  }
+
+  fs::path whole_, path_;
+  int descriptor_ = -1;
+};
 
 }  // namespace
 
@@ -59,16 +104,13 @@ void MakeFolders(const fs::path& folder) {
 }
 
 void WriteFileAtomically(const fs::path& path, std::string_view bytes) {
-  const fs::path part = PartOf(path);
+  const OwnPart part(path);
   try {
-    std::ofstream file(part, std::ios::binary | std::ios::trunc);
-    file.write(bytes.data(), static_cast<std::streamsize>(bytes.size()));
-    file.close();
-    if (!file) throw InternalError("{}: cannot be written: {}", path.string(), std::strerror(errno));
-    SyncAndRename(part, path);
+    part.Fill(bytes);
+    SyncAndRename(part.path(), path);
   } catch (const Error&) {
     std::error_code ignored;
-    fs::remove(part, ignored);
+    fs::remove(part.path(), ignored);
     throw;
   }
 }

@@ -9,7 +9,8 @@ namespace evac {
 /// @throws Error naming the file if it cannot be read.
 std::string ReadFile(const std::filesystem::path& path);
 
-/// Writes beside it, syncs, renames, syncs the folder: the file is there whole or not at all, also after a power cut.
+/// Writes beside it, syncs, renames, syncs the folder: the file is there whole or not at all, also after a power cut, and
+/// whoever else writes the same file meanwhile.
 /// @throws Error naming the file and the system's reason.
 void WriteFileAtomically(const std::filesystem::path& path, std::string_view bytes);
 

@@ -86,6 +86,8 @@ double BaselineRate(const GateRule& rule, const PinnedResult* baseline) {
   return trials > 0 ? successes / trials : kSupposedRate;
 }
 
+std::string Text(const SampleSize& size) { return size.exact ? fmt::to_string(size.n) : size.exact.reason(); }
+
 }  // namespace
 
 std::vector<std::string> SizesOf(const GateRules& rules, const PinnedResult* baseline) {
@@ -100,10 +102,10 @@ std::vector<std::string> SizesOf(const GateRules& rules, const PinnedResult* bas
         "{}: to show with 80 % power that an equal candidate is not worse by {:g} points (alpha {:g}, one-sided) takes "
         "{}",
         rule.name, 100 * rule.margin, rule.alpha,
-        rule.is_paired ? fmt::format("{} pairs if {} of the states flip ({} episodes of each unpaired at {})", pairs.n,
-                                     Percent(kSupposedFlips), trials.n, Percent(rate))
-                       : fmt::format("{} episodes of each at {} ({} pairs if {} of the states flip)", trials.n,
-                                     Percent(rate), pairs.n, Percent(kSupposedFlips))));
+        rule.is_paired ? fmt::format("{} pairs if {} of the states flip ({} episodes of each unpaired at {})", Text(pairs),
+                                     Percent(kSupposedFlips), Text(trials), Percent(rate))
+                       : fmt::format("{} episodes of each at {} ({} pairs if {} of the states flip)", Text(trials),
+                                     Percent(rate), Text(pairs), Percent(kSupposedFlips))));
   }
   return sizes;
 }

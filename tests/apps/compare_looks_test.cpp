@@ -4,6 +4,7 @@
 #include <nlohmann/json.hpp>
 
 #include "apps/commands.h"
+#include "core/error.h"
 #include "core/store.h"
 #include "tests/apps/printed.h"
 #include "tests/core/store_samples.h"
@@ -47,6 +48,23 @@ class CompareLooks : public testing::Test {
     return (folder_ / name).string();
   }
 
+  /// One more world for a run, in which its policy did well in one initial state.
+  static void AddWorld(const std::string& folder, const std::string& checkpoint, const std::string& state) {
+    Store store = Store::Open(folder, Store::Mode::kReadWrite);
+    store.AddWorld({.name = "tale", .type = "mujoco", .is_real = false, .profile_hash = "ba5"});
+    EpisodeRecord record;
+    record.episode.key = samples::Key(1, "tale");
+    record.episode.key.pair.initial_state = state;
+    record.episode.key.pair.checkpoint = checkpoint;
+    record.episode.stop = StopReason::kStill;
+    store.Add(record);
+    Verdict verdict;
+    verdict.episode_id = record.episode.key.Id();
+    verdict.judge = "oracle";
+    verdict.label = Label::kSuccess;
+    store.AddVerdict(verdict);
+  }
+
   static nlohmann::json Bet(const std::string& a, const std::string& b, const std::string& judge = "oracle") {
     const std::string out = Printed(AddCompare, {"compare", a, b, "--judge", judge, "--sequential", "--json"});
     return nlohmann::json::parse(out).at("worlds").at(0).at("sequential").at(0);
@@ -67,6 +85,15 @@ TEST_F(CompareLooks, EvidenceAgainstOneRunIsNoneAgainstAnother) {
   }
   EXPECT_GT(Bet(a, b).at("largest").get<double>(), 20) << "b's is still there";
   EXPECT_EQ(Bet(a, b).at("looks"), 1) << "the same data are no new look";
+}
+
+TEST_F(CompareLooks, NoneIsKeptOfAnyWorldWhereOneHasNoPairs) {
+  const std::string a = Write("a", {"good", "aaa"}), b = Write("b", {"poor", "bbb", Label::kFailure});
+  AddWorld(a, "good", "41-0000");
+  AddWorld(b, "poor", "41-0001");
+  EXPECT_THAT([&] { Printed(AddCompare, {"compare", a, b, "--sequential"}); },
+              testing::ThrowsMessage<Error>(HasSubstr("--sequential bets on pairs")));
+  EXPECT_TRUE(Store::Open(a, Store::Mode::kReadOnly).Looks().empty());
 }
 
 TEST_F(CompareLooks, TheJudgeIsNamedInFull) {

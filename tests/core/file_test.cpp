@@ -4,7 +4,9 @@
 #include <gtest/gtest.h>
 #include <unistd.h>
 
+#include <chrono>
 #include <fstream>
+#include <future>
 
 #include "core/error.h"
 #include "tests/support/temp_folder.h"
@@ -65,6 +67,25 @@ TEST(File, WhatCannotBeWrittenIsNamedAndTheOldFileStays) {
   EXPECT_THAT(MessageOf([&] { WriteFileAtomically(folder / "f", "new"); }), HasSubstr("No space left"));
   EXPECT_EQ(ReadFile(folder / "f"), "old");
   EXPECT_FALSE(fs::is_symlink(folder / "f.tmp"));
+}
+
+TEST(File, TwoThatWriteTheSameFileLeaveOneOfThemWhole) {
+  const TempFolder folder;
+  const std::string a(300'000, 'a'), b(900'000, 'b');
+  const auto write = [&](const std::string& bytes) {
+    return std::async(std::launch::async, [&] {
+      for (int i = 0; i < 20; ++i) WriteFileAtomically(folder / "f", bytes);
+    });
+  };
+  WriteFileAtomically(folder / "f", a);
+  std::future<void> first = write(a), second = write(b);
+  while (first.wait_for(std::chrono::seconds(0)) != std::future_status::ready) {
+    const std::string found = ReadFile(folder / "f");
+    ASSERT_TRUE(found == a || found == b) << found.size();
+  }
+  EXPECT_NO_THROW(first.get());
+  EXPECT_NO_THROW(second.get());
+  EXPECT_FALSE(fs::exists(folder / "f.tmp"));
 }
 
 TEST(File, AnotherNameIsALinkWhereTheDiskHasThem) {

@@ -296,6 +296,13 @@ TEST(Gate, SizesAreKnownBeforeTheRun) {
       << sizes[0];
 }
 
+TEST(Gate, ASizeThatNobodyCanCountIsNotZero) {
+  const std::string tiny = "  - {name: r, test: paired_mcnemar, world: sim, margin: 1e-10}\n";
+  const std::vector<std::string> sizes = SizesOf(Rules(tiny), nullptr);
+  ASSERT_EQ(sizes.size(), 1u);
+  EXPECT_THAT(sizes[0], HasSubstr("takes more than can be counted pairs")) << sizes[0];
+}
+
 TEST(Gate, AnInvertedIntervalTouchesItsThreshold) {
   const PairedOutcomes outcomes{{2, 14}, 50};
   const IntervalAt interval = [&](double confidence) { return TangoDifference(outcomes, confidence).interval; };

@@ -126,6 +126,7 @@ TEST(Resume, WhoRanWithOtherTimesThanTheRunBeganWithIsToldTheCommandThatKeepsThe
   EXPECT_EQ(longer.exit_code, 4);
   EXPECT_THAT(longer.err, HasSubstr("go on with: evac run " + kFaults + " --out " + run + " --set 'policies.0.command=["));
   EXPECT_THAT(longer.err, HasSubstr("--set error_budget=0 --set transport.deadline_s=60 --retry-failed\n"));
+  EXPECT_THAT(longer.err, testing::Not(HasSubstr("the last: \n"))) << "the budget was spent before";
 
   std::filesystem::remove(folder / "sick");
   words.push_back("--retry-failed");
@@ -169,6 +170,16 @@ TEST(Resume, ARunThatAnotherVersionBeganGoesOnAndSaysSo) {
   const CommandResult goes_on = RunCommand({Binary("evac"), "resume", (folder / "run").string()});
   EXPECT_EQ(goes_on.exit_code, 0) << goes_on.err;
   EXPECT_THAT(goes_on.err, HasSubstr("was begun by evac 0.0.1; evac "));
+}
+
+TEST(Resume, ASuiteThatIsMendedBeforeItsFirstEpisodeRunsInTheSameFolder) {
+  const TempFolder folder;
+  const fs::path run = folder / "run";
+  const CommandResult refused =
+      RunCommand(RunWords(kFaults, run, {"initial_states.count=1", "policies.0.command=[/no/such/policy]"}));
+  EXPECT_EQ(refused.exit_code, 2) << refused.err;
+  const CommandResult mended = RunCommand(RunWords(kFaults, run, {"initial_states.count=1"}));
+  EXPECT_EQ(mended.exit_code, 0) << mended.err;
 }
 
 TEST(Resume, ARunIsNotContinuedWithAnotherSuite) {
