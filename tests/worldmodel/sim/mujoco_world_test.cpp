@@ -287,8 +287,8 @@ void EndDrawingProcesses() {
   for (const auto& entry : std::filesystem::directory_iterator("/proc")) {
     std::ifstream file(entry.path() / "stat");
     std::string pid, name, state, parent;
-    const bool is_ours = file >> pid >> name >> state >> parent && name == "(evac-draw)" && parent == std::to_string(::getpid());
-    if (is_ours) ::kill(std::stoi(pid), SIGKILL);
+    file >> pid >> name >> state >> parent;
+    if (name == "(evac-draw)" && parent == std::to_string(::getpid())) ::kill(std::stoi(pid), SIGKILL);
   }
 }
 
