@@ -191,7 +191,7 @@ void Compare(const CompareArguments& arguments) {
     if (!arguments.json) fmt::print("{}{}", all["worlds"].empty() ? "" : "\n", ComparisonText(compared));
     all["worlds"].push_back(ComparisonJson(compared));
   }
-  if (arguments.json) fmt::print("{}\n", all.dump(2, ' ', false, Json::error_handler_t::replace));
+  if (arguments.json) fmt::print("{}\n", all.dump(2));
 }
 
 }  // namespace

@@ -54,8 +54,7 @@ class LcmPolicy : public Policy {
   /// @returns what the policy declared.
   /// @throws InvalidInput if they do not fit together (both declarations side by side), if nobody answers within
   /// `wait_s`,
-  ///         or if two policies answer on this address. One that is started again and declares something else then fails
-  ///         its episodes with what changed.
+  ///         or if two policies answer on this address.
   PolicySpec Handshake(const PolicySpec& harness, double wait_s);
 
   /// The policy's declared name; before the handshake the token.

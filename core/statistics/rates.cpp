@@ -66,26 +66,23 @@ Number AnovaIcc(std::span<const Count> clusters, double rate, double average_siz
   return (mean_between - mean_within) / denominator;
 }
 
-double AverageClusterSize(std::span<const Count> clusters) {
-  double trials = 0, squares = 0;
-  for (const Count& cluster : clusters) {
-    const double n = static_cast<double>(cluster.trials);
-    trials += n;
-    squares += n * n;
-  }
-  return (trials - squares / trials) / (static_cast<double>(clusters.size()) - 1);
+double Trials(std::span<const Count> clusters) {
+  double trials = 0;
+  for (const Count& cluster : clusters) trials += static_cast<double>(cluster.trials);
+  return trials;
 }
 
 /// How many trials the cluster has that a trial is in, on average: what the variance of the pooled rate grows with. The
 /// size where all are equal; more than the plain mean where they are not.
 double SizeAsTrialsSeeIt(std::span<const Count> clusters) {
-  double trials = 0, squares = 0;
-  for (const Count& cluster : clusters) {
-    const double n = static_cast<double>(cluster.trials);
-    trials += n;
-    squares += n * n;
-  }
-  return squares / trials;
+  double squares = 0;
+  for (const Count& cluster : clusters)
+    squares += static_cast<double>(cluster.trials) * static_cast<double>(cluster.trials);
+  return squares / Trials(clusters);
+}
+
+double AverageClusterSize(std::span<const Count> clusters) {
+  return (Trials(clusters) - SizeAsTrialsSeeIt(clusters)) / (static_cast<double>(clusters.size()) - 1);
 }
 
 double LinearisedSe(std::span<const Count> clusters, double rate) {

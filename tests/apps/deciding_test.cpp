@@ -146,13 +146,6 @@ TEST_F(Deciding, AJudgeIsHeldAgainstAnotherAndBothHaveJudged) {
   }
 }
 
-TEST_F(Deciding, ADashboardOfAJudgeWhoJudgedNoRunIsRefused) {
-  const std::string soon = (folder_ / "soon").string();
-  EXPECT_THAT([&] { Printed(AddDashboard, {"dashboard", Run(), soon, "--judge", "orakel", "--port", "0"}); },
-              testing::ThrowsMessage<Error>(
-                  HasSubstr("--judge: found 'orakel', wanted one who has judged any of the runs: oracle")));
-}
-
 TEST_F(Deciding, APlanNeedsNoRun) {
   EXPECT_THAT(Printed(AddPlan, {"plan", "--rate", "0.28", "--difference", "0.08"}), HasSubstr("533 episodes of each"));
   EXPECT_EQ(nlohmann::json::parse(Printed(AddPlan, {"plan", "--json"})).at("options").at("trials"), 40);

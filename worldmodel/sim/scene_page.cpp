@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <string_view>
-#include <utility>
 
 #include "core/config.h"
 #include "core/file.h"
@@ -19,12 +18,6 @@ std::vector<double> ReadNumbers(const Config& page, const std::string& key, std:
   const bool finite = std::all_of(numbers.begin(), numbers.end(), [](double number) { return std::isfinite(number); });
   page.Require(numbers.size() == count && finite, key, fmt::format("{} finite numbers", count));
   return numbers;
-}
-
-double ReadNumber(const Config& page, const std::string& key) {
-  const auto number = page.Get<double>(key);
-  page.Require(std::isfinite(number), key, "a finite number");
-  return number;
 }
 
 Range ReadRange(const Config& page, const std::string& key) {
@@ -64,7 +57,7 @@ Placement ReadPlacement(const Config& page) {
   placement.inside = page.Get<std::string>("inside", "");
   placement.x_m = ReadRange(page, "x_m");
   placement.y_m = ReadRange(page, "y_m");
-  placement.z_m = ReadNumber(page, "z_m");
+  placement.z_m = page.Get<double>("z_m");
   placement.yaw_deg = ReadRange(page, "yaw_deg");
   return placement;
 }
@@ -88,11 +81,11 @@ Clutter ReadClutter(const Config& page) {
   page.Require(clutter.chance >= 0 && clutter.chance <= 1, "chance", "a probability");
   for (const Config& place : page.List("places_m")) {
     const auto xy = place.Value<std::vector<double>>();
-    place.Require(xy.size() == 2 && std::isfinite(xy[0]) && std::isfinite(xy[1]), "", "two finite numbers [x, y]");
+    place.Require(xy.size() == 2, "", "two numbers [x, y]");
     clutter.places_m.emplace_back(xy[0], xy[1]);
   }
   page.Require(clutter.places_m.size() >= clutter.bodies.size(), "places_m", "at least as many places as bodies");
-  clutter.spread_m = ReadNumber(page, "spread_m");
+  clutter.spread_m = page.Get<double>("spread_m");
   return clutter;
 }
 
@@ -135,12 +128,7 @@ ScenePage ReadScenePage(const Task& task) {
   RequireIncludesNamed(page, named, scene.scene);
   for (const std::string& file : named) RequireIncludesNamed(page, named, scene.scene.parent_path() / file);
   scene.homes = ReadHomes(page.Section("home"), task);
-  for (const Config& item : page.List("objects")) {
-    Placement placement = ReadPlacement(item);
-    const bool is_new = std::ranges::find(scene.placements, placement.body, &Placement::body) == scene.placements.end();
-    item.Require(is_new, "body", "another body than those before it");
-    scene.placements.push_back(std::move(placement));
-  }
+  for (const Config& item : page.List("objects")) scene.placements.push_back(ReadPlacement(item));
   for (const Config& item : page.List("colours")) scene.colours.push_back(ReadColour(item));
   scene.light = ReadLight(page.Section("light"));
   scene.clutter = ReadClutter(page.Section("clutter"));
