@@ -35,6 +35,13 @@ ActionChunk Ask(Policy& policy, const Task& task, const Observation& observation
   return chunk;
 }
 
+/// How the physics failed; nothing if it did not. @throws InternalError if the world itself failed: no episode's outcome.
+const Failure* DivergedIn(const Advanced& advanced) {
+  const auto* failure = std::get_if<Failure>(&advanced);
+  if (failure && failure->stop != StopReason::kDiverged) throw InternalError("world real: {}", failure->message);
+  return failure;
+}
+
 const Eigen::Isometry3d& PoseOf(const std::string& body, const PrivilegedFrame& frame) {
   for (const PrivilegedFrame::Body& found : frame.bodies) {
     if (found.name == body) return found.base_from_body;
@@ -85,9 +92,8 @@ std::optional<UnseenRun> EpisodeRepeater::Do(const CollectJob& job, const std::v
       std::move(world_.Reset(0, task, {job.row.initial_state, job.row.state_seed}, job.row.world_seed).privileged));
   const SceneChunk driven{0, &all};
   Advanced advanced = std::move(world_.Advance({&driven, 1}).front());
-  auto* steps = std::get_if<std::vector<WorldStep>>(&advanced);
-  if (steps == nullptr) return std::nullopt;
-  for (WorldStep& step : *steps) run.track.push_back(std::move(step.privileged));
+  if (DivergedIn(advanced)) return std::nullopt;
+  for (WorldStep& step : std::get<std::vector<WorldStep>>(advanced)) run.track.push_back(std::move(step.privileged));
   run.success = Look({task, job.task->object, run.track, told}).fate == Fate::kSuccess;
   return run;
 }
@@ -113,7 +119,7 @@ Observation EpisodeCollector::Begin(const CollectJob& job, const Task& task, Col
 std::optional<std::vector<Observation>> EpisodeCollector::Execute(const ActionChunk& chunk, CollectedRun& run) {
   const SceneChunk driven{0, &chunk};
   Advanced advanced = std::move(world_.Advance({&driven, 1}).front());
-  if (const auto* failure = std::get_if<Failure>(&advanced)) {
+  if (const Failure* failure = DivergedIn(advanced)) {
     run.stop = Name(failure->stop);
     run.failure = failure->message;
     return std::nullopt;

@@ -78,7 +78,10 @@ ExitCode Calibrate(const CalibrateArguments& arguments) {
   const Store store = Store::Open(arguments.run, Store::Mode::kReadOnly);
   DemandTwoJudges(arguments, store);
   const JudgeCalibrationReport report = CalibrateJudge(store, arguments.judge, arguments.against);
-  fmt::print("{}", arguments.as_json ? Json(report).dump(2) + "\n" : Text(report));
+  if (arguments.as_json)
+    fmt::print("{}\n", Json(report).dump(2, ' ', false, json::error_handler_t::replace));
+  else
+    fmt::print("{}", Text(report));
   if (!report.missing.empty()) return ExitCode::kInconclusive;
   return report.refusals.empty() ? ExitCode::kOk : ExitCode::kNo;
 }

@@ -87,6 +87,27 @@ ComparedPolicy Side(const JudgedRun& run, const std::string& policy, const std::
   return side;
 }
 
+/// Adds whose verdicts tell an outcome in `world`, single raters left out.
+void AddTellers(const RunData& run, const std::string& world, std::set<std::string>& judges) {
+  for (const Episode& episode : run.episodes) {
+    const auto verdicts = run.verdicts.find(episode.key.Id());
+    if (episode.key.world != world || verdicts == run.verdicts.end()) continue;
+    for (const auto& [judge, verdict] : verdicts->second) {
+      const bool tells = verdict.label == Label::kSuccess || verdict.label == Label::kFailure;
+      if (tells && !judge.starts_with("human:")) judges.insert(judge);
+    }
+  }
+}
+
+/// Whom to ask where the judge who was asked told no outcome.
+std::vector<std::string> OtherJudges(const JudgedRun& first, const JudgedRun& second, const ComparedWorld& compared) {
+  const ComparisonRow& all = compared.comparison.all;
+  if (all.first_episodes + all.second_episodes > 0) return {};
+  std::set<std::string> judges;
+  for (const JudgedRun* run : {&first, &second}) AddTellers(run->summary.data, compared.world, judges);
+  return {judges.begin(), judges.end()};
+}
+
 std::vector<std::string> WorldsOfBoth(const JudgedRun& first, const JudgedRun& second, const std::string& wanted) {
   std::set<std::string> names;
   std::vector<std::string> shared;
@@ -182,8 +203,10 @@ void Compare(const CompareArguments& arguments) {
       left.name = first.run + ":" + a;
       right.name = second.run + ":" + b;
     }
-    worlds.push_back({world, arguments.judge, ComparePolicies(left, right, arguments.options), {}});
-    if (arguments.sequential) DemandPairs(worlds.back().comparison);
+    ComparedWorld& compared = worlds.emplace_back(
+        ComparedWorld{world, arguments.judge, ComparePolicies(left, right, arguments.options), {}, {}});
+    compared.other_judges = OtherJudges(one, two, compared);
+    if (arguments.sequential) DemandPairs(compared.comparison);
   }
   Json all = {{"schema", 1}, {"worlds", Json::array()}};
   for (ComparedWorld& compared : worlds) {
@@ -191,7 +214,7 @@ void Compare(const CompareArguments& arguments) {
     if (!arguments.json) fmt::print("{}{}", all["worlds"].empty() ? "" : "\n", ComparisonText(compared));
     all["worlds"].push_back(ComparisonJson(compared));
   }
-  if (arguments.json) fmt::print("{}\n", all.dump(2));
+  if (arguments.json) fmt::print("{}\n", all.dump(2, ' ', false, Json::error_handler_t::replace));
 }
 
 }  // namespace

@@ -61,7 +61,7 @@ void DemandKnownGold(const StudyOptions& options) {
 /// What a study was begun with holds for its later waves: raters know how many they are, and their orders stand.
 void KeepWhatTheStudyBeganWith(const RateArguments& arguments, StudyOptions& options) {
   options.raters_per_clip = arguments.raters.value_or(options.raters_per_clip);
-  if (!std::filesystem::exists(std::filesystem::path(arguments.study) / "study.sqlite")) return;
+  if (!StudyStore::IsIn(arguments.study)) return;
   const StudyInfo began = StudyStore::Open(arguments.study, StudyStore::Mode::kReadOnly).info();
   if (arguments.raters.value_or(began.raters_per_clip) != began.raters_per_clip)
     throw InvalidInput("--raters: found {}, but {} was begun with {}, and a wave cannot change that", *arguments.raters,

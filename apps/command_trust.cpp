@@ -36,7 +36,10 @@ void PrintTrust(const TrustArguments& arguments) {
   const RunSummary summary = Summarise(ReadRun(store), options);
   const WorldsTrust trust = TrustOfWorlds(summary, ModelWorlds(summary, arguments.world), arguments.options);
   if (trust.worlds.empty()) throw InvalidInput("trust: {}", WhyNothingIsSaid(trust.unsaid));
-  fmt::print("{}", arguments.json ? TrustJson(trust).dump(2) + "\n" : TrustText(trust));
+  if (arguments.json)
+    fmt::print("{}\n", TrustJson(trust).dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace));
+  else
+    fmt::print("{}", TrustText(trust));
 }
 
 }  // namespace

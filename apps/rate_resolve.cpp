@@ -11,6 +11,7 @@
 #include "core/error.h"
 #include "core/store.h"
 #include "judges/rating_tally.h"
+#include "reports/wording.h"
 
 namespace evac {
 namespace {
@@ -88,10 +89,17 @@ std::map<std::string, bool> StagesOf(const std::vector<StudyStore::Ballot>& ball
   return stages;
 }
 
-std::string ReasonOf(const RatedClip& clip) {
+/// At the end of a label's reason: whose it is.
+std::string Signature(const std::string& study) { return fmt::format(" (study {})", study); }
+
+bool IsOfAnotherStudy(const Verdict& verdict, const std::string& study) {
+  return verdict.reason.find(" (study ") != std::string::npos && !verdict.reason.ends_with(Signature(study));
+}
+
+std::string ReasonOf(const RatedClip& clip, const std::string& study) {
   const Majority& majority = clip.resolution.majority;
-  return fmt::format("{}: {} success, {} failure, {} cannot tell", clip.resolution.how, majority.successes,
-                     majority.valid - majority.successes, majority.unsure);
+  return fmt::format("{}: {} success, {} failure, {} cannot tell{}", clip.resolution.how, majority.successes,
+                     majority.valid - majority.successes, majority.unsure, Signature(study));
 }
 
 /// What a run is to say of one clip.
@@ -142,7 +150,7 @@ class Speaker {
     verdict.label = clip.resolution.label.value_or(Label::kCannotTell);
     if (clip.resolution.majority.soft) verdict.probability = *clip.resolution.majority.soft;
     verdict.stages = StagesOf(ballots, clip.resolution.label, facts_.at(clip.clip.rubric_hash));
-    verdict.reason = ReasonOf(clip);
+    verdict.reason = ReasonOf(clip, study_);
     return verdict;
   }
 
@@ -171,19 +179,28 @@ bool IsSame(const Verdict& a, const Verdict& b) {
   return a.label == b.label && a.reason == b.reason && a.stages == b.stages && a.rubric_version == b.rubric_version;
 }
 
-/// Adds what a run does not say yet.
-std::int64_t WriteTo(const std::string& run, const std::vector<Told>& all) {
+struct Written {
+  std::int64_t verdicts = 0, of_other_studies = 0;  ///< new ones, and those among them that took another study's place
+};
+
+/// Adds what a run does not say yet. A study takes back what it said itself only.
+Written WriteTo(const std::string& run, const std::vector<Told>& all, const std::string& study) {
   Store store = Store::Open(run, Store::Mode::kReadWrite);
   const auto current = store.CurrentVerdicts();
   std::vector<Verdict> wanted;
+  Written written;
   for (const auto& [verdict, takes_back] : all) {
     const auto of_episode = current.find(verdict.episode_id);
     const bool is_known = of_episode != current.end() && of_episode->second.contains(verdict.judge);
-    const bool is_news = is_known ? !IsSame(of_episode->second.at(verdict.judge), verdict) : !takes_back;
-    if (is_news) wanted.push_back(verdict);
+    const bool is_anothers = is_known && IsOfAnotherStudy(of_episode->second.at(verdict.judge), study);
+    if (takes_back && (!is_known || is_anothers)) continue;
+    if (is_known && IsSame(of_episode->second.at(verdict.judge), verdict)) continue;
+    wanted.push_back(verdict);
+    written.of_other_studies += is_anothers;
   }
   store.AddVerdicts(wanted);
-  return static_cast<std::int64_t>(wanted.size());
+  written.verdicts = static_cast<std::int64_t>(wanted.size());
+  return written;
 }
 
 }  // namespace
@@ -201,7 +218,15 @@ Resolved ResolveStudy(const StudyStore& study, const ResolveOptions& options) {
     if (HasSomebodysWord(clip)) ++(clip.resolution.label ? resolved.decided : resolved.undecided);
     for (Told& told : speaker.AllOf(clip)) by_run[clip.clip.run].push_back(std::move(told));
   }
-  for (const auto& [run, all] : by_run) resolved.written += WriteTo(run, all);
+  std::int64_t of_other_studies = 0;
+  for (const auto& [run, all] : by_run) {
+    const Written written = WriteTo(run, all, study.info().name);
+    resolved.written += written.verdicts;
+    of_other_studies += written.of_other_studies;
+  }
+  if (of_other_studies > 0)
+    resolved.warnings.push_back(fmt::format("{} of judge {} instead of another study's (--as NAME keeps studies apart)",
+                                            Counted(of_other_studies, "label"), options.judge));
   std::int64_t excluded = 0;
   for (const StudyRater& rater : study.Raters()) excluded += rater.counts ? 0 : 1;
   if (excluded > 0) resolved.warnings.push_back(fmt::format("{} raters excluded", excluded));

@@ -24,6 +24,7 @@ struct Resolved {
 /// calibrate --against human`, `evac report --judge human` and everything else finds them. Clips that are not decided
 /// are written as cannot_tell with the reason, never as failures. What is there already is not written again. Where a
 /// run has a verdict of votes that count no more (their raters left, or undid them), cannot_tell takes its place.
+/// Of two studies that give labels under one name to one episode the later one's holds, and a warning says so.
 /// Stages are written where somebody told of them: a sheet does not, nor who saw a success and marked none.
 /// @throws InvalidInput for a name of other judges, or if a run has moved, or a task was rated by several rubrics and they were not to be mixed.
 Resolved ResolveStudy(const StudyStore& study, const ResolveOptions& options);

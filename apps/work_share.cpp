@@ -7,10 +7,12 @@
 #include <cstdio>
 #include <exception>
 #include <mutex>
+#include <system_error>
 #include <thread>
 #include <vector>
 
 #include "apps/progress_display.h"
+#include "core/error.h"
 
 namespace evac {
 namespace {
@@ -49,7 +51,13 @@ void ShareOut(std::int64_t count, int threads, const std::function<void(std::int
   };
   std::vector<std::thread> team;
   const std::int64_t size = std::min<std::int64_t>(ThreadsOrCores(threads), count);
-  for (std::int64_t i = 0; i < size; ++i) team.emplace_back(work_on);
+  try {
+    for (std::int64_t i = 0; i < size; ++i) team.emplace_back(work_on);
+  } catch (const std::system_error& error) {  // those that are there end before it is thrown
+    const std::lock_guard lock(mutex);
+    if (!first_error)
+      first_error = std::make_exception_ptr(InternalError("cannot start {} threads: {}", size, error.what()));
+  }
   for (std::thread& one : team) one.join();
   if (first_error) std::rethrow_exception(first_error);
 }

@@ -6,7 +6,7 @@
 namespace evac {
 
 /// Calls `work` once for each item 0 … count - 1 on up to `threads` threads (0: one per core), any order; then `done`
-/// for that item, one at a time. The first error ends the rest and is thrown again.
+/// for that item, one at a time. The first error, a thread that cannot be started too, ends the rest and is thrown again.
 void ShareOut(std::int64_t count, int threads, const std::function<void(std::int64_t)>& work,
               const std::function<void(std::int64_t)>& done);
 

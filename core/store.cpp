@@ -48,11 +48,14 @@ fs::path DatabaseIn(const fs::path& folder) { return folder / run_files::kDataba
 
 void BeginOrDemandSame(sqlite::Connection& connection, const RunInfo& run, const fs::path& folder) {
   const std::optional<RunInfo> stored = rows::SelectRun(connection);
-  if (!stored) return rows::InsertRun(connection, run);
-  if (stored->suite_hash == run.suite_hash) return;
-  throw InvalidInput(
-      "{}: holds a run of another suite: its suite hash is {}, this suite's is {}; choose another folder",
-      folder.string(), stored->suite_hash, run.suite_hash);
+  if (stored && stored->suite_hash == run.suite_hash) return;
+  if (stored && !rows::IsWithoutResults(connection)) {
+    throw InvalidInput(
+        "{}: holds a run of another suite: its suite hash is {}, this suite's is {}; choose another folder",
+        folder.string(), stored->suite_hash, run.suite_hash);
+  }
+  rows::DeleteBeginning(connection);
+  rows::InsertRun(connection, run);
 }
 
 /// The record's episode without its steps, its files named; the thumbnail is written.

@@ -88,7 +88,8 @@ class Store {
  public:
   enum class Mode { kReadOnly, kReadWrite };
 
-  /// Begins a run in `folder` (made if absent), or continues the one there if it has the same suite hash.
+  /// Begins a run in `folder` (made if absent), or continues the one there if it has the same suite hash. One of another
+  /// suite that never came to an episode makes room.
   /// @throws InvalidInput if another run is there, another process writes it, or its schema is newer than this program.
   static Store CreateOrContinue(const std::filesystem::path& folder, const RunInfo& run);
   /// @throws InvalidInput if there is no run in `folder`. Older schemas are migrated (kReadWrite) or read as they are.

@@ -31,6 +31,20 @@ std::optional<RunInfo> SelectRun(sqlite::Connection& connection) {
   return RunInfo{row.Text(0), row.Text(1), row.Text(2), row.Text(3)};
 }
 
+bool IsWithoutResults(sqlite::Connection& connection) {
+  for (const char* sql : {"SELECT 1 FROM episodes LIMIT 1", "SELECT 1 FROM real_trials LIMIT 1",
+                          "SELECT 1 FROM sequential_looks LIMIT 1", "SELECT 1 FROM gate_decisions LIMIT 1"}) {
+    if (connection.Query(sql).Step()) return false;
+  }
+  return true;
+}
+
+void DeleteBeginning(sqlite::Connection& connection) {
+  for (const char* sql : {"DELETE FROM initial_scenes", "DELETE FROM counters", "DELETE FROM policies",
+                          "DELETE FROM worlds", "DELETE FROM tasks", "DELETE FROM run"})
+    connection.Run(sql);
+}
+
 void DeclareTask(sqlite::Connection& connection, const Task& task) {
   const std::string definition = codec::EncodeTask(task);
   auto row = connection.Query("SELECT definition, page FROM tasks WHERE id = ?", task.id);

@@ -65,6 +65,10 @@ void InsertVerdict(sqlite::Connection& connection, const Verdict& verdict) {
   if (!SelectEpisode(connection, verdict.episode_id)) {
     throw InvalidInput("a verdict of {} on episode '{}', which is not in the store", verdict.judge, verdict.episode_id);
   }
+  if (verdict.probability && !(*verdict.probability >= 0 && *verdict.probability <= 1)) {  // SQLite has no NaN, but NULL
+    throw InvalidInput("a verdict of {} on episode '{}': found probability {}, wanted a number from 0 to 1",
+                       verdict.judge, verdict.episode_id, *verdict.probability);
+  }
   connection.Run(
       "INSERT INTO verdicts (episode, judge, label, probability, stages, reason, rubric_version) VALUES (?, ?, ?, ?, "
       "?, ?, ?)",

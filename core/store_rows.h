@@ -16,6 +16,10 @@ namespace evac::rows {
 
 void InsertRun(sqlite::Connection& connection, const RunInfo& run);
 std::optional<RunInfo> SelectRun(sqlite::Connection& connection);
+/// False while there is an episode, a real trial, a look or a gate's decision: nothing is lost if another run begins here.
+bool IsWithoutResults(sqlite::Connection& connection);
+/// What a run of another suite said before its first episode.
+void DeleteBeginning(sqlite::Connection& connection);
 
 /// @throws InvalidInput if something else is stored under the name.
 void DeclareTask(sqlite::Connection& connection, const Task& task);

@@ -108,9 +108,15 @@ StudyStore::StudyStore(StudyStore&&) noexcept = default;
 StudyStore& StudyStore::operator=(StudyStore&&) noexcept = default;
 StudyStore::~StudyStore() = default;
 
+bool StudyStore::IsIn(const fs::path& folder) {
+  if (!fs::exists(folder / kFile)) return false;
+  sqlite::Connection connection = sqlite::Connection::OpenReadOnly(folder / kFile);
+  return Pragma(connection, "SELECT count(*) FROM sqlite_schema") > 0;
+}
+
 StudyStore StudyStore::Create(const fs::path& folder, const StudyInfo& info) {
   const fs::path file = folder / kFile;
-  if (fs::exists(file)) throw InvalidInput("{}: there is a study already", folder.string());
+  if (IsIn(folder)) throw InvalidInput("{}: there is a study already", folder.string());
   MakeFolders(folder);
   auto database = std::make_unique<Database>(Database{folder, sqlite::Connection::OpenReadWrite(file)});
   sqlite::Connection& connection = database->connection;
@@ -126,7 +132,10 @@ StudyStore StudyStore::Create(const fs::path& folder, const StudyInfo& info) {
 
 StudyStore StudyStore::Open(const fs::path& folder, Mode mode) {
   const fs::path file = folder / kFile;
-  if (!fs::exists(file)) throw InvalidInput("{}: there is no study ({} is missing)", folder.string(), kFile);
+  if (!IsIn(folder)) {
+    throw InvalidInput("{}: there is no study ({} {})", folder.string(), kFile,
+                       fs::exists(file) ? "was never begun" : "is missing");
+  }
   auto database =
       std::make_unique<Database>(Database{folder, mode == Mode::kReadOnly ? sqlite::Connection::OpenReadOnly(file)
                                                                           : sqlite::Connection::OpenReadWrite(file)});

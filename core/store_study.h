@@ -126,6 +126,8 @@ class StudyStore {
  public:
   enum class Mode { kReadOnly, kReadWrite };
 
+  /// Whether a study was begun in `folder`: what a process left that was killed before its first commit is none.
+  static bool IsIn(const std::filesystem::path& folder);
   /// @throws InvalidInput if there is a study in `folder` already.
   static StudyStore Create(const std::filesystem::path& folder, const StudyInfo& info);
   /// @throws InvalidInput if there is none, or a newer program's.

@@ -245,7 +245,7 @@ StudyMade MakeStudy(const fs::path& folder, const StudyOptions& options,
   if (candidates.empty()) throw InvalidInput("{}: no episode with a video to rate", options.runs.front().string());
   if (!options.gold_from.empty()) ChooseKnown(candidates, options);
 
-  const bool is_new = !fs::exists(folder / "study.sqlite");
+  const bool is_new = !StudyStore::IsIn(folder);
   std::optional<StudyStore> store;
   if (!is_new) {
     store = StudyStore::Open(folder, StudyStore::Mode::kReadWrite);

@@ -25,8 +25,10 @@ struct LcmGreeting {
   /// @throws InvalidInput if nobody answers within `wait_s`, the policy is gone, or two answer.
   spec_t Await(const PolicySpec& harness, double wait_s, std::map<std::string, declaration_t>& declarations) const;
 
- private:
+  /// Asks for declarations, once.
   void SayHello(const PolicySpec& harness) const;
+
+ private:
   void RefuseTwoPolicies(const PolicySpec& harness, std::map<std::string, declaration_t>& declarations) const;
   [[noreturn]] void ThrowNobodyAnswers(double wait_s) const;
 };

@@ -7,6 +7,8 @@
 #include <chrono>
 #include <random>
 #include <set>
+#include <utility>
+#include <vector>
 
 #include "core/error.h"
 #include "policies/lcm_greeting.h"
@@ -43,8 +45,7 @@ void CheckOptions(const LcmPolicyOptions& options) {
 struct LcmPolicy::Impl {
   explicit Impl(LcmPolicyOptions given) : options(std::move(given)), link(options.address.url, options.pacing) {
     CheckOptions(options);
-    Listen<declaration_t>("declaration",
-                          [this](const declaration_t& m) { declarations.insert_or_assign(m.server, m); });
+    Listen<declaration_t>("declaration", [this](const declaration_t& m) { TakeDeclaration(m); });
     Listen<episode_started_t>("started", [this](const episode_started_t& m) { TakeStarted(m); });
     Listen<chunk_t>("chunk", [this](const chunk_t& m) { TakeChunk(m); });
   }
@@ -158,13 +159,29 @@ struct LcmPolicy::Impl {
     return nullptr;
   }
 
+  void TakeDeclaration(const declaration_t& declaration) {
+    declarations.insert_or_assign(declaration.server, declaration);
+    for (const episode_started_t& started : std::exchange(undeclared, {})) {
+      if (started.server == declaration.server) TakeStarted(started);
+    }
+  }
+
+  /// After the handshake, one that was started again must declare itself too before its episodes begin.
   void TakeStarted(const episode_started_t& started) {
     last_heard = Clock::now();
     LcmLane* lane = Find(started.episode);
     if (lane == nullptr || lane->has_started) return;  // the answer to a repeated start
+    if (policy && !declarations.contains(started.server)) {
+      undeclared.push_back(started);
+      return Greeting().SayHello(*harness);
+    }
     lane->Started(started.server, options.repeat_after_s);
     last_answer = lane->answerable_at;
-    if (!started.error.empty() && !lane->answer)
+    if (lane->answer) return;
+    const std::string changes = policy ? Changes(*policy, FromWire(declarations.at(started.server).policy)) : "";
+    if (!changes.empty())
+      lane->answer = PolicyError("the policy was started again and declares otherwise: " + changes, "error_replies");
+    else if (!started.error.empty())
       lane->answer = PolicyError("the policy refuses the task: " + started.error, "error_replies");
   }
 
@@ -221,10 +238,13 @@ struct LcmPolicy::Impl {
     return {StopReason::kPolicyError, message};
   }
 
+  LcmGreeting Greeting() { return {link, options.address, client, options.why_gone, options.interrupted, counters}; }
+
   LcmPolicyOptions options;
   LcmLink link;
   std::string client = fmt::format("{}-{:08x}", getpid(), std::random_device()());
   std::map<std::string, declaration_t> declarations;  ///< by server
+  std::vector<episode_started_t> undeclared;          ///< of servers that were asked for their declaration
   std::optional<PolicySpec> harness, policy;          ///< after the handshake
   std::map<SceneId, LcmLane> lanes;
   std::int64_t next_episode = 0;
@@ -248,10 +268,7 @@ LcmPolicy::~LcmPolicy() {
 }
 
 PolicySpec LcmPolicy::Handshake(const PolicySpec& harness, double wait_s) {
-  const LcmPolicyOptions& options = impl_->options;
-  const LcmGreeting greeting{impl_->link,      options.address,     impl_->client,
-                             options.why_gone, options.interrupted, impl_->counters};
-  const PolicySpec policy = FromWire(greeting.Await(harness, wait_s, impl_->declarations));
+  const PolicySpec policy = FromWire(impl_->Greeting().Await(harness, wait_s, impl_->declarations));
   if (!Compare(harness, policy).empty()) {
     throw InvalidInput("policy {}@{} does not fit this run:\n{}", policy.name, policy.checkpoint,
                        SideBySide(harness, policy));

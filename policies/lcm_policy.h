@@ -55,6 +55,7 @@ class LcmPolicy : public Policy {
   /// @throws InvalidInput if they do not fit together (both declarations side by side), if nobody answers within
   /// `wait_s`,
   ///         or if two policies answer on this address.
+  /// A process that is started again is asked too: if it declares otherwise, its episodes fail with what changed.
   PolicySpec Handshake(const PolicySpec& harness, double wait_s);
 
   /// The policy's declared name; before the handshake the token.

@@ -9,6 +9,7 @@
 #include <csignal>
 #include <cstdlib>
 #include <deque>
+#include <iterator>
 #include <random>
 #include <set>
 
@@ -29,7 +30,10 @@ struct Gathering {
   std::optional<observation_t> header;
   std::map<int, image_t> images;  ///< by index
 
-  bool IsComplete() const { return header && static_cast<int>(images.size()) >= header->num_images; }
+  /// Whether all that the request counts are there, whatever else came.
+  bool IsComplete() const {
+    return header && std::distance(images.begin(), images.lower_bound(header->num_images)) >= header->num_images;
+  }
 };
 
 struct LiveEpisode {
@@ -50,11 +54,17 @@ struct Client {
 /// @throws InvalidInput if this is not what the task's cameras and arms would see.
 Observation ObservationOf(const Gathering& gathered, const Task& task) {
   Observation observation;
-  for (const auto& [index, image] : gathered.images) observation.images.push_back(ImageOf(image));
+  for (auto image = gathered.images.begin(); image != gathered.images.lower_bound(gathered.header->num_images); ++image)
+    observation.images.push_back(ImageOf(image->second));
   for (const arm_state_t& arm : gathered.header->arms)
     observation.arms.push_back(FromWire(arm, "the observation's arms"));
   observation.arms_are_commanded = gathered.header->arms_are_commanded != 0;
   if (const auto wrong = WhatIsWrong(observation, task)) throw InvalidInput("{}", *wrong);
+  for (std::size_t i = 0; i < task.cameras.size(); ++i) {
+    const std::string& found = gathered.images.at(static_cast<int>(i)).camera;
+    if (found != task.cameras[i].name)
+      throw InvalidInput("image {} is of camera '{}', wanted '{}'", i, found, task.cameras[i].name);
+  }
   return observation;
 }
 
@@ -155,6 +165,8 @@ struct PolicyServer::Impl {
     ++counters["resets"];
     try {
       episode.task = TaskOf(start);
+      if (episode.task.cameras.size() > kMaxImages)
+        throw InvalidInput("the task has {} cameras, wanted at most {}", episode.task.cameras.size(), kMaxImages);
       policy.Reset(episode.scene, episode.task, static_cast<std::uint64_t>(start.seed));
     } catch (const std::exception& error) {
       episode.refusal = error.what();

@@ -130,6 +130,16 @@ std::vector<SpecMismatch> Compare(const PolicySpec& harness, const PolicySpec& p
   return mismatches;
 }
 
+std::string Changes(const PolicySpec& before, const PolicySpec& now) {
+  const std::vector<Row> old_rows = Rows(before, before), new_rows = Rows(before, now);
+  std::string changes;
+  for (std::size_t i = 0; i < new_rows.size(); ++i) {
+    const std::string &was = old_rows[i].policy, &is = new_rows[i].policy;
+    if (was != is) changes += fmt::format("{}{} was {}, is {}", changes.empty() ? "" : "; ", new_rows[i].field, was, is);
+  }
+  return changes;
+}
+
 std::string SideBySide(const PolicySpec& harness, const PolicySpec& policy) {
   std::vector<Row> rows = Rows(harness, policy);
   rows.insert(rows.begin(), Row{"", "this run", "the policy", ""});

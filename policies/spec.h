@@ -55,6 +55,9 @@ struct SpecMismatch {
 /// Nothing if they fit: a longer chunk fits (its first targets are executed), a shorter one or another period does not.
 std::vector<SpecMismatch> Compare(const PolicySpec& harness, const PolicySpec& policy);
 
+/// "chunk_size was 16, is 8": what one policy declares otherwise than it did; nothing if it is the same.
+std::string Changes(const PolicySpec& before, const PolicySpec& now);
+
 /// Both declarations as a table, a row per field, a `*` before each row that does not fit and the reasons below.
 std::string SideBySide(const PolicySpec& harness, const PolicySpec& policy);
 

@@ -175,6 +175,7 @@ void Dashboard::Serve() {
   server_->serving = true;
   if (!server_->stopped) server_->http.listen_after_bind();
   server_->serving = false;
+  if (!server_->stopped) throw InternalError("dashboard: {} cannot be listened at any more", url());
 }
 
 void Dashboard::Stop() {

@@ -32,7 +32,7 @@ class Dashboard {
   int port() const;
   /// "http://127.0.0.1:41234/".
   std::string url() const;
-  /// Answers until Stop, which any thread may call.
+  /// Answers until Stop, which any thread may call. @throws InternalError if it can be listened no more before that.
   void Serve();
   void Stop();
 

@@ -198,7 +198,7 @@ std::string FidelityJson(const Fidelity& fidelity) {
   all.Put("seconds_per_chunk", fidelity.input.seconds_per_chunk);
   all.Put("judge", JudgeJson(fidelity.input.judge));
   all.Put("parts", PartsJson(fidelity.input.parts));
-  return all.Take().dump(1) + "\n";
+  return all.Take().dump(1, ' ', false, Json::error_handler_t::replace) + "\n";
 }
 
 std::string FidelityCsv(const std::vector<FidelityRow>& rows) {

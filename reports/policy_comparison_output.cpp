@@ -1,6 +1,7 @@
 #include "reports/policy_comparison_output.h"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 
@@ -62,6 +63,12 @@ std::string Apart(const PolicyComparison& comparison) {
   if (all.first_apart + all.second_apart == 0) return "";
   return fmt::format("In no rate (errors, cannot tell, invalid, not judged): {} of {}, {} of {}.\n", all.first_apart,
                      comparison.first, all.second_apart, comparison.second);
+}
+
+std::string AskAnother(const ComparedWorld& compared) {
+  if (compared.other_judges.empty()) return "";
+  return fmt::format("Judge {} told no outcome in {}; --judge {} did.\n", compared.judge, compared.world,
+                     fmt::join(compared.other_judges, " or "));
 }
 
 const char* Name(Winner winner) {
@@ -144,14 +151,15 @@ std::string ComparisonText(const ComparedWorld& compared) {
       {"TASK", "N", comparison.first, comparison.second, "DIFFERENCE", "FLIPS", "TEST", "P", "HOLM", ""}};
   for (const ComparisonRow& row : comparison.tasks) rows.push_back(Cells(row, comparison));
   if (comparison.tasks.size() > 1) rows.push_back(Cells(comparison.all, comparison));
-  return fmt::format("World {}, judge {}. {}\n\n{}{}{}", compared.world, compared.judge, DecisionOf(comparison),
-                     TextTable(rows), Apart(comparison), BetsText(compared));
+  return fmt::format("World {}, judge {}. {}\n\n{}{}{}{}", compared.world, compared.judge, DecisionOf(comparison),
+                     TextTable(rows), Apart(comparison), AskAnother(compared), BetsText(compared));
 }
 
 nlohmann::ordered_json ComparisonJson(const ComparedWorld& compared) {
   const PolicyComparison& comparison = compared.comparison;
   Json json = {{"world", compared.world},
                {"judge", compared.judge},
+               {"other_judges", compared.other_judges},
                {"first", comparison.first},
                {"second", comparison.second},
                {"alpha", comparison.options.alpha},

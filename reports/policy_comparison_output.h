@@ -24,6 +24,7 @@ struct ComparedWorld {
   std::string world, judge;
   PolicyComparison comparison;
   std::vector<BetState> bets;
+  std::vector<std::string> other_judges = {};  ///< who told an outcome where `judge` told none; else empty
 };
 
 /// A sentence, then the table.

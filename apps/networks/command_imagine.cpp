@@ -67,8 +67,18 @@ void AddModel(CLI::App& command, ImagineArguments& arguments) {
   command.add_flag("--restart", arguments.restart, "throw away what OUT holds of another job");
 }
 
+/// Where it has no effect, an option may still say what it is by default: the recorded command does.
+void RefuseWithoutEffect(const SamplerArguments& sampler) {
+  const SamplerArguments usual;
+  if (sampler.solver == "dpm" && sampler.eta != usual.eta)
+    throw InvalidInput("--eta: found {} with --solver dpm, wanted none: DPM-Solver++ draws no noise", sampler.eta);
+  if (sampler.cfg == 1 && sampler.cfg_rescale != usual.cfg_rescale)
+    throw InvalidInput("--cfg-rescale: found {} with --cfg 1, wanted none: nothing is guided", sampler.cfg_rescale);
+}
+
 ExitCode Imagine(const ImagineArguments& arguments, bool maps_only) {
   if (maps_only) return ImagineMaps(arguments);
+  RefuseWithoutEffect(arguments.sampler);
   if (arguments.weights.empty()) {
     throw InvalidInput("--weights is missing: wanted a checkpoint, or --maps-only, which needs none");
   }

@@ -96,6 +96,12 @@ TEST_F(CompareLooks, NoneIsKeptOfAnyWorldWhereOneHasNoPairs) {
   EXPECT_TRUE(Store::Open(a, Store::Mode::kReadOnly).Looks().empty());
 }
 
+TEST_F(CompareLooks, AFolderWhoseNameIsNoTextIsNamedAllTheSame) {
+  const std::string a = Write("a\xff", {"good", "aaa"}), b = Write("b", {"good", "bbb"});
+  const std::string out = Printed(AddCompare, {"compare", a, b, "--json"});
+  EXPECT_THAT(nlohmann::json::parse(out).dump(), HasSubstr("a\xef\xbf\xbd:visual_pick@good"));
+}
+
 TEST_F(CompareLooks, TheJudgeIsNamedInFull) {
   const std::string a = Write("a", {"good", "aaa", Label::kSuccess, "classifier:abc"});
   const std::string b = Write("b", {"poor", "bbb", Label::kFailure, "classifier:abc"});

@@ -82,6 +82,32 @@ TEST_F(Deciding, ComparedRunsMayBeFoldersOfTheirOwn) {
   EXPECT_THROW(Compare({"--judge", "nobody"}), Error);
 }
 
+TEST_F(Deciding, WhereTheJudgeToldNothingThoseWhoDidAreNamed) {
+  {
+    Store store = Store::Open(Run(), Store::Mode::kReadWrite);
+    store.AddWorld({"dream", "evac", false, "d4e"});
+    for (const char* checkpoint : {"good", "poor"}) {
+      EpisodeRecord record;
+      record.episode.key = Key(1, "dream");
+      record.episode.key.pair.checkpoint = checkpoint;
+      record.episode.stop = StopReason::kStill;
+      store.Add(record);
+      for (const char* judge : {"oracle", "classifier:abc", "human:study:r1"}) {
+        Verdict verdict;
+        verdict.episode_id = record.episode.key.Id();
+        verdict.judge = judge;
+        verdict.label = judge == std::string("oracle") ? Label::kCannotTell : Label::kSuccess;
+        store.AddVerdict(verdict);
+      }
+    }
+  }
+  EXPECT_THAT(Compare({"--world", "dream"}),
+              HasSubstr("Judge oracle told no outcome in dream; --judge classifier:abc did.\n"));
+  EXPECT_THAT(Compare({"--world", "sim"}), testing::Not(HasSubstr("told no outcome")));
+  const auto json = nlohmann::json::parse(Compare({"--world", "dream", "--json"}));
+  EXPECT_EQ(json.at("worlds").at(0).at("other_judges"), nlohmann::json({"classifier:abc"}));
+}
+
 TEST_F(Deciding, SequentialLooksAreKeptAndTheSameDataAreNoNewLook) {
   Compare({"--world", "sim", "--sequential"});
   const auto again = nlohmann::json::parse(Compare({"--world", "sim", "--sequential", "--json"}));
@@ -144,6 +170,13 @@ TEST_F(Deciding, AJudgeIsHeldAgainstAnotherAndBothHaveJudged) {
       EXPECT_THAT(error.what(), HasSubstr(words));
     }
   }
+}
+
+TEST_F(Deciding, ADashboardOfAJudgeWhoJudgedNoRunIsRefused) {
+  const std::string soon = (folder_ / "soon").string();
+  EXPECT_THAT([&] { Printed(AddDashboard, {"dashboard", Run(), soon, "--judge", "orakel", "--port", "0"}); },
+              testing::ThrowsMessage<Error>(
+                  HasSubstr("--judge: found 'orakel', wanted one who has judged any of the runs: oracle")));
 }
 
 TEST_F(Deciding, APlanNeedsNoRun) {

@@ -89,6 +89,26 @@ TEST_F(MeaninglessOption, OfImaginingIsRefusedWhereMapsAloneAreDrawn) {
   EXPECT_FALSE(std::filesystem::exists(out));
 }
 
+TEST_F(MeaninglessOption, OfASamplerIsRefusedWhereItHasNoEffectUnlessItSaysWhatIsUsual) {
+  const auto complaint = [&](const std::vector<std::string>& options) {
+    std::vector<std::string> words = {"imagine", "--recording", Run(), "--out", Beside("imagined").string()};
+    words.insert(words.end(), options.begin(), options.end());
+    try {
+      Printed(AddImagine, words);
+    } catch (const Error& error) {
+      return std::string(error.what());
+    }
+    return std::string("nothing was thrown");
+  };
+  EXPECT_THAT(complaint({"--solver", "dpm", "--eta", "0"}), HasSubstr("--eta: found 0 with --solver dpm"));
+  EXPECT_THAT(complaint({"--cfg-rescale", "0"}), HasSubstr("--cfg-rescale: found 0 with --cfg 1"));
+  for (const std::vector<std::string>& options :
+       {std::vector<std::string>{"--eta", "0"},
+        {"--cfg", "2", "--cfg-rescale", "0"},
+        {"--solver", "dpm", "--eta", "1", "--cfg", "1", "--cfg-rescale", "0.7"}})
+    EXPECT_THAT(complaint(options), HasSubstr("--weights is missing"));
+}
+
 TEST_F(MeaninglessOption, BeforeASubcommandThatReadsNoneIsRefused) {
   const std::string out = Beside("pinned.json").string();
   EXPECT_THROW(Printed(AddJudge, {"judge", "--again", "calibrate", Run(), "--judge", "oracle"}), CLI::ValidationError);

@@ -159,6 +159,28 @@ TEST_F(Resolving, WhatNobodyOfTheStudyEverVotedOnIsLeftToWhoSaidIt) {
   EXPECT_EQ(Told().at("human").label, Label::kSuccess);
 }
 
+TEST_F(Resolving, ALabelThatTakesTheOneOfAnotherStudyIsSaidToAndNoneIsTakenBack) {
+  const StudyClip clip = store.Clips().front();
+  Verdict of_another_study;
+  of_another_study.episode_id = clip.episode;
+  of_another_study.judge = "human";
+  of_another_study.label = Label::kSuccess;
+  of_another_study.reason = "majority: 2 success, 0 failure, 0 cannot tell (study monday)";
+  const auto say_again = [&] { Store::Open(clip.run, Store::Mode::kReadWrite).AddVerdict(of_another_study); };
+  say_again();
+  AtTheDesk ann(store, desk), bob(store, desk);
+  RateAll(ann, "failure");
+  RateAll(bob, "failure");
+  EXPECT_THAT(Resolve().warnings, testing::Contains(StartsWith("1 label of judge human instead of another study's")));
+  EXPECT_EQ(Told().at("human").label, Label::kFailure);
+  EXPECT_EQ(Told().at("human").reason, "majority: 0 success, 2 failure, 0 cannot tell (study study)");
+  EXPECT_THAT(Resolve().warnings, testing::Not(testing::Contains(testing::HasSubstr("another study"))));
+  say_again();
+  for (AtTheDesk* rater : {&ann, &bob}) desk.Withdraw(rater->Me(), {.keep = false, .erase = false}, 9);
+  Resolve();
+  EXPECT_EQ(Told().at("human").label, Label::kSuccess) << "who left this study says nothing of the other's label";
+}
+
 TEST_F(Resolving, UnderTheNameOfAnotherJudgeOrOfNoneNothingIsWritten) {
   Import("ann", "failure");
   Import("bob", "failure");

@@ -364,7 +364,10 @@ TEST_F(StoreTest, OrphansAreWhatNoRowNames) {
 }
 
 TEST_F(StoreTest, ARunGoesOnWithTheSameSuiteAndNotWithAnother) {
-  { NewRun(); }
+  {
+    Store begun = NewRun();
+    begun.Add(SomeEpisode(begun, Key(1)));
+  }
   Store store = Store::CreateOrContinue(run_, SomeRun());
   EXPECT_EQ(store.run().suite_text, SomeRun().suite_text);
   EXPECT_EQ(store.Tasks().size(), 1u);
@@ -372,6 +375,26 @@ TEST_F(StoreTest, ARunGoesOnWithTheSameSuiteAndNotWithAnother) {
   RunInfo other = SomeRun();
   other.suite_hash = "07e42";
   EXPECT_THAT(MessageOf([&] { Store::CreateOrContinue(run_, other); }), AllOf(HasSubstr("5417e"), HasSubstr("07e42")));
+}
+
+TEST_F(StoreTest, ARunThatNeverCameToAnEpisodeMakesRoomForTheMendedSuite) {
+  SplitMix64 random(1);
+  {
+    Store store = NewRun();
+    store.AddInitialScene(Key(1).pair, {{Image(1), Image(2)}, SomeArms(random), SomeTask().cameras});
+    store.Count("visual_pick@good", {{"repeats", 1}});
+  }
+  RunInfo mended = SomeRun();
+  mended.suite_hash = "07e42";
+  mended.suite_text = "name: mended\n";
+  Store store = Store::CreateOrContinue(run_, mended);
+  EXPECT_EQ(store.run().suite_hash, "07e42");
+  EXPECT_EQ(store.run().suite_text, "name: mended\n");
+  EXPECT_THAT(store.Tasks(), IsEmpty());
+  EXPECT_THAT(store.Worlds(), IsEmpty());
+  EXPECT_THAT(store.Policies(), IsEmpty());
+  EXPECT_THAT(store.InitialScenes(), IsEmpty());
+  EXPECT_THAT(store.CountersByPolicy(), IsEmpty());
 }
 
 TEST_F(StoreTest, ASecondWriterIsRefusedAndReadersAreNot) {

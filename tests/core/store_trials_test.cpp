@@ -1,6 +1,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <limits>
+
 #include "core/error.h"
 #include "core/store.h"
 #include "tests/core/store_samples.h"
@@ -35,6 +37,35 @@ TEST(StoreTrials, RealTrialsAreKeptInTheOrderAddedAllOrNone) {
   EXPECT_THROW(store.AddRealTrials({SomeTrial(5), elsewhere}), Error);
   EXPECT_THAT(Store::Open(folder / "run", Store::Mode::kReadOnly).RealTrials(),
               ElementsAre(SomeTrial(2), SomeTrial(1)));
+}
+
+TEST(StoreTrials, TheyAloneKeepARunFromMakingRoomForAnotherSuite) {
+  const TempFolder folder;
+  {
+    Store store = Store::CreateOrContinue(folder / "run", SomeRun());
+    store.AddTask(SomeTask());
+    store.AddRealTrials({SomeTrial(1)});
+  }
+  RunInfo other = SomeRun();
+  other.suite_hash = "07e42";
+  EXPECT_THROW(Store::CreateOrContinue(folder / "run", other), Error);
+}
+
+TEST(StoreVerdicts, AProbabilityThatIsNoneIsRefused) {
+  const TempFolder folder;
+  Store store = Store::InMemory(folder.path(), SomeRun());
+  Declare(store);
+  store.Add(SomeEpisode(store, Key(1)));
+  for (const double none : {std::numeric_limits<double>::quiet_NaN(), -0.1, 1.1}) {
+    Verdict verdict;
+    verdict.episode_id = Key(1).Id();
+    verdict.judge = "classifier:abc";
+    verdict.label = Label::kSuccess;
+    verdict.probability = none;
+    EXPECT_THAT([&] { store.AddVerdict(verdict); },
+                testing::ThrowsMessage<Error>(testing::HasSubstr("wanted a number from 0 to 1")));
+  }
+  EXPECT_THAT(store.Verdicts(), IsEmpty());
 }
 
 TEST(StoreTrials, LooksAreKeptOldestFirst) {

@@ -341,6 +341,18 @@ TEST(RatingDeskGold, PracticeTellsWhatIsKnownAndGoldDoesNot) {
   EXPECT_EQ(desk.Examples(ann.Me()).body.at("examples").size(), 4u);
 }
 
+TEST(StudyTruth, WhatAKillBeforeTheFirstCommitLeftMakesRoomForAStudy) {
+  SmallStudy other(2);
+  const TempFolder folder;
+  sqlite::Connection::OpenReadWrite(folder / "study.sqlite");
+  EXPECT_THAT([&] { StudyStore::Open(folder.path(), StudyStore::Mode::kReadOnly); },
+              testing::ThrowsMessage<Error>(HasSubstr("there is no study (study.sqlite was never begun)")));
+  MakeStudy(folder.path(), {.runs = {other.run().folder()}, .height_px = 64}, [](std::size_t, std::size_t) {});
+  EXPECT_FALSE(StudyStore::Open(folder.path(), StudyStore::Mode::kReadOnly).Clips().empty());
+  EXPECT_THAT([&] { StudyStore::Create(folder.path(), {}); },
+              testing::ThrowsMessage<Error>(HasSubstr("there is a study already")));
+}
+
 TEST(StudyTruth, VerdictsAndClipsCannotBeChangedOrDeleted) {
   SmallStudy study(2);
   StudyStore store = study.Open();

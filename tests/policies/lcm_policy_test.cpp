@@ -283,6 +283,30 @@ TEST_F(LcmPolicyTest, ARestartFailsTheEpisodesUnderWayAndNoOthers) {
   EXPECT_EQ(Told(answers[1]), "chunk");
 }
 
+TEST_F(LcmPolicyTest, OneThatIsStartedAgainAndDeclaresOtherwiseFailsItsEpisodesWithWhatChanged) {
+  const LcmAddress address = wire::OwnAddress();
+  wire::ProbePolicy probe, again, other;
+  auto served = std::make_unique<wire::Served>(probe, wire::ProbeSpec(), address);
+  LcmPolicy policy(Patient(address));
+  const Task task = wire::TwoCameraTask();
+  policy.Handshake(HarnessSpec(task, 2), 30);
+  served.reset();
+  served = std::make_unique<wire::Served>(again, wire::ProbeSpec(), address);
+  policy.Reset(0, task, 1);
+  EXPECT_EQ(Told(Ask(policy, {0}, task)[0]), "chunk") << "the same declaration";
+  served.reset();
+  PolicySpec changed = wire::ProbeSpec(4);
+  changed.checkpoint = "c2";
+  served = std::make_unique<wire::Served>(other, changed, address);
+  policy.Reset(0, task, 1);
+  policy.Reset(1, task, 1);
+  for (const Acted& acted : Ask(policy, {0, 1}, task)) {
+    EXPECT_EQ(Told(acted),
+              "policy_error: the policy was started again and declares otherwise: checkpoint was c1, is c2; chunk_size "
+              "was 2, is 4");
+  }
+}
+
 TEST_F(LcmPolicyTest, AReplyToTheLastRequestIsNotTakenForAReplyToThisOne) {
   const LcmAddress address = wire::OwnAddress();
   wire::RawServer server(address, [&](LcmLink& link, const observation_t& header) {

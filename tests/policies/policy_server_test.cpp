@@ -55,6 +55,7 @@ class BareClient {
     image.episode = episode;
     image.request = request;
     image.index = index;
+    image.camera = index == 0 ? "head" : "hand_right";
     PutImage(rgb, std::nullopt, image);
     return image;
   }
@@ -125,6 +126,38 @@ TEST_F(PolicyServerTest, ImagesMayComeInAnyOrderTwiceAndBeforeTheirRequest) {
   EXPECT_EQ(client.NextChunk().error, "");
   const auto seen = probe.seen().at(0).observations.at(0);
   for (int i = 0; i < 2; ++i) EXPECT_EQ(cv::norm(seen.images[i], observation_.images[i], cv::NORM_INF), 0);
+}
+
+TEST_F(PolicyServerTest, ARequestIsCompleteWithTheImagesItCountsAndWithNoOthers) {
+  const LcmAddress address = wire::OwnAddress();
+  wire::ProbePolicy probe;
+  wire::Served served(probe, wire::ProbeSpec(), address);
+  BareClient client(address);
+  client.Start(0, 0, task_);
+  client.Send("observation", client.Header(0, 0, observation_));
+  client.Send("image", client.Image(0, 0, 0, observation_.images[0]));
+  client.Send("image", client.Image(0, 0, 5, observation_.images[1]));  // of no camera
+  client.Send("image", client.Image(0, 0, 1, observation_.images[1]));
+  EXPECT_EQ(client.NextChunk().error, "");
+  EXPECT_EQ(probe.seen().at(0).observations.at(0).images.size(), 2u);
+
+  image_t swapped = client.Image(0, 1, 0, observation_.images[0]);
+  swapped.camera = "hand_right";
+  client.Send("observation", client.Header(0, 1, observation_));
+  client.Send("image", swapped);
+  client.Send("image", client.Image(0, 1, 1, observation_.images[1]));
+  EXPECT_EQ(client.NextChunk().error, "image 0 is of camera 'hand_right', wanted 'head'");
+}
+
+TEST_F(PolicyServerTest, ATaskOfMoreCamerasThanARequestCanHaveIsRefused) {
+  const LcmAddress address = wire::OwnAddress();
+  wire::ProbePolicy probe;
+  wire::Served served(probe, wire::ProbeSpec(), address);
+  BareClient client(address);
+  Task task = task_;
+  task.cameras.resize(17, task_.cameras[0]);
+  client.Start(0, 0, task);
+  EXPECT_EQ(client.started.at(0).error, "the task has 17 cameras, wanted at most 16");
 }
 
 TEST_F(PolicyServerTest, ARepeatedStartIsOneReset) {

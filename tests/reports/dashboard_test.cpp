@@ -5,6 +5,7 @@
 #include <httplib.h>
 
 #include <fstream>
+#include <future>
 #include <nlohmann/json.hpp>
 #include <thread>
 
@@ -151,6 +152,21 @@ TEST(Dashboard, AnAddressThatIsTakenIsRefused) {
   const Dashboard first({.runs = {empty.path()}});
   EXPECT_GT(first.port(), 0);
   EXPECT_THROW(Dashboard({.runs = {empty.path()}, .host = "no.such.host.invalid"}), Error);
+}
+
+TEST(Dashboard, WhatCanBeListenedAtNoMoreIsSaidToBeSo) {
+  TempFolder empty;
+  Dashboard dashboard(OptionsFor({empty.path()}));
+  std::future<void> served = std::async(std::launch::async, [&] { dashboard.Serve(); });
+  ASSERT_TRUE(httplib::Client("127.0.0.1", dashboard.port()).Get("/"));
+  for (int descriptor = 0; descriptor < 1024; ++descriptor) {
+    sockaddr_in address{};
+    socklen_t size = sizeof(address);
+    const bool is_socket = ::getsockname(descriptor, reinterpret_cast<sockaddr*>(&address), &size) == 0;
+    if (is_socket && ntohs(address.sin_port) == dashboard.port()) ::shutdown(descriptor, SHUT_RDWR);
+  }
+  EXPECT_THAT([&] { served.get(); },
+              testing::ThrowsMessage<Error>(HasSubstr(dashboard.url() + " cannot be listened at any more")));
 }
 
 TEST(DashboardPath, OnlyWhatAPageNamesIsThere) {

@@ -172,6 +172,16 @@ TEST(Resume, ARunThatAnotherVersionBeganGoesOnAndSaysSo) {
   EXPECT_THAT(goes_on.err, HasSubstr("was begun by evac 0.0.1; evac "));
 }
 
+TEST(Resume, ASuiteThatIsMendedBeforeItsFirstEpisodeRunsInTheSameFolder) {
+  const TempFolder folder;
+  const fs::path run = folder / "run";
+  const CommandResult refused =
+      RunCommand(RunWords(kFaults, run, {"initial_states.count=1", "policies.0.command=[/no/such/policy]"}));
+  EXPECT_EQ(refused.exit_code, 2) << refused.err;
+  const CommandResult mended = RunCommand(RunWords(kFaults, run, {"initial_states.count=1"}));
+  EXPECT_EQ(mended.exit_code, 0) << mended.err;
+}
+
 TEST(Resume, ARunIsNotContinuedWithAnotherSuite) {
   const TempFolder folder;
   const fs::path run = folder / "run";

@@ -7,8 +7,8 @@
 namespace evac::sim {
 namespace {
 
-/// Executes one chunk, up to where the physics fails. Not filmed, only its last step is drawn.
-Advanced Execute(Scene& scene, const ActionChunk& chunk, bool film, Renderer& renderer) {
+/// Executes one chunk, up to where the physics or the drawing fails. Not filmed, only its last step is drawn.
+Advanced Execute(Scene& scene, const ActionChunk& chunk, bool film, Renderer& renderer) try {
   std::vector<WorldStep> steps;
   for (const Arms& target : chunk.targets) {
     scene.Drive(target);
@@ -17,6 +17,8 @@ Advanced Execute(Scene& scene, const ActionChunk& chunk, bool film, Renderer& re
     steps.push_back(scene.Observe(seen ? &renderer : nullptr));
   }
   return steps;
+} catch (const std::exception& error) {
+  return Failure{StopReason::kWorldError, error.what()};
 }
 
 }  // namespace

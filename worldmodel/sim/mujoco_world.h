@@ -29,7 +29,8 @@ struct MujocoWorldOptions {
 /// Pose, colour, light and clutter come from InitialState::seed alone; what a scene answers is a function of the
 /// profile, the task, the initial state, Reset's `seed` (sensor noise) and the chunks, bit for bit on one machine.
 /// Observed arms are measured; images are as Task::cameras says, taken by cameras that stand where the profile's
-/// calibration error puts them. A scene whose physics diverges answers Failure{kDiverged}.
+/// calibration error puts them. A scene whose physics diverges answers Failure{kDiverged}, one that cannot be drawn
+/// Failure{kWorldError}.
 class MujocoWorld : public World {
  public:
   /// @throws Error if the profile is wrong or there is no OpenGL.

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <string_view>
+#include <utility>
 
 #include "core/config.h"
 #include "core/file.h"
@@ -128,7 +129,12 @@ ScenePage ReadScenePage(const Task& task) {
   RequireIncludesNamed(page, named, scene.scene);
   for (const std::string& file : named) RequireIncludesNamed(page, named, scene.scene.parent_path() / file);
   scene.homes = ReadHomes(page.Section("home"), task);
-  for (const Config& item : page.List("objects")) scene.placements.push_back(ReadPlacement(item));
+  for (const Config& item : page.List("objects")) {
+    Placement placement = ReadPlacement(item);
+    const bool is_new = std::ranges::find(scene.placements, placement.body, &Placement::body) == scene.placements.end();
+    item.Require(is_new, "body", "another body than those before it");
+    scene.placements.push_back(std::move(placement));
+  }
   for (const Config& item : page.List("colours")) scene.colours.push_back(ReadColour(item));
   scene.light = ReadLight(page.Section("light"));
   scene.clutter = ReadClutter(page.Section("clutter"));

@@ -1,9 +1,18 @@
 #include "worldmodel/sim/workers.h"
 
+#include <system_error>
+
+#include "core/error.h"
+
 namespace evac::sim {
 
 Workers::Workers(int threads) {
-  for (int i = 0; i < threads; ++i) threads_.emplace_back([this] { Live(); });
+  try {
+    for (int i = 0; i < threads; ++i) threads_.emplace_back([this] { Live(); });
+  } catch (const std::system_error& error) {
+    Stop();
+    throw InternalError("cannot start {} threads to simulate in: {}", threads, error.what());
+  }
   std::unique_lock lock(mutex_);
   changed_.wait(lock, [&] { return ready_ == threads; });
   if (!start_error_) return;

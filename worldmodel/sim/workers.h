@@ -16,7 +16,7 @@ class Workers {
  public:
   using Work = std::function<void(int item, Renderer& renderer)>;
 
-  /// @throws Error of a thread that gets no renderer.
+  /// @throws Error of a thread that gets no renderer, or that cannot be started.
   explicit Workers(int threads);
   ~Workers();
   Workers(const Workers&) = delete;

@@ -3,8 +3,13 @@
 #include <fmt/ranges.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <signal.h>
+#include <sys/resource.h>
+#include <unistd.h>
 
 #include <algorithm>
+#include <filesystem>
+#include <fstream>
 #include <functional>
 #include <limits>
 #include <opencv2/imgproc.hpp>
@@ -275,6 +280,39 @@ TEST(MujocoWorld, PhysicsThatDivergesFailsItsOwnSceneOnly) {
   EXPECT_EQ(std::get<0>(answers[1]).size(), 20U);
   EXPECT_EQ(WhatIsWrong(world.Reset(0, good, State(1), 1).observation, good),
             std::nullopt);  // the lane can be used again
+}
+
+/// Ends what draws for this process's worlds.
+void EndDrawingProcesses() {
+  for (const auto& entry : std::filesystem::directory_iterator("/proc")) {
+    std::ifstream file(entry.path() / "stat");
+    std::string pid, name, state, parent;
+    file >> pid >> name >> state >> parent;
+    if (name == "(evac-draw)" && parent == std::to_string(::getpid())) ::kill(std::stoi(pid), SIGKILL);
+  }
+}
+
+TEST(MujocoWorld, ASceneThatCannotBeDrawnLeavesTheOthersTheirAnswers) {
+  const TempFolder folder;
+  MujocoWorld world({"sim", ProfilePage("sim"), 1, /*film=*/false});
+  const Task bad = WithTinyPictures(TaskThatBlowsUp(folder.path())), good = WithTinyPictures(ReadTask("take_bottle"));
+  const ArmState home = world.Reset(0, good, State(1), 1).observation.arms[0];
+  world.Reset(1, bad, State(1), 1);  // never comes to be drawn
+  const ActionChunk rest{std::vector<Arms>(20, {home}), false};
+  const SceneChunk batch[] = {{0, &rest}, {1, &rest}};
+  rlimit descriptors{};
+  ASSERT_EQ(::getrlimit(RLIMIT_NOFILE, &descriptors), 0);
+  const rlimit none_left{1, descriptors.rlim_max};
+  EndDrawingProcesses();
+  ASSERT_EQ(::setrlimit(RLIMIT_NOFILE, &none_left), 0);  // no other can be started
+  std::vector<Advanced> answers;
+  EXPECT_NO_THROW(answers = world.Advance(batch));
+  ASSERT_EQ(::setrlimit(RLIMIT_NOFILE, &descriptors), 0);
+  ASSERT_EQ(answers.size(), 2U);
+  ASSERT_TRUE(std::holds_alternative<Failure>(answers[0]) && std::holds_alternative<Failure>(answers[1]));
+  EXPECT_EQ(std::get<Failure>(answers[0]).stop, StopReason::kWorldError);
+  EXPECT_THAT(std::get<Failure>(answers[0]).message, HasSubstr("cannot render"));
+  EXPECT_EQ(std::get<Failure>(answers[1]).stop, StopReason::kDiverged);
 }
 
 TEST(MujocoWorld, WhatItCannotShowIsRefusedByName) {

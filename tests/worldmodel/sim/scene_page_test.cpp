@@ -37,6 +37,25 @@ TEST(ScenePage, NamesEveryFileThatItsSceneIncludesBecauseTheSuitesHashCoversThos
   EXPECT_THAT(RefusalWith("<include\n  file = 'shelf.xml'/>"), HasSubstr("includes 'shelf.xml'"));
 }
 
+TEST(ScenePage, NumbersAreFiniteAndNoBodyIsPlacedTwice) {
+  const auto complaint = [](const std::string& found, const std::string& put) {
+    Task task = test::ReadTask("take_bottle");
+    const std::size_t at = task.page.find(found);
+    EXPECT_NE(at, std::string::npos) << found;
+    const std::size_t end = task.page.find_first_of(",}\n", at);
+    task.page.replace(at, end - at, put);
+    try {
+      ReadScenePage(task);
+    } catch (const Error& error) {
+      return std::string(error.what());
+    }
+    return std::string("no complaint");
+  };
+  EXPECT_THAT(complaint("z_m: ", "z_m: .nan"), HasSubstr("wanted a number"));
+  EXPECT_THAT(complaint("spread_m: ", "spread_m: .inf"), HasSubstr("wanted a number"));
+  EXPECT_THAT(complaint("body: bottle", "body: box"), HasSubstr("wanted another body than those before it"));
+}
+
 TEST(ScenePage, AnEndlessAttributeIsReadWithoutRecursion) {
   EXPECT_THAT(RefusalWith("<include file=\"" + std::string(5'000'000, 'a') + "\"/>"), HasSubstr("wanted that file"));
   EXPECT_EQ(RefusalWith("<include file=\"" + std::string(100, ' ')), "");
