@@ -189,11 +189,13 @@ class StudyStore {
   void AddPresentations(std::span<const Presentation> presentations);
   std::optional<Presentation> FindPresentation(const std::string& id) const;
   std::vector<Presentation> PresentationsOf(std::int64_t rater) const;
+  /// Of what a rater is asked: gold and repeats too, examples and practice not, nor what could not be played.
   struct Progress {
-    std::int64_t done = 0, total = 0;  ///< clips, practice and examples not
+    std::int64_t done = 0;   ///< answered
+    std::int64_t total = 0;  ///< and still to be asked, as things are now: less when others rate a clip first
     std::int64_t practice_left = 0;
   };
-  Progress ProgressOf(std::int64_t rater) const;
+  Progress ProgressOf(std::int64_t rater, std::int64_t now_ms) const;
   /// The first open one of the rater's order whose clip still wants votes: those that count and those to come under a
   /// lease of others are fewer than raters_per_clip (gold and practice always are wanted, a repeat once its first is
   /// answered).
@@ -236,11 +238,10 @@ class StudyStore {
     int stages = 0;
     bool has_flags = false;
     double rt_ms = 0, max_speed = 0;
+    std::int64_t since_ms = 0;  ///< when it was said, by the server's clock
   };
   /// Every row after that verdict, oldest first: replaced ones, "retracted" ones and those that do not count too.
   std::vector<Ballot> BallotsAfter(std::int64_t verdict) const;
-  /// Rows of any kind but undone ones, by the server's clock.
-  std::int64_t VerdictsSince(std::int64_t from_ms) const;
   /// Clips with all their votes that somebody must decide: split, nobody could tell, against the reference, or flagged
   /// by two. Not those that an adjudicator decided; one who left and counts no more has decided none.
   std::vector<std::int64_t> Disputes() const;

@@ -77,7 +77,7 @@ CREATE VIEW votes AS
 PRAGMA user_version = 1;
 )sql";
 
-/// A rater's next clip, who holds one, how far a rater is: each read from an index of just those rows.
+/// A rater's next clip, who holds or answered one, how far a rater is: each read from an index of just those rows.
 const char* const kStudyIndexes = R"sql(
 CREATE TABLE IF NOT EXISTS round_trips (wave INTEGER PRIMARY KEY REFERENCES waves (number), codec_sha256 TEXT NOT NULL);
 CREATE INDEX IF NOT EXISTS presentations_to_finish ON presentations (rater, order_index)
@@ -87,6 +87,7 @@ CREATE INDEX IF NOT EXISTS presentations_to_come ON presentations (rater, order_
 CREATE INDEX IF NOT EXISTS presentations_held ON presentations (clip, lease_until_ms)
   WHERE state = 'open' AND lease_until_ms > 0;
 CREATE INDEX IF NOT EXISTS presentations_of_rater ON presentations (rater, showing, state);
+CREATE INDEX IF NOT EXISTS presentations_answered ON presentations (clip, showing, rater) WHERE state = 'answered';
 DROP INDEX IF EXISTS presentations_of_clip;
 )sql";
 

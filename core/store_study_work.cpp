@@ -1,3 +1,5 @@
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <utility>
 
@@ -12,6 +14,10 @@ namespace {
 constexpr const char* kPresentationColumns =
     "SELECT p.id, p.rater, p.clip, p.order_index, p.showing, p.repeat_of, p.state, p.shown_ms, p.lease_until_ms "
     "FROM presentations p ";
+
+std::string PresentationsWhere(const std::string& condition) {
+  return fmt::format("{}{}", kPresentationColumns, condition);
+}
 
 Presentation PresentationOf(const sqlite::Statement& row) {
   Presentation presentation;
@@ -80,6 +86,24 @@ std::vector<StudyStore::Said> AllSaid(sqlite::Statement row) {
   return all;
 }
 
+/// Whether a presentation that is open and was never shown wants this rater (?1) at this time (?2). Its clip's votes
+/// are those that the view `votes` has, read from one index: what is answered, by raters who count.
+std::string WantsRater(const char* p) {
+  return fmt::format(
+      "({0}.showing IN ('gold', 'practice', 'adjudication') OR {0}.showing = 'counted' AND "
+      "(SELECT count(*) FROM presentations a WHERE a.clip = {0}.clip AND a.state = 'answered' "
+      "AND a.showing IN ('counted', 'gold', 'import') AND a.rater NOT IN (SELECT id FROM raters WHERE counts = 0)) + "
+      "(SELECT count(*) FROM presentations o WHERE o.clip = {0}.clip AND o.state = 'open' AND o.lease_until_ms > 0 "
+      "AND o.lease_until_ms > ?2 AND o.rater <> ?1 AND o.showing = 'counted') < "
+      "(SELECT raters_per_clip FROM study))",
+      p);
+}
+
+/// Whether a presentation is asked for yet, as above; what was shown and not answered always is.
+std::string IsAhead(const char* p) {
+  return fmt::format("({0}.state = 'open' AND ({0}.shown_ms IS NOT NULL OR {1}))", p, WantsRater(p));
+}
+
 }  // namespace
 
 void StudyStore::AddPresentations(std::span<const Presentation> presentations) {
@@ -94,33 +118,37 @@ void StudyStore::AddPresentations(std::span<const Presentation> presentations) {
 
 std::optional<Presentation> StudyStore::FindPresentation(const std::string& id) const {
   sqlite::Statement row =
-      database_->connection.Query((std::string(kPresentationColumns) + "WHERE p.id = ?").c_str(), id);
+      database_->connection.Query(PresentationsWhere("WHERE p.id = ?").c_str(), id);
   if (!row.Step()) return std::nullopt;
   return PresentationOf(row);
 }
 
 std::vector<Presentation> StudyStore::PresentationsOf(std::int64_t rater) const {
   sqlite::Statement row = database_->connection.Query(
-      (std::string(kPresentationColumns) + "WHERE p.rater = ? ORDER BY p.order_index").c_str(), rater);
+      PresentationsWhere("WHERE p.rater = ? ORDER BY p.order_index").c_str(), rater);
   std::vector<Presentation> presentations;
   while (row.Step()) presentations.push_back(PresentationOf(row));
   return presentations;
 }
 
-StudyStore::Progress StudyStore::ProgressOf(std::int64_t rater) const {
-  sqlite::Statement row = database_->connection.Query(
-      "SELECT showing, state = 'open', count(*) FROM presentations WHERE rater = ? GROUP BY showing, state", rater);
+StudyStore::Progress StudyStore::ProgressOf(std::int64_t rater, std::int64_t now_ms) const {
+  static const std::string query = fmt::format(
+      "SELECT p.showing, p.state = 'answered', count(*) FROM presentations p WHERE p.rater = ?1 AND "
+      "(p.state = 'answered' OR {} OR p.state = 'open' AND p.showing = 'repeat' AND EXISTS "
+      "(SELECT 1 FROM presentations f WHERE f.id = p.repeat_of AND (f.state = 'answered' OR {}))) GROUP BY 1, 2",
+      IsAhead("p"), IsAhead("f"));
+  sqlite::Statement row = database_->connection.Query(query.c_str(), rater, now_ms);
   Progress progress;
   while (row.Step()) {
     const Showing showing = ShowingFromName(row.Text(0));
-    const bool is_open = row.Integer(1) != 0;
+    const bool is_answered = row.Integer(1) != 0;
     if (showing == Showing::kExample) continue;
     if (showing == Showing::kPractice) {
-      if (is_open) progress.practice_left += row.Integer(2);
+      if (!is_answered) progress.practice_left += row.Integer(2);
       continue;
     }
     progress.total += row.Integer(2);
-    if (!is_open) progress.done += row.Integer(2);
+    if (is_answered) progress.done += row.Integer(2);
   }
   return progress;
 }
@@ -136,24 +164,18 @@ std::optional<Presentation> StudyStore::NextOpen(std::int64_t rater, std::span<c
   };
   // What was shown and not answered comes first: a reload goes on where it was, an undone verdict is asked again.
   sqlite::Connection& connection = database_->connection;
-  const std::string columns = kPresentationColumns;
   if (auto shown = first_not_held(connection.Query(
-          (columns + "WHERE p.rater = ? AND p.state = 'open' AND p.shown_ms IS NOT NULL ORDER BY p.order_index")
+          PresentationsWhere("WHERE p.rater = ? AND p.state = 'open' AND p.shown_ms IS NOT NULL ORDER BY p.order_index")
               .c_str(),
           rater)))
     return shown;
   // The index stands in the order asked for, so that rows are looked at until the first that is wanted.
   return first_not_held(connection.Query(
-      (columns +
-       "INDEXED BY presentations_to_come WHERE p.rater = ?1 AND p.state = 'open' AND p.shown_ms IS NULL "
-       "AND (p.showing IN ('gold', 'practice', 'adjudication') OR "
-       "p.showing = 'repeat' AND EXISTS (SELECT 1 FROM presentations f WHERE f.id = p.repeat_of AND f.state = "
-       "'answered') "
-       "OR p.showing = 'counted' AND "
-       "(SELECT count(*) FROM votes v WHERE v.clip = p.clip) + "
-       "(SELECT count(*) FROM presentations o WHERE o.clip = p.clip AND o.state = 'open' AND o.lease_until_ms > 0 "
-       "AND o.lease_until_ms > ?2 AND o.rater <> ?1 AND o.showing = 'counted') < "
-       "(SELECT raters_per_clip FROM study)) ORDER BY p.order_index")
+      PresentationsWhere(
+          "INDEXED BY presentations_to_come WHERE p.rater = ?1 AND p.state = 'open' AND p.shown_ms IS NULL "
+          "AND (p.showing = 'repeat' AND EXISTS (SELECT 1 FROM presentations f WHERE f.id = p.repeat_of AND f.state = "
+          "'answered') OR " +
+          WantsRater("p") + ") ORDER BY p.order_index")
           .c_str(),
       rater, now_ms));
 }
@@ -232,22 +254,17 @@ std::vector<StudyStore::Said> StudyStore::CurrentBy(std::int64_t rater) const {
 std::vector<StudyStore::Ballot> StudyStore::BallotsAfter(std::int64_t verdict) const {
   sqlite::Statement row = database_->connection.Query(
       "SELECT v.id, coalesce(v.supersedes, 0), v.rater, v.clip, v.label, p.showing, r.role, v.is_final, v.stages, "
-      "v.flags <> '', v.rt_ms, v.max_speed FROM verdicts v JOIN presentations p ON p.id = v.presentation "
+      "v.flags <> '', v.rt_ms, v.max_speed, v.created_ms FROM verdicts v JOIN presentations p ON p.id = v.presentation "
       "JOIN raters r ON r.id = v.rater WHERE v.id > ? ORDER BY v.id",
       verdict);
   std::vector<Ballot> ballots;
   while (row.Step()) {
     ballots.push_back({row.Integer(0), row.Integer(1), row.Integer(2), row.Integer(3), row.Text(4),
                        ShowingFromName(row.Text(5)), RaterRoleFromName(row.Text(6)), row.Integer(7) != 0,
-                       static_cast<int>(row.Integer(8)), row.Integer(9) != 0, row.Real(10), row.Real(11)});
+                       static_cast<int>(row.Integer(8)), row.Integer(9) != 0, row.Real(10), row.Real(11),
+                       row.Integer(12)});
   }
   return ballots;
-}
-
-std::int64_t StudyStore::VerdictsSince(std::int64_t from_ms) const {
-  sqlite::Statement row = database_->connection.Query(
-      "SELECT count(*) FROM verdicts WHERE created_ms >= ? AND label <> 'retracted'", from_ms);
-  return row.Step() ? row.Integer(0) : 0;
 }
 
 std::vector<std::int64_t> StudyStore::Disputes() const {
@@ -277,8 +294,7 @@ std::vector<StudyStore::Unplayable> StudyStore::UnplayableClips() const {
 
 std::vector<Presentation> StudyStore::Leases(std::int64_t now_ms) const {
   sqlite::Statement row = database_->connection.Query(
-      (std::string(kPresentationColumns) +
-       "WHERE p.state = 'open' AND p.lease_until_ms > 0 AND p.lease_until_ms > ? ORDER BY p.rater")
+      PresentationsWhere("WHERE p.state = 'open' AND p.lease_until_ms > 0 AND p.lease_until_ms > ? ORDER BY p.rater")
           .c_str(),
       now_ms);
   std::vector<Presentation> leases;

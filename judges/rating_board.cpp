@@ -126,17 +126,26 @@ Json BlindingJson(const StudyStore& store, const RatingTally& tally) {
   return json;
 }
 
-/// Clips, verdicts and what is left, with the time it takes if it goes on as in the last hour.
+/// Votes of a clip that were missing and came since then: an imported one was no work, one too many fills no place.
+std::int64_t FilledSince(const RatedClip& clip, std::int64_t from_ms, std::int64_t wanted) {
+  const std::int64_t fresh = std::ranges::count_if(clip.by_rater, [from_ms](const auto& vote) {
+    return vote.second.since_ms >= from_ms && vote.second.showing != Showing::kImport;
+  });
+  const std::int64_t others = static_cast<std::int64_t>(clip.by_rater.size()) - fresh;
+  return std::min(fresh, std::max<std::int64_t>(0, wanted - others));
+}
+
+/// Clips, votes and what is left, with the time it takes if places are filled as in the last hour.
 Json ProgressJson(const StudyStore& store, const std::vector<RatedClip>& clips, std::int64_t now_ms) {
   const std::int64_t wanted = store.info().raters_per_clip;
-  std::int64_t votes = 0, complete = 0, missing = 0;
+  std::int64_t votes = 0, complete = 0, missing = 0, last_hour = 0;
   for (const RatedClip& clip : clips) {
     const auto given = static_cast<std::int64_t>(clip.by_rater.size());
     votes += given;
     if (given >= wanted) ++complete;
     missing += std::max<std::int64_t>(0, wanted - given);
+    last_hour += FilledSince(clip, now_ms - 3'600'000, wanted);
   }
-  const std::int64_t last_hour = store.VerdictsSince(now_ms - 3'600'000);
   Json json = {{"clips", clips.size()},
                {"complete", complete},
                {"votes", votes},

@@ -113,8 +113,9 @@ void RatingDesk::Plan(const StudyRater& rater, std::int64_t now_ms) {
   store_.AddPresentations(writer.presentations);
 }
 
-Json RatingDesk::Progress(const StudyRater& rater) const {
-  const StudyStore::Progress progress = store_.ProgressOf(rater.id);
+Json RatingDesk::Progress(const StudyRater& rater, std::int64_t now_ms) const {
+  StudyStore::Progress progress = store_.ProgressOf(rater.id, now_ms);
+  if (rater.role == RaterRole::kAdjudicator) progress.total = progress.done + DisputesLeft(rater);
   return {{"done", progress.done}, {"total", progress.total}, {"practice_left", progress.practice_left}};
 }
 
@@ -124,7 +125,7 @@ DeskAnswer RatingDesk::Me(const StudyRater& rater, std::int64_t now_ms) {
   answer.body = {{"rater", PublicName(rater)}, {"role", Name(rater.role)},      {"name", rater.name},
                  {"study", info_.name},        {"cover", options_.cover_share}, {"break_every", options_.break_every},
                  {"period_s", info_.period_s}, {"width_px", info_.width_px},    {"height_px", info_.height_px},
-                 {"flags", RatingFlags()},     {"causes", FailureCauses()},     {"progress", Progress(rater)}};
+                 {"flags", RatingFlags()},     {"causes", FailureCauses()},     {"progress", Progress(rater, now_ms)}};
   Json rubrics = Json::array();
   for (const StudyRubric& rubric : store_.Rubrics()) rubrics.push_back(Json::parse(rubric.document));
   answer.body["rubrics"] = std::move(rubrics);
@@ -134,7 +135,7 @@ DeskAnswer RatingDesk::Me(const StudyRater& rater, std::int64_t now_ms) {
 DeskAnswer RatingDesk::TakeTab(const StudyRater& rater) { return {200, {{"tab_epoch", store_.NextTab(rater.id)}}}; }
 
 /// What the browser needs to show a clip. Gold and repeats look like any other.
-DeskAnswer RatingDesk::Shown(const StudyRater& rater, const Presentation& p) const {
+DeskAnswer RatingDesk::Shown(const StudyRater& rater, const Presentation& p, std::int64_t now_ms) const {
   const StudyClip clip = store_.Clip(p.clip);
   std::string document = "{}";
   for (const StudyRubric& rubric : store_.Rubrics()) {
@@ -151,9 +152,9 @@ DeskAnswer RatingDesk::Shown(const StudyRater& rater, const Presentation& p) con
                  {"period_s", info_.period_s},
                  {"views", Json::parse(clip.views)},
                  {"rubric", Json::parse(document)},
-                 {"progress", Progress(rater)}};
+                 {"progress", Progress(rater, now_ms)}};
   if (const auto current = store_.CurrentVerdict(p.id)) {
-    answer.body["verdict"] = Stored(rater, *current).body["verdict"];
+    answer.body["verdict"] = Stored(rater, *current, now_ms).body["verdict"];
     if (is_dispute) answer.body["others"] = Others(p.clip);
   }
   return answer;
@@ -164,9 +165,9 @@ DeskAnswer RatingDesk::Next(const StudyRater& rater, const NextBody& body, std::
   if (rater.role == RaterRole::kAdjudicator) return NextDispute(rater, body, now_ms);
   if (rater.role == RaterRole::kLead) return Refused(403, "role", "a lead rates no clips");
   const auto next = store_.NextOpen(rater.id, body.held, now_ms);
-  if (!next) return {200, {{"done", true}, {"progress", Progress(rater)}}};
+  if (!next) return {200, {{"done", true}, {"progress", Progress(rater, now_ms)}}};
   store_.Lease(next->id, now_ms + options_.lease_ms, now_ms);
-  return Shown(rater, *next);
+  return Shown(rater, *next, now_ms);
 }
 
 DeskAnswer RatingDesk::Open(const StudyRater& rater, const PresentationBody& body, std::int64_t now_ms) {
@@ -175,14 +176,15 @@ DeskAnswer RatingDesk::Open(const StudyRater& rater, const PresentationBody& bod
   if (!p || p->rater != rater.id || !p->shown_ms || p->showing == Showing::kExample)
     return Refused(404, "clip", "there is no such clip");
   if (p->state == "open") store_.Lease(p->id, now_ms + options_.lease_ms, now_ms);
-  return Shown(rater, *p);
+  return Shown(rater, *p, now_ms);
 }
 
 DeskAnswer RatingDesk::NextDispute(const StudyRater& rater, const NextBody& body, std::int64_t now_ms) {
   std::map<std::int64_t, Presentation> mine;
   int next = 0;
   for (Presentation& p : store_.PresentationsOf(rater.id)) next = p.order_index + 1, mine[p.clip] = std::move(p);
-  for (const std::int64_t clip : store_.Disputes()) {
+  const std::vector<std::int64_t> disputes = store_.Disputes();
+  for (const std::int64_t clip : disputes) {
     auto found = mine.find(clip);
     if (found == mine.end()) {
       Presentation p;
@@ -196,11 +198,20 @@ DeskAnswer RatingDesk::NextDispute(const StudyRater& rater, const NextBody& body
     }
     if (found->second.state != "open" || std::ranges::find(body.held, found->second.id) != body.held.end()) continue;
     store_.Lease(found->second.id, now_ms + options_.lease_ms, now_ms);
-    DeskAnswer answer = Shown(rater, found->second);
-    answer.body["left"] = store_.Disputes().size();
+    DeskAnswer answer = Shown(rater, found->second, now_ms);
+    answer.body["left"] = disputes.size();
     return answer;
   }
-  return {200, {{"done", true}, {"progress", Progress(rater)}}};
+  return {200, {{"done", true}, {"progress", Progress(rater, now_ms)}}};
+}
+
+/// How many clips wait for this adjudicator: those that they decided or cannot play do not.
+std::int64_t RatingDesk::DisputesLeft(const StudyRater& rater) const {
+  std::set<std::int64_t> over;
+  for (const Presentation& p : store_.PresentationsOf(rater.id)) {
+    if (p.state != "open") over.insert(p.clip);
+  }
+  return std::ranges::count_if(store_.Disputes(), [&over](std::int64_t clip) { return !over.contains(clip); });
 }
 
 DeskAnswer RatingDesk::Heartbeat(const StudyRater& rater, const PresentationBody& body, std::int64_t now_ms) {

@@ -70,11 +70,12 @@ class RatingDesk {
 
  private:
   void Plan(const StudyRater& rater, std::int64_t now_ms);
-  DeskAnswer Shown(const StudyRater& rater, const Presentation& presentation) const;
+  DeskAnswer Shown(const StudyRater& rater, const Presentation& presentation, std::int64_t now_ms) const;
   DeskAnswer NextDispute(const StudyRater& rater, const NextBody& body, std::int64_t now_ms);
   std::optional<DeskAnswer> WhyNotAgain(const Presentation& presentation, HumanVerdict& verdict) const;
-  DeskAnswer Stored(const StudyRater& rater, const HumanVerdict& verdict) const;
-  nlohmann::ordered_json Progress(const StudyRater& rater) const;
+  std::int64_t DisputesLeft(const StudyRater& rater) const;
+  DeskAnswer Stored(const StudyRater& rater, const HumanVerdict& verdict, std::int64_t now_ms) const;
+  nlohmann::ordered_json Progress(const StudyRater& rater, std::int64_t now_ms) const;
   nlohmann::ordered_json Others(std::int64_t clip) const;
 
   StudyStore& store_;

@@ -31,12 +31,13 @@ Json VerdictJson(const HumanVerdict& verdict) {
           {"flags", verdict.flags},
           {"cause", verdict.cause},
           {"note", verdict.note},
+          {"confidence", verdict.confidence ? Json(*verdict.confidence) : Json(nullptr)},
           {"is_final", verdict.is_final}};
 }
 
 }  // namespace
 
-DeskAnswer RatingDesk::Stored(const StudyRater& rater, const HumanVerdict& verdict) const {
+DeskAnswer RatingDesk::Stored(const StudyRater& rater, const HumanVerdict& verdict, std::int64_t now_ms) const {
   DeskAnswer answer;
   answer.body = {{"verdict", VerdictJson(verdict)}};
   const auto p = store_.FindPresentation(verdict.presentation);
@@ -46,7 +47,7 @@ DeskAnswer RatingDesk::Stored(const StudyRater& rater, const HumanVerdict& verdi
                                {"reason", clip.reference_reason}};
   }
   if (p && p->showing == Showing::kAdjudication) answer.body["others"] = Others(p->clip);
-  answer.body["progress"] = Progress(rater);
+  answer.body["progress"] = Progress(rater, now_ms);
   return answer;
 }
 
@@ -90,7 +91,7 @@ std::optional<DeskAnswer> RatingDesk::WhyNotAgain(const Presentation& p, HumanVe
 DeskAnswer RatingDesk::Submit(const StudyRater& rater, HumanVerdict verdict, std::int64_t now_ms) {
   if (const auto stored = store_.VerdictByUuid(verdict.client_uuid)) {
     if (stored->rater != rater.id) return Refused(409, "uuid", "this uuid is taken");
-    return Stored(rater, *stored);
+    return Stored(rater, *stored, now_ms);
   }
   const auto p = store_.FindPresentation(verdict.presentation);
   if (!p || p->rater != rater.id || !p->shown_ms || p->showing == Showing::kExample)
@@ -98,9 +99,9 @@ DeskAnswer RatingDesk::Submit(const StudyRater& rater, HumanVerdict verdict, std
   if (verdict.tab_epoch != rater.tab_epoch) return Refused(409, "tab", "this study is open in another tab");
   if (verdict.is_final && p->showing != Showing::kAdjudication)
     return Refused(403, "role", "only an adjudicator decides");
+  const bool is_change = verdict.supersedes.has_value();  // or the decision: the clip was watched for the first word
   if (auto refusal = WhyNotAgain(*p, verdict)) return *refusal;
-  const bool is_decision = p->showing == Showing::kAdjudication && verdict.is_final;
-  if (!is_decision && verdict.coverage < options_.cover_share - 1e-6)
+  if (!is_change && verdict.coverage < options_.cover_share - 1e-6)
     return Refused(422, "coverage",
                    fmt::format("coverage: found {:.3f}, wanted {} or more", verdict.coverage, options_.cover_share));
   verdict.created_ms = now_ms;
@@ -110,13 +111,13 @@ DeskAnswer RatingDesk::Submit(const StudyRater& rater, HumanVerdict verdict, std
     store_.SetState(p->id, "answered");
     store_.Lease(p->id, 0, now_ms);
   }
-  return Stored(rater, stored);
+  return Stored(rater, stored, now_ms);
 }
 
 DeskAnswer RatingDesk::Retract(const StudyRater& rater, const RetractBody& body, std::int64_t now_ms) {
   if (const auto stored = store_.VerdictByUuid(body.uuid)) {
     if (stored->rater != rater.id) return Refused(409, "uuid", "this uuid is taken");
-    return Stored(rater, *stored);
+    return Stored(rater, *stored, now_ms);
   }
   const auto target = store_.VerdictByUuid(body.of_uuid);
   if (!target || target->rater != rater.id) return Refused(404, "verdict", "there is no such verdict");
@@ -137,7 +138,7 @@ DeskAnswer RatingDesk::Retract(const StudyRater& rater, const RetractBody& body,
   const HumanVerdict stored = store_.AddVerdict(std::move(row));
   store_.SetState(p->id, "open");
   store_.Lease(p->id, now_ms + options_.lease_ms, now_ms);
-  return Stored(rater, stored);
+  return Stored(rater, stored, now_ms);
 }
 
 DeskAnswer RatingDesk::Unplayable(const StudyRater& rater, const PresentationBody& body, std::int64_t now_ms) {
@@ -149,7 +150,7 @@ DeskAnswer RatingDesk::Unplayable(const StudyRater& rater, const PresentationBod
     store_.Lease(p->id, 0, now_ms);
     store_.AddEvent(rater.id, "unplayable", p->id + " " + body.reason, now_ms);
   }
-  return {200, {{"progress", Progress(rater)}}};
+  return {200, {{"progress", Progress(rater, now_ms)}}};
 }
 
 DeskAnswer RatingDesk::Withdraw(const StudyRater& rater, const WithdrawBody& body, std::int64_t now_ms) {

@@ -1,6 +1,7 @@
 #include "judges/rating_http.h"
 
 #include <fmt/format.h>
+#include <spdlog/spdlog.h>
 
 #include <atomic>
 #include <boost/asio/awaitable.hpp>
@@ -17,6 +18,7 @@
 #include <boost/beast/http.hpp>
 #include <chrono>
 #include <fstream>
+#include <system_error>
 #include <thread>
 #include <utility>
 
@@ -75,7 +77,11 @@ HttpAnswer WithFile(HttpAnswer answer) {
   if (!stream) return Plain(404);
   const auto size = static_cast<std::uint64_t>(stream.tellg());
   const ByteRange part = answer.part.value_or(ByteRange{0, size});
-  if (part.first > size || part.count > size - part.first) return Plain(416);
+  if (part.first > size || part.count > size - part.first) {
+    HttpAnswer refusal = Plain(416);
+    refusal.headers.emplace_back("Content-Range", fmt::format("bytes */{}", size));
+    return refusal;
+  }
   answer.body.resize(part.count);
   stream.seekg(static_cast<std::streamoff>(part.first));
   stream.read(answer.body.data(), static_cast<std::streamsize>(part.count));
@@ -215,7 +221,11 @@ int RatingHttp::port() const { return impl_->acceptor.local_endpoint().port(); }
 void RatingHttp::Serve() {
   asio::co_spawn(impl_->io, impl_->Accept(), asio::detached);
   std::vector<std::thread> threads;
-  for (int i = 1; i < impl_->limits.threads; ++i) threads.emplace_back([this] { impl_->io.run(); });
+  try {
+    for (int i = 1; i < impl_->limits.threads; ++i) threads.emplace_back([this] { impl_->io.run(); });
+  } catch (const std::system_error& error) {  // this one answers too
+    spdlog::warn("rating: {} of {} threads: {}", threads.size() + 1, impl_->limits.threads, error.what());
+  }
   impl_->io.run();
   for (std::thread& thread : threads) thread.join();
 }

@@ -53,7 +53,7 @@ class RatingHttp {
   RatingHttp(const std::string& host, int port, const HttpServerLimits& limits, Handler handler);
   ~RatingHttp();
   int port() const;
-  /// Answers until Stop, which any thread may call.
+  /// Answers until Stop, which any thread may call; with fewer threads where no more can be had.
   void Serve();
   void Stop();
 

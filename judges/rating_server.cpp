@@ -246,9 +246,13 @@ struct RatingServer::Impl {
     const auto size = file ? std::filesystem::file_size(*file, error) : 0;
     if (!file || error) return Refused(404, "clip", "there is no such clip");
     HttpAnswer answer{200, "video/mp4", "", {{"Accept-Ranges", "bytes"}}, file, std::nullopt};
-    if (asked.range.empty()) return answer;
+    if (asked.method != "GET" || !IsOneRange(asked.range)) return answer;
     answer.part = ParseRange(asked.range, size);
-    if (!answer.part) return Refused(416, "range", "Range: wanted one range of bytes inside the file");
+    if (!answer.part) {
+      answer = Refused(416, "range", "Range: wanted bytes inside the file");
+      answer.headers.emplace_back("Content-Range", fmt::format("bytes */{}", size));
+      return answer;
+    }
     answer.status = 206;
     answer.headers.emplace_back("Content-Range", fmt::format("bytes {}-{}/{}", answer.part->first,
                                                              answer.part->first + answer.part->count - 1, size));

@@ -63,6 +63,7 @@ void RatingTally::Take(StudyStore::Ballot ballot) {
     const auto replaced = std::find_if(own.rbegin(), own.rend(),
                                        [&](const StudyStore::Ballot& said) { return said.id == ballot.supersedes; });
     if (replaced != own.rend()) {  // a "retracted" row was taken away when it came
+      ballot.since_ms = replaced->since_ms;
       Discount(*replaced);
       own.erase(std::next(replaced).base());
     }

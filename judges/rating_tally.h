@@ -23,7 +23,7 @@ class RatingTally {
   const std::vector<RatedClip>& rated() const { return rated_; }
   /// Every clip, by id.
   const std::unordered_map<std::int64_t, StudyClip>& clips() const { return clips_; }
-  /// What a rater says now, counted or not, oldest first.
+  /// What a rater says now, counted or not, oldest first. What replaced something is since when that was said.
   const std::vector<StudyStore::Ballot>& By(std::int64_t rater) const;
   /// Ids of clips that an adjudicator is asked for, ascending: what StudyStore::Disputes finds.
   std::vector<std::int64_t> Disputes() const;

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <string_view>
 
 #include "core/seed.h"
 #include "core/statistics/bootstrap.h"
@@ -100,6 +101,15 @@ double Median(std::vector<double> values) {
   if (values.empty()) return 0;
   std::ranges::sort(values);
   return Quantile(values, 0.5);
+}
+
+/// What a rater says of each clip at its first showing. It may come after the repeat's answer: it was changed then.
+std::unordered_map<std::int64_t, std::string_view> FirstAnswers(const std::vector<StudyStore::Ballot>& ballots) {
+  std::unordered_map<std::int64_t, std::string_view> first;
+  for (const StudyStore::Ballot& ballot : ballots) {
+    if (ballot.showing != Showing::kRepeat) first[ballot.clip] = ballot.label;
+  }
+  return first;
 }
 
 /// rating.md 1.5: a verdict that came before anybody could have seen the clip.
@@ -221,17 +231,14 @@ RaterQuality QualityOfRater(const std::vector<StudyStore::Ballot>& ballots,
   std::int64_t successes = 0, too_fast = 0;
   const std::string* answer = nullptr;
   bool is_one_answer = true;
-  std::unordered_map<std::int64_t, const std::string*> first;
+  const std::unordered_map<std::int64_t, std::string_view> first = FirstAnswers(ballots);
   std::vector<double> rt_ms;
   for (const StudyStore::Ballot& ballot : ballots) {
     const StudyClip& clip = clips.at(ballot.clip);
     if (ballot.showing == Showing::kPractice) continue;
-    if (ballot.showing == Showing::kRepeat) {
+    if (const auto said = first.find(ballot.clip); ballot.showing == Showing::kRepeat && said != first.end()) {
       ++quality.repeats_seen;
-      const auto before = first.find(ballot.clip);
-      if (before != first.end() && *before->second == ballot.label) ++quality.repeats_same;
-    } else {
-      first[ballot.clip] = &ballot.label;
+      if (said->second == ballot.label) ++quality.repeats_same;
     }
     if (ballot.showing == Showing::kGold && clip.reference) {
       ++quality.gold_seen;

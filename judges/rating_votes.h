@@ -66,7 +66,7 @@ struct RaterQuality {
   std::int64_t verdicts = 0;
   double success_share = 0, median_rt_ms = 0;
   std::int64_t gold_right = 0, gold_seen = 0;
-  std::int64_t repeats_same = 0, repeats_seen = 0;
+  std::int64_t repeats_same = 0, repeats_seen = 0;  ///< of clips that have both answers now
   std::vector<std::string> concerns{};  ///< sentences
 };
 /// @param ballots  the current ones of one rater, oldest first. @param clips  by id. @param period_s  of a frame.

@@ -14,8 +14,11 @@ namespace {
 
 using nlohmann::json;
 
-constexpr double kLongest_ms = 7 * 24 * 3600e3;  // a page left open for a week
+constexpr double kLongest_ms = 10 * 365 * 24 * 3600e3;  // ten years: pages stay open for weeks, and lose no verdict
 constexpr std::size_t kMostIntervals = 1000, kLongestNote = 2000, kLongestName = 80;
+
+/// Tabs and ends of lines are text: a note that was pasted has them.
+bool IsControl(char c) { return static_cast<unsigned char>(c) < 0x20 && c != '\t' && c != '\n' && c != '\r'; }
 
 /// Reads fields of one JSON object and remembers the first thing that is wrong.
 class Fields {
@@ -32,8 +35,7 @@ class Fields {
     if (!value->is_string()) return Complain("{}: wanted a text", name), "";
     std::string text = value->get<std::string>();
     if (text.size() > longest) return Complain("{}: {} bytes, wanted at most {}", name, text.size(), longest), "";
-    if (std::ranges::any_of(text, [](char c) { return static_cast<unsigned char>(c) < 0x20 && c != '\n'; }))
-      return Complain("{}: has control characters", name), "";
+    if (std::ranges::any_of(text, IsControl)) return Complain("{}: has control characters", name), "";
     return text;
   }
 
@@ -179,6 +181,24 @@ std::optional<std::uint64_t> WholeNumber(std::string_view digits) {
   return value;
 }
 
+/// "bytes=5-9", "bytes=5-", "bytes=-4": of the two numbers one may be missing.
+struct BytesAsked {
+  std::optional<std::uint64_t> first{}, last{};
+};
+std::optional<BytesAsked> BytesOf(std::string_view header) {
+  constexpr std::string_view kUnit = "bytes=";
+  if (!header.starts_with(kUnit)) return std::nullopt;
+  header.remove_prefix(kUnit.size());
+  const std::size_t dash = header.find('-');
+  if (dash == std::string_view::npos) return std::nullopt;
+  const std::string_view first_text = header.substr(0, dash), last_text = header.substr(dash + 1);
+  const BytesAsked asked{WholeNumber(first_text), WholeNumber(last_text)};
+  const bool is_odd = (!asked.first && !first_text.empty()) || (!asked.last && !last_text.empty());
+  if (is_odd || (!asked.first && !asked.last)) return std::nullopt;
+  if (asked.first && asked.last && *asked.last < *asked.first) return std::nullopt;
+  return asked;
+}
+
 }  // namespace
 
 const std::vector<std::string>& RatingFlags() {
@@ -264,20 +284,17 @@ std::optional<std::size_t> ParseFrom(std::string_view query) {
   return query.starts_with(kName) ? WholeNumber(query.substr(kName.size())) : std::nullopt;
 }
 
+bool IsOneRange(std::string_view header) { return BytesOf(header).has_value(); }
+
 std::optional<ByteRange> ParseRange(std::string_view header, std::uint64_t size) {
-  constexpr std::string_view kUnit = "bytes=";
-  if (!header.starts_with(kUnit)) return std::nullopt;
-  header.remove_prefix(kUnit.size());
-  const std::size_t dash = header.find('-');
-  if (dash == std::string_view::npos) return std::nullopt;
-  const std::string_view first_text = header.substr(0, dash), last_text = header.substr(dash + 1);
-  const auto first = WholeNumber(first_text), last = WholeNumber(last_text);
-  if ((!first && !first_text.empty()) || (!last && !last_text.empty()) || (!first && !last)) return std::nullopt;
+  const auto asked = BytesOf(header);
+  if (!asked) return std::nullopt;
+  const auto& [first, last] = *asked;
   if (!first) {
     const std::uint64_t count = std::min(*last, size);
     return count == 0 ? std::nullopt : std::optional(ByteRange{size - count, count});
   }
-  if (*first >= size || (last && *last < *first)) return std::nullopt;
+  if (*first >= size) return std::nullopt;
   return ByteRange{*first, std::min(last.value_or(size - 1), size - 1) - *first + 1};
 }
 

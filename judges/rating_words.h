@@ -67,6 +67,8 @@ const std::vector<std::string>& FailureCauses();
 struct ByteRange {
   std::uint64_t first = 0, count = 0;
 };
+/// Whether it is one such range, be it inside of the file or not. Any other header is to be ignored (RFC 9110, 14.2).
+bool IsOneRange(std::string_view header);
 /// Nothing if it is another kind, more than one, or outside of the file.
 std::optional<ByteRange> ParseRange(std::string_view header, std::uint64_t size);
 

@@ -59,6 +59,15 @@ bool IsCounted(const std::string& judge, const std::string& counted) {
 
 std::string LastJudge(const std::string& counted) { return Names(counted).back(); }
 
+std::vector<std::string> JudgingCommands(const std::string& judge) {
+  const std::string kind = judge.substr(0, judge.find(':'));
+  if (kind == "oracle") return {"evac judge RUN --judge oracle"};
+  if (kind == "classifier") return {"evac judge RUN --judge classifier --weights FILE"};
+  if (kind == "vlm") return {"evac judge RUN --judge vlm --config PAGE"};
+  const std::string as = judge == "human" ? "" : kind == "human" ? " --each-rater" : " --as " + judge;
+  return {"evac rate new STUDY --run RUN", "evac rate serve STUDY", "evac rate resolve STUDY" + as};
+}
+
 std::string JudgeWords(const std::string& counted) { return fmt::format("{}", fmt::join(Names(counted), ", else ")); }
 
 }  // namespace evac

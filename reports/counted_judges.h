@@ -26,6 +26,10 @@ bool IsCounted(const std::string& judge, const std::string& counted);
 /// Who could still judge what nobody judged yet: the last of them, which the others leave it to.
 std::string LastJudge(const std::string& counted);
 
+/// The commands that give this judge's verdicts, one after the other; RUN, FILE, PAGE and STUDY stand for what the
+/// reader has. @param judge  one name: whoever is no program's is people's.
+std::vector<std::string> JudgingCommands(const std::string& judge);
+
 /// For people: "oracle", "oracle, else classifier:0123456789ab".
 std::string JudgeWords(const std::string& counted);
 

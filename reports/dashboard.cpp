@@ -74,7 +74,7 @@ struct Dashboard::Server {
     if (request.method != "GET" && request.method != "HEAD") {
       response.status = 405;
       response.set_header("Allow", "GET, HEAD");
-    } else if (IsLoopback(options.host) && !IsLoopbackHost(request.get_header_value("Host"))) {
+    } else if (IsLoopback(options.host) && !IsLoopbackHost(request.get_header_value("Host"), options.host)) {
       response.status = 403;
     } else if (!path || (path->view >= DashboardView::kPage && path->run >= runs.size())) {
       response.status = 404;

@@ -113,9 +113,14 @@ DashboardRun DashboardRunOf(const std::string& name, const ReportData& report) {
 
 std::string DashboardIndex(const std::vector<DashboardRun>& runs, const std::string& program) {
   std::string rows;
-  for (std::size_t i = 0; i < runs.size(); ++i) rows += RunRow(runs[i], i);
+  nlohmann::ordered_json stamps = nlohmann::ordered_json::array();
+  for (std::size_t i = 0; i < runs.size(); ++i) {
+    rows += RunRow(runs[i], i);
+    stamps.push_back(runs[i].stamp);
+  }
   return PageHead("evac dashboard", PageScripts::kLive) +
-         "<body data-events=\"events\"><header><h1>Runs</h1><p class=\"subtitle\">" +
+         "<body data-events=\"events\" data-stamp=\"" + Escaped(stamps.dump()) +
+         "\"><header><h1>Runs</h1><p class=\"subtitle\">" +
          Counted(static_cast<std::int64_t>(runs.size()), "run") + " · " + Escaped(program) +
          "</p></header>\n<main><p class=\"live\" role=\"status\"></p><div class=\"wide\"><table "
          "class=\"plain\"><thead><tr><th "

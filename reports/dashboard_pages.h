@@ -14,6 +14,7 @@ namespace evac {
 struct DashboardRun {
   std::string name;     ///< as it was given
   std::string problem;  ///< why it cannot be read; empty where it can
+  std::string stamp;    ///< of the store that it was counted from (dashboard_run.h)
   std::string suite_hash;
   std::int64_t episodes = 0, judged = 0, errors = 0;
   std::string reference;        ///< the real world's name

@@ -51,7 +51,7 @@ std::optional<DashboardPath> ParseDashboardPath(std::string_view path) {
   return DashboardPath{DashboardView::kFile, *run, std::string(path.substr(kFiles.size()))};
 }
 
-bool IsLoopbackHost(std::string_view host) {
+bool IsLoopbackHost(std::string_view host, std::string_view told) {
   std::string_view name = host;
   if (name.starts_with('[')) {
     name = name.substr(0, name.find(']') + 1);
@@ -62,7 +62,8 @@ bool IsLoopbackHost(std::string_view host) {
   const bool is_port =
       port.empty() || (port.size() > 1 && port.size() < 7 && port[0] == ':' &&
                        std::ranges::all_of(port.substr(1), [](char c) { return c >= '0' && c <= '9'; }));
-  return is_port && (name == "127.0.0.1" || name == "localhost" || name == "[::1]");
+  const bool is_ours = name == "127.0.0.1" || name == "localhost" || name == "[::1]";
+  return is_port && (is_ours || (!name.empty() && name == told));
 }
 
 }  // namespace evac

@@ -29,7 +29,7 @@ struct DashboardPath {
 std::optional<DashboardPath> ParseDashboardPath(std::string_view path);
 
 /// Whether a Host header names this machine's loopback, with or without a port: other names may be another site's, made
-/// to point here.
-bool IsLoopbackHost(std::string_view host);
+/// to point here. @param told  the loopback address that the dashboard was told to listen at: a name of it as well.
+bool IsLoopbackHost(std::string_view host, std::string_view told = "127.0.0.1");
 
 }  // namespace evac

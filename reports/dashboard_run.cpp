@@ -8,10 +8,20 @@
 #include "core/store.h"
 #include "reports/html.h"
 #include "reports/page.h"
+#include "reports/page_parts.h"
 #include "reports/report_json.h"
 
 namespace evac {
 namespace fs = std::filesystem;
+namespace {
+
+std::string ProblemPage(const std::string& problem, const PageOptions& page) {
+  return PageHead("No report", PageScripts::kLive) + LiveBody(page) + "<main><p>" + Escaped(problem) +
+         "</p><p class=\"live\" role=\"status\"></p></main>\n<script>" + PageScript(PageScripts::kLive) +
+         "</script></body></html>\n";
+}
+
+}  // namespace
 
 std::string StampOf(const fs::path& run) {
   std::string stamp;
@@ -19,7 +29,7 @@ std::string StampOf(const fs::path& run) {
     std::error_code error;
     const auto size = fs::file_size(run / name, error);
     const auto time = fs::last_write_time(run / name, error);
-    stamp += error ? "none " : fmt::format("{}@{} ", size, time.time_since_epoch().count());
+    stamp += error || size == 0 ? "none " : fmt::format("{}@{} ", size, time.time_since_epoch().count());
   }
   return stamp;
 }
@@ -31,26 +41,28 @@ WatchedRun::Content WatchedRun::Now() {
   const std::lock_guard lock(mutex_);
   const std::string stamp = StampOf(folder_);  // before reading: what is written meanwhile is news next time
   if (stamp != stamp_) {
-    content_ = Count();
+    content_ = Count(stamp);
+    content_.summary.stamp = stamp;
     stamp_ = stamp;
   }
   return content_;
 }
 
-WatchedRun::Content WatchedRun::Count() const try {
-  const ReportData report = ReportDataOf(Summarise(ReadRun(Store::Open(folder_, Store::Mode::kReadOnly)), options_));
-  const PageOptions page{"files", program_, "../../events", index_};
-  return {ReportPage(report, page), ReportJson(report.summary, program_), DashboardRunOf(folder_.string(), report)};
-} catch (const Error& error) {  // not begun yet, or being made: said where it would stand
-  Content content;
-  content.summary.name = folder_.string();
-  content.summary.problem = error.what();
-  content.page =
-      "<!doctype html><html lang=\"en\"><title>No report</title><p>" + Escaped(error.what()) + "</p></html>\n";
-  content.json = nlohmann::ordered_json{{"problem", error.what()}}.dump(
-                     -1, ' ', false, nlohmann::ordered_json::error_handler_t::replace) +
-                 "\n";
-  return content;
+WatchedRun::Content WatchedRun::Count(const std::string& stamp) const {
+  const PageOptions page{"files", program_, "../../events", index_, stamp};
+  try {
+    const ReportData report = ReportDataOf(Summarise(ReadRun(Store::Open(folder_, Store::Mode::kReadOnly)), options_));
+    return {ReportPage(report, page), ReportJson(report.summary, program_), DashboardRunOf(folder_.string(), report)};
+  } catch (const Error& error) {  // not begun yet, or being made: said where it would stand
+    Content content;
+    content.summary.name = folder_.string();
+    content.summary.problem = error.what();
+    content.page = ProblemPage(error.what(), page);
+    content.json = nlohmann::ordered_json{{"problem", error.what()}}.dump(
+                       -1, ' ', false, nlohmann::ordered_json::error_handler_t::replace) +
+                   "\n";
+    return content;
+  }
 }
 
 std::optional<fs::path> WatchedRun::FileOf(const std::string& file) const {

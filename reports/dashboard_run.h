@@ -10,7 +10,8 @@
 
 namespace evac {
 
-/// Changes whenever somebody writes a store: sizes and times of its files. Cheap enough to be looked at all the time.
+/// Changes whenever somebody writes a store: sizes and times of its files. Cheap enough to be looked at all the time. An
+/// empty log is as good as none: reading leaves one behind.
 std::string StampOf(const std::filesystem::path& run);
 
 /// What a dashboard keeps of one run: its pages, counted anew when its store has changed and somebody asks.
@@ -31,7 +32,7 @@ class WatchedRun {
   std::optional<std::filesystem::path> FileOf(const std::string& file) const;
 
  private:
-  Content Count() const;
+  Content Count(const std::string& stamp) const;
 
   const std::filesystem::path folder_;
   const std::size_t index_;

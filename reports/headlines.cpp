@@ -1,6 +1,7 @@
 #include "reports/headlines.h"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 
@@ -151,8 +152,8 @@ Headline Trusted(const ReportData& report) {
 void AddMissing(const RunSummary& summary, std::vector<HeadlineItem>& items) {
   if (const auto unjudged = summary.Count(Outcome::kUnjudged); unjudged > 0) {
     items.push_back({"",
-                     fmt::format("{} not judged yet: evac judge RUN --judge {}",
-                                 Counted(unjudged, "episode is", "episodes are"), LastJudge(summary.options.judge)),
+                     fmt::format("{} not judged yet: {}", Counted(unjudged, "episode is", "episodes are"),
+                                 fmt::join(JudgingCommands(LastJudge(summary.options.judge)), ", then ")),
                      "#clips"});
   }
   if (const auto errors = summary.Count(Outcome::kError); errors > 0)

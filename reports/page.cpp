@@ -60,11 +60,14 @@ std::string MissingVerdicts(const RunSummary& summary) {
   for (const std::string& judge : summary.judges) {
     if (!IsCounted(judge, summary.options.judge)) others += (others.empty() ? "" : ", ") + Escaped(judge);
   }
+  std::string commands;
+  for (const std::string& command : JudgingCommands(LastJudge(summary.options.judge)))
+    commands += "<code>" + Escaped(command) + "</code>, then ";
   return fmt::format(
       "<p class=\"notice\" role=\"note\"><strong>{} no verdict by {}.</strong> No rate counts such. "
-      "<code>evac judge RUN --judge {}</code>, then <code>evac report RUN</code>, adds them.{}</p>",
+      "{}<code>evac report RUN</code>, adds them.{}</p>",
       unjudged == 1 ? "1 episode has" : fmt::format("{} episodes have", unjudged), Escaped(JudgeWords(summary.options.judge)),
-      Escaped(LastJudge(summary.options.judge)), others.empty() ? "" : " Other judges have spoken: " + others + ".");
+      commands, others.empty() ? "" : " Other judges have spoken: " + others + ".");
 }
 
 /// "sha256-…" of a script, as a policy names it: base64 of the hash's bytes.
@@ -132,6 +135,11 @@ std::string PageHead(const std::string& title, PageScripts scripts, const std::s
          "</title>\n<style>" + ColoursCss() + ChartsCss() + PageCss() + more + "</style></head>\n";
 }
 
+std::string LiveBody(const PageOptions& options) {
+  return fmt::format("<body data-events=\"{}\" data-run=\"{}\" data-stamp=\"{}\">", Escaped(options.events), options.run,
+                     Escaped(options.stamp));
+}
+
 std::string Tag(const std::string& word) {
   if (word.empty()) return "";
   std::string name = word;
@@ -148,9 +156,7 @@ std::string ReportPage(const ReportData& report, const PageOptions& options) {
   const RunSummary& summary = report.summary;
   const PageScripts scripts = options.events.empty() ? PageScripts::kReport : PageScripts::kLiveReport;
   std::string html = PageHead("Policy evaluation report", scripts);
-  html += options.events.empty()
-              ? "<body>"
-              : fmt::format("<body data-events=\"{}\" data-run=\"{}\">", Escaped(options.events), options.run);
+  html += options.events.empty() ? "<body>" : LiveBody(options);
   html += "<header><h1>Policy evaluation</h1><p class=\"subtitle\">" + Subtitle(summary) + "</p></header>\n<main>\n";
   if (!options.events.empty()) html += "<p class=\"live\" role=\"status\"></p>";
   html += MissingVerdicts(summary) + HeadlinesPart(report) + "\n" + Navigation(report) + "\n";

@@ -12,6 +12,7 @@ struct PageOptions {
   std::string program;      ///< "evac 0.1.0": who wrote the page
   std::string events = {};  ///< inside a dashboard: where it tells of news, relative to the page; else empty
   std::size_t run = 0;      ///< inside a dashboard: which of its runs this is
+  std::string stamp = {};   ///< inside a dashboard: what it tells of the store that the page was counted from
   /// Bytes of a thumbnail of the run, JPEG, to be carried inside the page; empty bytes, or no function: it is linked.
   std::function<std::string(const std::string& file)> embedded = {};
 };

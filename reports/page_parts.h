@@ -42,6 +42,9 @@ std::string PageScript(PageScripts scripts);
 /// @param more  styles of this page alone
 std::string PageHead(const std::string& title, PageScripts scripts, const std::string& more = "");
 
+/// <body> of a run's page inside a dashboard, with what the script holds against the news (page/live.js).
+std::string LiveBody(const PageOptions& options);
+
 /// "✓ success", with a class that colours it.
 std::string OutcomeBadge(Outcome outcome);
 /// A pill with one word, "yes", "not decided", "worse", coloured by what it says; nothing for an empty word.

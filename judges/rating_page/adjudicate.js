@@ -1,27 +1,30 @@
 // Where raters differ: first one's own look, then theirs, then the word that counts. Both are stored.
-function unfold(answer, given) {
-  if (!answer) return rate();
-  const box = make('.feedback.others', {role: 'alert'}, make('h3', {}, `You: ${words[given.label]}. The raters:`),
-    make('ul', {}, answer.others.map(other => make('li', {}, make('b.' + other.label, {}, words[other.label]), ` ${other.rater}`,
-      other.stages.length ? make('small.quiet', {}, ` reached ${other.stages.map(k => rating.clip.rubric.stages[k]?.name || k + 1).join(', ')}`) : null,
+// Who was interrupted between the two comes back to the second: the server has the first and takes no other.
+function unfold(clip, verdict, others) {
+  const box = make('.feedback.others', {role: 'alert'}, make('h3', {}, `You: ${words[verdict.label]}. The raters:`),
+    make('ul', {}, others.map(other => make('li', {}, make('b.' + other.label, {}, words[other.label]), ` ${other.rater}`,
+      other.stages.length ? make('small.quiet', {}, ` reached ${other.stages.map(k => clip.rubric.stages[k]?.name || k + 1).join(', ')}`) : null,
       other.flags ? make('small.quiet', {}, ` ${other.flags.split(' ').map(named).join(', ')}`) : null,
       other.note ? make('q', {}, other.note) : null))),
     make('p', {}, 'Look again if you like; then decide.'),
     make('.verdicts', {role: 'group', 'aria-label': 'Decision'}, ['success', 'failure', 'cannot_tell'].map(label =>
-      make(`button.decision.${label}`, {type: 'button', 'data-decision': label, onclick: () => settle(label, answer.verdict.id, given)},
-        words[label] + (label === given.label ? ' (keep)' : '')))));
-  $('.answer').prepend(box);
-  $('.final').hidden = true;
+      make(`button.decision.${label}${label === verdict.label ? '.kept' : ''}`, {type: 'button', 'data-decision': label, onclick: () => settle(clip, label, verdict.id)},
+        words[label] + (label === verdict.label ? ' (keep)' : '')))));
+  rating.answer.prepend(box);
+  $('.final', rating.answer).hidden = true;
   rating.isBusy = true;
-  $(`[data-decision="${given.label}"]`, box).focus();
+  refresh();
+  $('.kept', box).focus();
 }
 
-async function settle(label, first, given) {
-  const {answered} = await send('/api/verdict', {...given, ...rating.player.record(), client_uuid: secret(), label, supersedes: first, is_final: true,
-    stages: rating.stages, flags: [...rating.flags], cause: label === 'failure' ? rating.cause : '', note: rating.note, ...howSure(), coverage: 1});
-  await answered.catch(() => {});
-  speak('decided');
-  rate();
+async function settle(clip, label, first) {
+  document.querySelectorAll('.decision').forEach(button => { button.disabled = true; });  // a second click is no second decision
+  const {answered} = await send('/api/verdict', {client_uuid: secret(), presentation: clip.presentation, ...said(label), ...rating.player.record(),
+    supersedes: first, is_final: true});
+  sessionStorage.removeItem('evac-clip');
+  const isStored = await answered.then(() => true, () => false);
+  if (isStored) speak('decided');
+  if (rating.clip === clip) moveOn();
 }
 
 function adjudicated() {

@@ -3,8 +3,56 @@ const percent = number => number.value === null ? '–' : `${(100 * number.value
 const decimal = number => number.value === null ? '–' : number.value.toFixed(3);
 const range = number => number.low === undefined ? '' : `[${number.low.toFixed(2)}, ${number.high.toFixed(2)}]`;
 
-async function board(from = 0, height_px = 0) {
-  const data = await patiently(() => get(`/api/board?from=${from}`));
+async function board(from = 0) {
+  const turn = board.turn = (board.turn || 0) + 1;
+  let data;
+  try {
+    data = await patiently(() => get(`/api/board?from=${from}`));
+  } finally {
+    if (turn === board.turn) boardLater();
+  }
+  if (turn !== board.turn) return;  // another page of it was asked for meanwhile
+  const isSamePage = board.from === from, putBack = placesOf();
+  board.from = from;
+  board.at = Date.now();
+  drawBoard(data);
+  putBack(isSamePage);
+}
+
+/** Every 15 seconds while somebody looks, and at once when somebody looks again. A refusal is said and tried again: a board that stands still looks like a study that does. */
+const boardEvery_ms = 15000;
+function boardLater() {
+  clearTimeout(board.timer);
+  board.timer = setTimeout(refreshBoard, boardEvery_ms);
+}
+async function refreshBoard() {
+  if (document.visibilityState !== 'visible') return boardLater();
+  try {
+    await board(board.from);
+    banner('board', '');
+  } catch (error) {
+    if (isNotOurs(error)) return location.reload();
+    banner('board', `Not refreshed${board.at ? ` since ${new Date(board.at).toLocaleTimeString()}` : ''}: ${error.message}`);
+  }
+}
+document.addEventListener('visibilitychange', () => { if (document.visibilityState === 'visible' && $('.board')) refreshBoard(); });
+
+const clipsLabel = 'Clips and votes';
+
+/** @returns what puts window, tables and focus back where they were before the board was drawn anew. */
+function placesOf() {
+  const left = scrollX, top = scrollY, focus = document.activeElement, name = focus && (focus.getAttribute('aria-label') || focus.textContent);
+  const tables = [...document.querySelectorAll('.scroll')].map(table => ({label: table.getAttribute('aria-label'), left: table.scrollLeft, top: table.scrollTop}));
+  const isOnBoard = Boolean(focus?.closest('.board'));
+  return isSamePage => {
+    for (const {label, left, top} of tables) $(`.scroll[aria-label="${label}"]`)?.scrollTo(left, isSamePage || label !== clipsLabel ? top : 0);
+    window.scrollTo(left, top);
+    const again = isOnBoard && [...document.querySelectorAll('.board .scroll, .board button')].find(one => (one.getAttribute('aria-label') || one.textContent) === name);
+    if (again) (again.disabled ? again.closest('.scroll') : again).focus({preventScroll: true});
+  };
+}
+
+function drawBoard(data) {
   const {progress} = data;
   const screen = show(make('.board', {},
     make('header', {}, make('h1', {}, data.study), make('p.quiet', {}, `${progress.complete} of ${plural(progress.clips, 'clip')} have ${plural(data.raters_per_clip, 'vote')}; ${progress.votes} votes, ${progress.missing} missing` +
@@ -20,9 +68,6 @@ async function board(from = 0, height_px = 0) {
     make('section', {}, make('h2', {}, 'Clips'), matrix(data)),
     data.leases.length ? make('section', {}, make('h2', {}, 'Being rated now'), make('p', {}, data.leases.map(lease => `${lease.rater}: clip ${lease.clip}, ${Math.ceil(lease.left_s / 60)} min`).join(' · '))) : null));
   screen.className = 'wide-screen';
-  window.scrollTo(0, height_px);
-  clearTimeout(board.timer);
-  board.timer = setTimeout(() => { if (document.visibilityState === 'visible' && $('.board')) board(from, window.scrollY).catch(() => {}); }, 15000);
 }
 
 const figure = (name, value, under) => make('.figure', {}, make('span.quiet', {}, name), make('b', {}, value), make('small.quiet', {}, under));
@@ -63,7 +108,7 @@ function matrix(data) {
   const rows = data.clips.map(clip => make('tr' + (disputed.has(clip.clip) ? '.disputed' : ''), {}, make('th', {scope: 'row'}, clip.episode, clip.use === 'gold' ? make('small.quiet', {}, ' known') : null),
     raters.map(rater => make('td.vote', {'data-vote': clip.votes[rater] || null}, letters[clip.votes[rater]] || '')),
     make('td', {}, clip.label ? words[clip.label] : '–'), make('td.quiet', {}, clip.how)));
-  return make('.scroll', {tabindex: '0', role: 'region', 'aria-label': 'Clips and votes'}, make('table.matrix', {}, make('thead', {}, make('tr', {}, make('th', {scope: 'col'}, 'Episode'), raters.map(rater => make('th', {scope: 'col'}, rater)), make('th', {scope: 'col'}, 'Label'), make('th', {scope: 'col'}, 'How'))), make('tbody', {}, rows)),
+  return make('.scroll', {tabindex: '0', role: 'region', 'aria-label': clipsLabel}, make('table.matrix', {}, make('thead', {}, make('tr', {}, make('th', {scope: 'col'}, 'Episode'), raters.map(rater => make('th', {scope: 'col'}, rater)), make('th', {scope: 'col'}, 'Label'), make('th', {scope: 'col'}, 'How'))), make('tbody', {}, rows)),
     pages(data));
 }
 
@@ -71,7 +116,7 @@ function matrix(data) {
 function pages(data) {
   const all = data.progress.clips, first = data.clips_from, end = first + data.clips.length;
   if (first === 0 && end === all) return null;
-  const to = (name, from, isThere) => make('button', {type: 'button', disabled: !isThere, onclick: () => board(from, window.scrollY)}, name);
+  const to = (name, from, isThere) => make('button', {type: 'button', disabled: !isThere, onclick: () => board(from)}, name);
   board.rows = Math.max(board.rows || 1, data.clips.length);
   return make('.row', {}, to('Previous', Math.max(0, first - board.rows), first > 0), to('Next', end, end < all), make('span.quiet', {}, `${first + 1} … ${end} of ${all}, disputes first`));
 }

@@ -2,35 +2,41 @@
 const keyHelp = [  // [keys, meaning, the right hand's]
   ['Space', 'play, pause'], ['J  L', 'one second back, on'], [',  .', 'one frame back, on'], ['Home  End', 'first, last frame'],
   ['[  ]', 'slower, faster'], ['R', 'again from the start', 'O'], ['A', 'loop the last two seconds', 'P'],
-  ['S  F  U', 'success, failure, cannot tell', 'K  ;  U'], ['1 … 5', 'stage reached', '6 … 0'],
-  ['Shift+1 … 5  V', 'one view alone, all views', 'Shift+6 … 0  M'], ['X, then 1 … 6', 'flags', 'Y, then 6 … 0 and -'],
+  ['S  F  U', 'success, failure, cannot tell', 'K  ;  U'], ['1 … 9', 'stage reached', '6 … 0  -'],
+  ['Shift+1 … 9  V', 'one view alone, all views', 'Shift+6 … 0  M'], ['X, then 1 … 6', 'flags', 'Y, then 6 … 0 and -'],
   ['C', 'how sure: sure, fairly, a guess', 'I'], ['N', 'note (Esc leaves it)'], ['Z', 'undo the last verdict', 'Backspace'], ['H', 'what you said'], ['?', 'this help, and the task'],
 ];
 /** What the left hand's keys are to the right hand: keys beside each other, none used twice. The others are there already. */
 const rightHand = {K: 'S', ';': 'F', O: 'R', P: 'A', M: 'V', Y: 'X', I: 'C', Backspace: 'Z'};
 const rightDigits = ['Digit6', 'Digit7', 'Digit8', 'Digit9', 'Digit0', 'Minus'];
 const isRightHanded = () => localStorage.getItem('evac-keys') === 'right';
-let areFlagsOpen = false;
+
+/** The key of the k-th stage, flag or view; null where there is none. */
+const digitKey = k => isRightHanded() ? ['6', '7', '8', '9', '0', '-'][k] || null : k < 9 ? String(k + 1) : null;
+const digitCap = k => make('kbd', {'data-digit': k, hidden: !digitKey(k)}, digitKey(k));
+function capDigits() {
+  document.querySelectorAll('[data-digit]').forEach(cap => cap.replaceWith(digitCap(Number(cap.dataset.digit))));
+}
 
 function openHelp() {
   rating.player?.video.pause();
   const hand = make('input', {type: 'checkbox', id: 'hand'});
   hand.checked = isRightHanded();
-  const list = make('dl.keys', {});
-  const fill = () => list.replaceChildren(...keyHelp.map(([key, meaning, right]) => make('div', {},
+  const keys = make('dl.keys', {});
+  const list = () => keys.replaceChildren(...keyHelp.map(([key, meaning, right]) => make('div', {},
     make('dt', {}, (isRightHanded() && right || key).split('  ').map(one => make('kbd', {}, one))), make('dd', {}, meaning))));
-  fill();
-  hand.addEventListener('change', () => { localStorage.setItem('evac-keys', hand.checked ? 'right' : 'left'); fill(); });
+  list();
+  hand.addEventListener('change', () => { localStorage.setItem('evac-keys', hand.checked ? 'right' : 'left'); list(); capDigits(); });
   const clip = rating.clip;
-  ask('Keys', [list, make('label.check', {for: 'hand'}, hand, 'Keys for the right hand'),
+  ask('Keys', [keys, make('label.check', {for: 'hand'}, hand, 'Keys for the right hand'),
     clip ? rubricCard(clip.rubric) : null].filter(Boolean), [['Close', null, 'primary']]);
 }
 
+/** However they were opened, by key or by mouse: what is open is what digits mean. */
 function openFlags() {
-  areFlagsOpen = !areFlagsOpen;
-  const box = document.querySelector('details.more');
-  if (box) box.open = areFlagsOpen;
-  speak(areFlagsOpen ? 'flags: 1 to 6' : 'flags closed');
+  const box = $('.flags');
+  box.open = !box.open;
+  speak(box.open ? `flags: ${digitKey(0)} to ${digitKey(session.me.flags.length - 1)}` : 'flags closed');
 }
 
 function openNote() {
@@ -81,6 +87,6 @@ function onRateScreen(event) {
 
 function onDigit(k, isShifted, player) {
   if (isShifted) return k < player.clip.views.length ? player.isolate(k) : undefined;
-  if (areFlagsOpen) return session.me.flags[k] && toggleFlag(session.me.flags[k]);
-  if (k < 5) toggleStage(k);
+  if ($('.flags').open) return session.me.flags[k] && toggleFlag(session.me.flags[k]);
+  toggleStage(k);
 }

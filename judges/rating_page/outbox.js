@@ -69,6 +69,14 @@ async function flush() {
   }
 }
 
+/** Gives what waits some time to go. @returns how much of it is left. */
+async function drain(patience_s) {
+  const end = Date.now() + 1000 * patience_s;
+  flush();
+  while (outbox.waiting.length && maySend() && (Date.now() < end || $('#dialog').open)) await sleep(100);  // a dialog asks what to do with one of them
+  return outbox.waiting.length;
+}
+
 async function sendFirst(entry) {
   let answer = null, refusal = null;
   try {

@@ -21,6 +21,7 @@ class Player {
     this.changed = changed;
     this.watch = {shown_at_ms: performance.now(), first_play_ms: 0, visible_ms: 0, played: [], seeks: 0, replays: 0, pauses: 0,
       stalls_ms: 0, speeds: [], max_speed: 0, interrupted: false};
+    this.rested_ms = 0;
     this.view = -1;
     this.last = null;
     this.video = make('video', {playsinline: true, preload: 'auto', disablepictureinpicture: true, tabindex: '-1',
@@ -56,7 +57,7 @@ class Player {
       requestAnimationFrame(step);
     }
     this.clock = setInterval(() => {
-      if (document.visibilityState === 'visible') this.watch.visible_ms += 250;
+      if (document.visibilityState === 'visible' && !this.restsSince) this.watch.visible_ms += 250;
       if (!video.paused) this.watch.speeds.push(video.playbackRate);
       if (this.loop && !video.paused && video.currentTime >= this.duration - this.period) this.loopAgain();
     }, 250);
@@ -95,7 +96,7 @@ class Player {
     this.endInterval();
     const {speeds: all, ...watch} = this.watch;
     const sorted = [...all].sort((a, b) => a - b), now = performance.now();
-    return {...watch, decided_ms: now, rt_ms: now - watch.shown_at_ms, coverage: this.coverage,
+    return {...watch, decided_ms: now, rt_ms: now - watch.shown_at_ms - this.rested_ms, coverage: this.coverage,
       median_speed: sorted.length ? sorted[sorted.length >> 1] : 0,
       viewport: `${Math.min(99999, innerWidth)}x${Math.min(99999, innerHeight)}`, pixel_ratio: devicePixelRatio || 1};
   }
@@ -128,6 +129,10 @@ class Player {
     if (view) speak(`view ${view.name}`);
     this.changed();
   }
+
+  /** From rest() to back() nobody looks: it is no time that the verdict took. */
+  rest() { this.video.pause(); this.restsSince ||= performance.now(); }
+  back() { if (this.restsSince) this.rested_ms += performance.now() - this.restsSince; this.restsSince = 0; }
 
   close() {
     this.isGone = true;

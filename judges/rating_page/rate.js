@@ -1,17 +1,22 @@
 // The screen that matters: one clip, one verdict.
-const rating = {player: null, clip: null, film: null, isBusy: false, done: 0, sinceBreak: 0, breakAt: Date.now(), prefetched: null, last: null, turn: 0};
+const rating = {player: null, clip: null, film: null, isBusy: false, done: 0, sinceBreak: 0, breakAt: Date.now(), prefetched: null, last: null, turn: 0, held: null};
 
-/** The next clip and its bytes. What was fetched ahead comes first: so a rater goes on while the line is down. */
+/** The next clip and its bytes. What was fetched ahead comes first: so a rater goes on while the line is down. That nothing is left is
+    never believed of an answer from before: it left out the clips in hand, and whoever dropped one since would not be asked of it. */
 async function nextClip() {
   if (rating.prefetched) {
     const ahead = rating.prefetched;
     rating.prefetched = null;
     const ready = await ahead.catch(() => null);
-    if (ready && (!ready.clip.done || outbox.waiting.length === 0)) return ready;
+    if (ready && !ready.clip.done) return ready;
   }
   while (outbox.waiting.length && !session.isOther) { flush(); await sleep(200); }  // else the same clip would be given again
   return patiently(() => fetchNext([]));
 }
+
+/** What the server holds for unanswered and must not give again: the clip on the screen, and those whose verdicts are on their way. */
+const mostHeld = 8;  // that a request may name
+const inHand = () => [...new Set([rating.clip.presentation, ...outbox.waiting.map(entry => entry.body.presentation).filter(Boolean)])];
 
 async function fetchNext(held) {
   const clip = await post('/api/next', {tab_epoch: session.epoch, held});
@@ -26,7 +31,9 @@ async function fetchNext(held) {
 
 /** Shows what comes next. Of two that are under way (undo while a clip fails to play, say) the later one counts: it asked the server last. */
 async function rate() {
+  if (rating.held) return goOn();
   const turn = ++rating.turn;
+  rating.isOver = true;
   try {
     const ready = await nextClip();
     if (turn !== rating.turn) return;
@@ -46,31 +53,76 @@ function closeClip() {
   clearInterval(rating.beat);
   rating.player = null;
   rating.source = null;
+  rating.held = null;
+}
+
+/** A break in a clip: the clip, what was seen of it and what was marked wait as they are; its place may go to others meanwhile. */
+function hold() {
+  rating.player.rest();
+  clearInterval(rating.beat);
+  rating.held = [...$('#screen').childNodes];
+}
+
+function goOn() {
+  show(...rating.held).className = 'rate';
+  rating.held = null;
+  rating.breakAt = Date.now();
+  rating.player.back();
+  keepPlace();
+  refresh();
+  $('.feedback .primary, .feedback .kept')?.focus();
+  if (!rating.isBusy && !rating.player.isCovered(session.me.cover)) rating.player.play();
+}
+
+/** After a verdict: the next clip; to somebody who went to the menu meanwhile it comes with Go on. */
+function moveOn() {
+  if (rating.held) return closeClip();
+  rate();
+}
+
+function keepPlace() {
+  const {presentation} = rating.clip;
+  const beat = () => post('/api/heartbeat', {tab_epoch: session.epoch, presentation}).catch(error => { if (error.error === 'tab') losePlace(); });
+  clearInterval(rating.beat);
+  rating.beat = setInterval(beat, 60000);
 }
 
 function showClip(clip, source) {
   closeClip();
-  Object.assign(rating, {clip, source, isBusy: false, stages: 0, flags: new Set(), cause: '', confidence: 0, note: '', film: null});
+  Object.assign(rating, {clip, source, isBusy: false, stages: 0, flags: new Set(), cause: '', confidence: 0, note: '', film: null, isOpen: false, supersedes: null,
+    isOver: false, saidCovered: false});
   const resumed = JSON.parse(sessionStorage.getItem('evac-clip') || 'null');
   const player = new Player(clip, source, refresh, why => unplayable(clip, why));
   rating.player = player;
   if (resumed && resumed.presentation === clip.presentation) {  // reloaded before the verdict: go on where it was
     player.watch.interrupted = true;
     player.resume(resumed.seen || '');
-    player.video.addEventListener('loadedmetadata', () => { player.video.currentTime = resumed.time; }, {once: true});
+    player.video.addEventListener('loadedmetadata', () => { player.video.currentTime = Math.max(0, resumed.time - 3 * player.period); }, {once: true});  // the last frames were not told of
   }
   layOut(player, source);
   player.isolate(-1);
   player.play();
-  rating.beat = setInterval(() => post('/api/heartbeat', {tab_epoch: session.epoch, presentation: clip.presentation})
-    .catch(error => { if (error.error === 'tab') losePlace(); }), 60000);
-  if (clip.kind === 'clip') {
-    const ahead = fetchNext([clip.presentation]);
+  keepPlace();
+  const held = inHand();
+  if (clip.kind === 'clip' && held.length <= mostHeld) {
+    const ahead = fetchNext(held);
     ahead.catch(() => {});
     rating.prefetched = ahead;
   }
   refresh();
   speak(`${headline(clip)}. ${clip.rubric.instruction}`);
+  if (clip.verdict) fill(clip.verdict);
+  if (clip.verdict && clip.kind === 'adjudication') unfold(clip, clip.verdict, clip.others);  // the first look is stored: only the decision is left
+}
+
+/** What was said before stands in the form, so that who changes one thing keeps the others. */
+function fill(verdict) {
+  rating.clip.rubric.stages.forEach((stage, k) => { if (verdict.stages >> k & 1) toggleStage(k); });
+  verdict.flags.split(' ').filter(flag => session.me.flags.includes(flag)).forEach(toggleFlag);
+  if (verdict.cause) setCause(verdict.cause);
+  if (verdict.confidence) setConfidence(verdict.confidence);
+  rating.note = $('textarea', rating.answer).value = verdict.note;
+  $('.noted').open = Boolean(verdict.note);
 }
 
 function headline(clip) {
@@ -83,10 +135,11 @@ function layOut(player, source) {
   const {clip} = player;
   rating.done = Math.max(rating.done, clip.progress.done);
   rating.scrub = scrubber(player);
+  rating.answer = make('section.answer', {'aria-label': 'Verdict'}, ...column(clip));
   const screen = show(
     make('header.bar', {},
       make('h1', {}, headline(clip)),
-      make('span#unsent.badge', {hidden: true}),
+      make('span.badge', {id: 'unsent', hidden: true}),
       make('progress', {max: Math.max(1, clip.progress.total), value: rating.done, 'aria-label': 'Progress'}),
       make('.row.tight', {},
         make('button.quiet', {type: 'button', onclick: openHistory, 'aria-keyshortcuts': 'H'}, 'History'),
@@ -95,19 +148,17 @@ function layOut(player, source) {
     make('section.watch', {'aria-label': 'Clip'},
       make('.place', {}, player.frame, make('.playmark', {'aria-hidden': 'true'})),
       filmstrip(player, source), rating.scrub, transport(player)),
-    make('section.answer', {'aria-label': 'Verdict'}, ...column(clip)));
+    rating.answer);
   screen.className = 'rate';
   player.frame.addEventListener('click', () => player.toggle());
-  const badge = $('.badge', screen);
-  badge.id = 'unsent';
   sayUnsent();
 }
 
 function transport(player) {
-  const button = (name, label, keys, act) => make('button.tool', {type: 'button', tabindex: '-1', title: `${label} (${keys})`, 'aria-label': label, onclick: act}, name);
+  const button = (name, label, keys, act) => make('button.tool', {type: 'button', tabindex: '-1', title: keys ? `${label} (${keys})` : label, 'aria-label': label, onclick: act}, name);
   const views = player.clip.views.length > 1 ? make('.row.tight.views', {role: 'group', 'aria-label': 'Views'},
     button('All', 'All views', 'V', () => player.isolate(-1)),
-    player.clip.views.map((view, k) => button(String(k + 1), `View ${view.name}`, `Shift+${k + 1}`, () => player.isolate(k)))) : null;
+    player.clip.views.map((view, k) => button(String(k + 1), `View ${view.name}`, digitKey(k) && `Shift+${digitKey(k)}`, () => player.isolate(k)))) : null;
   return make('.transport', {},
     button('|‹', 'First frame', 'Home', () => player.seek(0)),
     button('−1 s', 'One second back', 'J', () => player.seek(player.time - 1)),
@@ -126,17 +177,16 @@ function transport(player) {
 
 function column(clip) {
   const stages = clip.rubric.stages.map((stage, k) => make('button.stage', {type: 'button', 'aria-pressed': 'false', 'data-stage': k,
-    title: stage.description || stage.name, 'aria-keyshortcuts': String(k + 1), onclick: () => toggleStage(k)},
-    make('kbd', {}, String(k + 1)), make('span', {}, stage.name, stage.description ? make('small', {}, stage.description) : null)));
+    title: stage.description || stage.name, onclick: () => toggleStage(k)}, digitCap(k), make('span', {}, stage.name, stage.description ? make('small', {}, stage.description) : null)));
   const flags = session.me.flags.map((flag, k) => make('button.flag', {type: 'button', 'aria-pressed': 'false', 'data-flag': flag,
-    onclick: () => toggleFlag(flag)}, make('kbd', {}, String(k + 1)), named(flag)));
+    onclick: () => toggleFlag(flag)}, digitCap(k), named(flag)));
   const causes = session.me.causes.map(cause => make('button.cause', {type: 'button', 'aria-pressed': 'false', 'data-cause': cause,
     onclick: () => setCause(cause)}, named(cause)));
   return [
     make('h2.instruction', {}, clip.rubric.instruction),
     make('p.success', {}, make('b', {}, 'Success: '), clip.rubric.success || 'the task is done as the instruction says'),
     stages.length ? make('.group', {role: 'group', 'aria-label': 'Stages reached'}, make('h3', {}, 'Reached'), make('.stages', {}, stages)) : null,
-    make('details.more', {}, make('summary', {}, make('kbd', {}, 'X'), 'Flags', make('span.chosen', {})),
+    make('details.more.flags', {}, make('summary', {}, make('kbd', {}, 'X'), 'Flags', make('span.chosen', {})),
       make('.chips', {role: 'group', 'aria-label': 'Flags'}, flags)),
     make('details.more', {}, make('summary', {}, 'Cause, if it fails', make('span.chosen-cause', {})),
       make('.chips', {role: 'group', 'aria-label': 'Cause of the failure'}, causes)),
@@ -156,7 +206,7 @@ function column(clip) {
 function refresh() {
   const player = rating.player;
   if (!player || !$('.rate')) return;
-  sessionStorage.setItem('evac-clip', JSON.stringify({presentation: player.clip.presentation, time: player.time, seen: player.seen.join('')}));
+  if (!rating.isBusy) sessionStorage.setItem('evac-clip', JSON.stringify({presentation: player.clip.presentation, time: player.time, seen: player.seen.join('')}));
   rating.scrub.refresh();
   const isCovered = player.isCovered(session.me.cover) || rating.isOpen, may = isCovered && !rating.isBusy && !session.isOther;
   document.querySelectorAll('.verdict').forEach(button => { button.disabled = !may; });
@@ -200,38 +250,54 @@ function nextConfidence() {
   speak(rating.confidence ? sureness.find(([level]) => level === rating.confidence)[1] : 'not said how sure');
 }
 
+/** What the form says, with a label. */
+const said = label => ({label, stages: rating.stages, flags: [...rating.flags], cause: label === 'failure' ? rating.cause : '', note: rating.note, ...howSure()});
+
 /** A verdict. It is kept here first, then sent; the next clip comes after 600 ms, undo stays for longer. */
 async function decide(label) {
   const player = rating.player;
   if (!player || rating.isBusy || session.isOther || !(player.isCovered(session.me.cover) || rating.isOpen)) return;
   rating.isBusy = true;
+  rating.isOver = rating.clip.kind === 'clip';  // of the other kinds there is something to read, or to decide
   player.isQuiet = true;
   player.video.pause();
-  const clip = rating.clip, uuid = secret();
-  const {tab, ...record} = player.record();
-  if (rating.isOpen) record.coverage = Math.max(record.coverage, session.me.cover);
-  const body = {client_uuid: uuid, presentation: clip.presentation, label, stages: rating.stages, flags: [...rating.flags],
-    cause: label === 'failure' ? rating.cause : '', note: rating.note, ...howSure(), ...record};
+  const {clip, turn, isOpen} = rating, uuid = secret();
+  const record = player.record();
+  const body = {client_uuid: uuid, presentation: clip.presentation, ...said(label), ...record};
   if (rating.supersedes) body.supersedes = rating.supersedes;
   $(`.verdict.${label}`).classList.add('given');
   refresh();
   const {answered} = await send('/api/verdict', body);
+  if (clip.kind === 'adjudication') return compare(clip, answered);
   sessionStorage.removeItem('evac-clip');
-  if (clip.kind === 'practice') return feedback(await answered, label);
-  if (clip.kind === 'adjudication') return unfold(await answered, body);
-  if (!rating.isOpen) rating.done++, rating.sinceBreak++;
+  if (clip.kind === 'practice') return learn(clip, answered);
+  if (!isOpen) rating.done++, rating.sinceBreak++;
   rating.last = {uuid, clip};
-  rating.isOpen = false;
-  rating.supersedes = null;
   toast(`${words[label]} kept`, {name: 'Undo (Z)', act: undo}, 8);
   speak(`${words[label]} kept`);
   await sleep(600);
-  if (rating.clip === clip) next();
+  if (rating.clip === clip && rating.turn === turn) next();
+}
+
+/** The server's word on a clip that goes on; nothing if it was refused (which was said) or another clip is here by now. */
+async function wordOn(clip, answered) {
+  const answer = await answered.catch(() => null);
+  if (rating.clip !== clip || !rating.player) return null;
+  if (!answer) moveOn();
+  return answer;
+}
+async function learn(clip, answered) {
+  const answer = await wordOn(clip, answered);
+  if (answer) feedback(clip, answer);
+}
+async function compare(clip, answered) {
+  const answer = await wordOn(clip, answered);
+  if (answer) unfold(clip, answer.verdict, answer.others);
 }
 
 function next() {
   const isLong = Date.now() - rating.breakAt > 25 * 60e3;
-  if (rating.sinceBreak >= session.me.break_every || (isLong && rating.sinceBreak > 0)) return pause();
+  if (rating.sinceBreak >= session.me.break_every || (isLong && rating.sinceBreak > 0)) { closeClip(); return pause(); }
   return rate();
 }
 
@@ -239,6 +305,8 @@ async function undo() {
   const last = rating.last;
   if (!last || session.isOther) return;
   rating.last = null;
+  const turn = ++rating.turn;
+  rating.held = null;
   hideToast();
   const {answered} = await send('/api/retract', {client_uuid: secret(), of_uuid: last.uuid});
   rating.done--;
@@ -246,15 +314,16 @@ async function undo() {
   rating.prefetched = null;
   await answered.catch(() => {});
   speak('undone');
-  rate();
+  if (turn === rating.turn) rate();
 }
 
 /** It does not play here: no vote, no blame; the lead hears of it. */
 async function unplayable(clip, why) {
   closeClip();
+  const turn = ++rating.turn;
   rating.prefetched = null;
   toast('This clip cannot be played; the lead is told.', null, 4);
   await send('/api/unplayable', {presentation: clip.presentation, reason: String(why).slice(0, 190)});
   while (outbox.waiting.length && !session.isOther) await sleep(100);
-  rate();
+  if (turn === rating.turn) rate();
 }

@@ -5,6 +5,20 @@ function noInvitation() {
     .className = 'centred';
 }
 
+/** A link was opened where somebody takes part already: whose is this browser? @returns whether the link counts. */
+async function isSomebodyNew(me) {
+  const who = me.rater + (me.name ? ` (${me.name})` : '');
+  const isNew = await ask('Who is here?', [make('p', {}, `${who} takes part in this browser already. The link that was opened may be for somebody else.`),
+    make('p', {}, `A browser is one person’s: who uses the link takes it over, and ${who} cannot go on here. Answers that were given stay.`)],
+  [[`Go on as ${who}`, false], ['Use the link', true, 'bad']]);
+  if (!isNew || me.role === 'lead') return Boolean(isNew);
+  await loadOutbox(me.study_id, me.rater);
+  if (outbox.waiting.length) await becomeTheTab();
+  if (!await drain(handover_s)) return true;
+  await ask('Not yet', [make('p', {}, `${plural(outbox.waiting.length, 'answer')} of ${who} could not be sent, and would be lost. Open the link again when the connection is back.`)], [[`Go on as ${who}`, null, 'primary']]);
+  return false;
+}
+
 /** /r/<link>: what this is, who is asked, and what leaving means. */
 function join(invite) {
   const uuid = sessionStorage.getItem('evac-join') || secret();
@@ -20,7 +34,9 @@ function join(invite) {
     try {
       await patiently(() => post('/api/join', {invite, uuid, name: name.value.trim()}));
       history.replaceState(null, '', '/');
+      localStorage.setItem('evac-link', invite);
       sessionStorage.removeItem('evac-join');
+      sessionStorage.removeItem('evac-clip');  // of whoever was here before
       await start();
     } catch (error) {
       problem.textContent = error.status === 410 ? 'This link was used already. A link works once; ask for another one.'
@@ -33,8 +49,8 @@ function join(invite) {
     make('p', {}, 'You will watch short clips of a robot at work and say of each whether it did what it was told. You are not told where a clip comes from, and it does not matter: judge only what you see.'),
     make('ul', {},
       make('li', {}, 'Every answer is kept the moment you give it. You can stop at any time and go on later in this browser.'),
-      make('li', {}, 'Stored are your answers, the name below if you give one, and how you watched: times, pauses, screen size. No sound, no camera, no tracking.'),
-      make('li', {}, 'You can leave the study at any time (Pause, then Leave) and decide whether your answers may be used; your name and notes are erased if you wish.')),
+      make('li', {}, 'Stored are your answers, the name below if you give one, and how you watched: times, pauses, window size, and a hash of your browser’s name. No sound, no camera, no tracking.'),
+      make('li', {}, 'You can leave the study at any time (Pause, then Leave) and decide whether your answers may be used. If you wish, your name, your notes and that hash are erased; the answers themselves stay stored, under a number.')),
     screenCheck(),
     make('label', {for: 'name'}, 'Name or nickname ', make('span.quiet', {}, '(may stay empty)')), name,
     make('label.check', {for: 'consent'}, consent, 'I have read this and take part of my own will.'),
@@ -60,7 +76,6 @@ function rubricCard(rubric) {
 
 /** What the tasks are, with clips whose label is known. */
 async function brief() {
-  closeClip();
   const examples = (await patiently(() => get('/api/examples'))).examples;
   const left = session.me.progress.practice_left;
   const screen = show(make('.sheet.wide', {},
@@ -88,19 +103,19 @@ function example(one) {
 }
 
 /** After a practice clip: what is known of it. */
-function feedback(answer, given) {
-  const known = answer && answer.feedback;
+function feedback(clip, answer) {
+  const known = answer.feedback;
   if (!known) return rate();
-  const isRight = known.label === given;
+  const isRight = known.label === answer.verdict.label;
   const box = make('.feedback', {role: 'alert'}, make('h3', {}, isRight ? 'That is what we say too' : `We say: ${words[known.label]}`),
     known.reason ? make('p.quiet', {}, known.reason) : null,
     make('button.primary', {type: 'button', onclick: rate}, answer.progress.practice_left ? 'Next' : 'Practice is over: rate clips'));
-  $('.answer').prepend(box);
+  rating.answer.prepend(box);
   $('.primary', box).focus();
 }
 
+/** A break; the clip that is held, if one is, comes back with Go on. */
 function pause() {
-  closeClip();
   rating.sinceBreak = 0;
   rating.breakAt = Date.now();
   const {total} = session.me.progress, left = Math.max(0, (rating.clip?.progress.total ?? total) - rating.done);
@@ -116,7 +131,12 @@ function pause() {
   $('.primary', screen).focus({preventScroll: true});
 }
 
-function openMenu() { rating.player?.video.pause(); pause(); }
+/** What is under way must not come over the menu; a clip that is over does not come back. */
+function openMenu() {
+  rating.turn++;
+  if (!rating.player || rating.isOver) closeClip(); else hold();
+  pause();
+}
 
 /** The end for now: first the question about origins, then what was recorded. */
 async function finished() {
@@ -159,19 +179,34 @@ async function download() {
   setTimeout(() => URL.revokeObjectURL(link.href), 10000);
 }
 
+const handover_s = 10;  // what waits longer than that for a line is not on its way
+
 async function leave() {
   const erase = make('input', {type: 'checkbox', id: 'erase'});
   const choice = await ask('Leave the study',
     [make('p', {}, 'Your link and this session end now. May the answers you gave be used?'),
-      make('label.check', {for: 'erase'}, erase, 'Erase my name, my notes and what is stored of my browser')],
+      make('p.quiet', {}, `Either way they stay stored under ${session.me.rater}, with how you watched: times, pauses, window size.`),
+      make('label.check', {for: 'erase'}, erase, 'Erase my name, my notes and the hash of my browser’s name')],
     [['Stay', null], ['Leave, do not use my answers', 'exclude', 'bad'], ['Leave, my answers may be used', 'keep', 'primary']]);
   if (!choice) return;
-  await patiently(() => post('/api/withdraw', {verdicts: choice, erase: erase.checked}));
+  if (choice === 'keep' && await drain(handover_s)) return stay('You have not left', `${plural(outbox.waiting.length, 'answer')} of yours could not be sent, and would be lost.`);
+  try {
+    await post('/api/withdraw', {verdicts: choice, erase: erase.checked});  // once: nobody must leave later, while already going on
+  } catch (error) {
+    if (isNotOurs(error)) return location.reload();
+    return stay('Leaving is not confirmed', error instanceof Offline ? 'The server gave no answer.' : error.message);
+  }
   session.epoch = 0;
+  closeClip();
+  sessionStorage.removeItem('evac-clip');
   await emptyOutbox();
   show(make('.sheet', {}, make('h1', {}, 'You have left the study'),
-    make('p', {}, choice === 'keep' ? 'Your answers stay in it.' : 'Your answers are left out of every result.'),
-    make('p', {}, erase.checked ? 'Your name and notes are erased.' : ''))).className = 'centred done';
+    make('p', {}, choice === 'keep' ? 'Your answers stay in it.' : 'No result that is made from now on uses your answers; they stay stored, marked as not to be used.'),
+    make('p', {}, erase.checked ? 'Your name, your notes and the hash of your browser’s name are erased from the study. Whoever runs it may have copies from before.' : ''))).className = 'centred done';
+}
+
+function stay(title, why) {
+  return ask(title, [make('p', {}, `${why} What you rated is kept in this browser. Try again when the connection is back.`)], [['Close', null, 'primary']]);
 }
 
 async function openHistory() {
@@ -191,9 +226,10 @@ async function reopen(verdict) {
     const clip = await patiently(() => post('/api/open', {tab_epoch: session.epoch, presentation: verdict.presentation}));
     const source = await patiently(() => fetchClip(verdict.presentation));
     rating.prefetched = null;
+    rating.turn++;
     showClip(clip, source);
-    rating.isOpen = true;
-    rating.supersedes = verdict.id;
+    rating.isOpen = Boolean(clip.verdict);  // undone meanwhile: it is asked as if for the first time
+    rating.supersedes = clip.verdict?.id;
     refresh();
   } catch (error) {
     if (error instanceof Refusal && error.error === 'tab') return losePlace();

@@ -8,9 +8,10 @@ async function start() {
     if (error instanceof Refusal && (error.status === 401 || error.status === 403)) return invite ? join(invite[1]) : noInvitation();
     throw error;
   }
-  if (invite) history.replaceState(null, '', '/');
   session.me = me;
   session.csrf = me.csrf;
+  if (invite && localStorage.getItem('evac-link') !== invite[1] && await isSomebodyNew(me)) return join(invite[1]);
+  if (invite) history.replaceState(null, '', '/');
   document.title = `${me.study} · rating`;
   if (me.role === 'lead') return board();
   await loadOutbox(me.study_id, me.rater);

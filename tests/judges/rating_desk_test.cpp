@@ -162,6 +162,71 @@ TEST_F(RatingDeskTest, AVerdictWithoutWatchingIsRefused) {
   EXPECT_EQ(ann.Say(verdict).status, 422);
   verdict.coverage = 0.9;
   EXPECT_EQ(ann.Say(verdict).status, 200);
+  HumanVerdict changed = ann.Watched(verdict.presentation, "success");
+  changed.coverage = 0.1;
+  EXPECT_EQ(ann.Say(changed).status, 409) << "it replaces nothing";
+  changed.supersedes = store.CurrentVerdict(verdict.presentation)->id;
+  EXPECT_EQ(ann.Say(changed).status, 200) << "it was watched for the first word";
+  EXPECT_EQ(store.CurrentVerdict(verdict.presentation)->coverage, 0.1) << "what was seen since, no more";
+}
+
+TEST_F(RatingDeskTest, HowSureARaterWasComesBackWithTheVerdict) {
+  AtTheDesk ann(store, desk);
+  HumanVerdict sure = ann.Watched(ann.Next().body.at("presentation"), "success");
+  sure.confidence = 3;
+  EXPECT_EQ(ann.Say(sure).body.at("verdict").at("confidence"), 3);
+  ann.Say(ann.Next().body.at("presentation"), "failure");
+  const auto said = desk.History(ann.Me()).body.at("verdicts");
+  EXPECT_TRUE(said[0].at("confidence").is_null()) << "nothing was said";
+  EXPECT_EQ(said[1].at("confidence"), 3);
+  const auto opened = desk.Open(ann.Me(), {ann.epoch, sure.presentation, ""}, ann.now_ms).body;
+  EXPECT_EQ(opened.at("verdict").at("confidence"), 3) << "what Change begins with";
+}
+
+TEST_F(RatingDeskTest, ProgressIsOfTheClipsThatARaterIsAskedAndWholeWhenNoneIsLeft) {
+  AtTheDesk ann(store, desk), bob(store, desk), eve(store, desk);
+  const auto label = [](const StudyClip&) { return "success"; };
+  const auto of = [&](const AtTheDesk& who, const char* what) -> std::int64_t {
+    return desk.Me(who.Me(), who.now_ms).body.at("progress").at(what);
+  };
+  EXPECT_EQ(of(ann, "total"), 16 + 2) << "two of them twice";
+  EXPECT_EQ(ann.RateAll(label), 18);
+  EXPECT_EQ(of(ann, "done"), 18);
+  for (int i = 0; i < 6; ++i) bob.Say(bob.Next().body.at("presentation"), "success");
+  EXPECT_LE(of(eve, "total"), 10 + 2) << "six clips have their two votes";
+  EXPECT_EQ(desk.Unplayable(eve.Me(), {eve.epoch, eve.Next().body.at("presentation"), "media error 4"}, 5).status, 200);
+  EXPECT_EQ(of(eve, "done"), 0) << "what cannot be played is nobody's vote";
+  const std::int64_t asked = of(eve, "total");
+  EXPECT_LE(asked, 9 + 2);
+  EXPECT_EQ(eve.RateAll(label), asked);
+  EXPECT_EQ(of(eve, "done"), asked);
+  EXPECT_EQ(of(eve, "total"), asked);
+  EXPECT_LT(of(bob, "total"), 16) << "eve has left bob few";
+  bob.RateAll(label);
+  EXPECT_EQ(of(bob, "done"), of(bob, "total"));
+  desk.Withdraw(eve.Me(), {.keep = false, .erase = false}, 9);
+  EXPECT_GT(of(bob, "total"), of(bob, "done")) << "her clips want votes again";
+  bob.RateAll(label);
+  EXPECT_EQ(of(bob, "done"), of(bob, "total"));
+}
+
+TEST_F(RatingDeskTest, AnAdjudicatorsProgressIsOfTheDisputesThatWait) {
+  AtTheDesk ann(store, desk), bob(store, desk);
+  ann.RateAll([](const StudyClip&) { return "success"; });
+  bob.RateAll([](const StudyClip&) { return "failure"; });
+  AtTheDesk judge(store, desk, RaterRole::kAdjudicator), other(store, desk, RaterRole::kAdjudicator);
+  const auto decide = [&](AtTheDesk& who) {
+    const std::string clip = who.Next().body.at("presentation");
+    who.Say(clip, "success");
+    HumanVerdict last = who.Watched(clip, "success");
+    last.supersedes = store.CurrentVerdict(clip)->id;
+    last.is_final = true;
+    return who.Say(last).body.at("progress");
+  };
+  using Json = nlohmann::ordered_json;
+  EXPECT_EQ(judge.Next().body.at("progress"), (Json{{"done", 0}, {"total", 16}, {"practice_left", 0}}));
+  EXPECT_EQ(decide(other), (Json{{"done", 1}, {"total", 16}, {"practice_left", 0}}));
+  EXPECT_EQ(decide(judge), (Json{{"done", 1}, {"total", 15}, {"practice_left", 0}})) << "one was decided by another";
 }
 
 TEST_F(RatingDeskTest, OthersClipsAreNotThere) {
@@ -184,6 +249,7 @@ TEST_F(RatingDeskTest, WhoLeavesDecidesWhetherTheVerdictsCount) {
   const auto label = [](const StudyClip&) { return "success"; };
   HumanVerdict noted = ann.Watched(ann.Next().body.at("presentation"), "success");
   noted.note = "my name is Ann";
+  noted.viewport = "1280x800";
   ann.Say(noted);
   bob.RateAll(label);
   eve.RateAll(label);
@@ -197,6 +263,7 @@ TEST_F(RatingDeskTest, WhoLeavesDecidesWhetherTheVerdictsCount) {
   EXPECT_EQ(store.VerdictByUuid(noted.client_uuid)->note, "");
   EXPECT_EQ(store.VerdictByUuid(noted.client_uuid)->ua_hash, "");
   EXPECT_EQ(store.VerdictByUuid(noted.client_uuid)->label, "success") << "the row itself stays";
+  EXPECT_EQ(store.VerdictByUuid(noted.client_uuid)->viewport, "1280x800") << "with how the clip was watched";
   desk.Withdraw(bob.Me(), {.keep = true, .erase = false}, 9);
   EXPECT_EQ(store.Rater(bob.id).status, "withdrawn");
   EXPECT_TRUE(store.Rater(bob.id).counts);

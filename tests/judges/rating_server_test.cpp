@@ -2,12 +2,15 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <pthread.h>
 
 #include <atomic>
 #include <nlohmann/json.hpp>
+#include <system_error>
 #include <thread>
 
 #include "core/error.h"
+#include "judges/rating_http.h"
 #include "tests/judges/rating_support.h"
 #include "tests/support/raw_http.h"
 
@@ -148,6 +151,30 @@ TEST_F(RatingServerTest, ClipsAreForWhomTheyWereShownTo) {
     EXPECT_EQ(std::filesystem::file_size(study.folder() / other.file), whole.body.size()) << "all are of one length";
 }
 
+TEST_F(RatingServerTest, ARangeIsIgnoredWhereItMeansNothingAndRefusedWithTheSize) {
+  const std::string ann = Join();
+  const std::string path = "/clip/" + Next(ann, Epoch(ann)).at("presentation").get<std::string>();
+  const std::string size = std::to_string(Get(path, ann).body.size());
+  for (const char* ignored : {"items=0-3", "bytes=0-1,4-5", "bytes=5-4", "bytes=x-"}) {
+    const Heard whole = Get(path, ann + "Range: " + ignored + "\r\n");
+    EXPECT_EQ(whole.status, 200) << ignored;
+    EXPECT_EQ(std::to_string(whole.body.size()), size) << ignored;
+    EXPECT_THAT(whole.head, Not(HasSubstr("Content-Range"))) << ignored;
+  }
+  for (const std::string range : {"bytes=4-7", "bytes=99999999-"}) {
+    const Heard head = Raw("HEAD " + path + " HTTP/1.1\r\nHost: 127.0.0.1\r\nConnection: close\r\n" + ann +
+                           "Range: " + range + "\r\n\r\n");
+    EXPECT_EQ(head.status, 200) << "a range is for GET alone: " << range;
+    EXPECT_THAT(head.head, HasSubstr("Content-Length: " + size));
+    EXPECT_EQ(head.body, "");
+  }
+  for (const char* outside : {"bytes=99999999-", "bytes=-0"}) {
+    const Heard refused = Get(path, ann + "Range: " + outside + "\r\n");
+    EXPECT_EQ(refused.status, 416) << outside;
+    EXPECT_THAT(refused.head, HasSubstr("Content-Range: bytes */" + size)) << outside;
+  }
+}
+
 TEST_F(RatingServerTest, NoPathLeadsToAFile) {
   const std::string ann = Join();
   const std::string file = study.Open().Clips()[0].file;
@@ -281,6 +308,42 @@ TEST(StudyId, StaysWithItsStudyAndIsNoOthers) {
   EXPECT_EQ(study.Open().Id(), id);
   EXPECT_NE(alike.Open().Id(), id) << "of the same name, seed and clips";
   EXPECT_EQ(id.find_first_not_of("0123456789abcdef"), std::string::npos);
+}
+
+/// While it lives no thread can be started that is not told its stack: there is no room for one.
+class NoRoomForThreads {
+ public:
+  NoRoomForThreads() {
+    pthread_getattr_default_np(&before_);
+    pthread_attr_t huge;
+    pthread_attr_init(&huge);
+    pthread_attr_setstacksize(&huge, std::size_t{1} << 56);
+    pthread_setattr_default_np(&huge);
+    pthread_attr_destroy(&huge);
+  }
+  ~NoRoomForThreads() {
+    pthread_setattr_default_np(&before_);
+    pthread_attr_destroy(&before_);
+  }
+
+ private:
+  pthread_attr_t before_{};
+};
+
+TEST(RatingHttp, AThreadThatCannotBeStartedLeavesAServerWithFewer) {
+  RatingHttp http("127.0.0.1", 0, {.threads = 3}, [](const HttpAsked&, const RatingHttp::Reply& reply) { reply({}); });
+  RawAnswer answer;
+  std::thread asking([&] {
+    answer = RawExchange(http.port(), "GET / HTTP/1.1\r\nHost: 127.0.0.1\r\nConnection: close\r\n\r\n");
+    http.Stop();
+  });
+  {
+    const NoRoomForThreads none;
+    EXPECT_THROW(std::thread([] {}).join(), std::system_error) << "the test tests nothing";
+    http.Serve();
+  }
+  asking.join();
+  EXPECT_EQ(answer.status, 200);
 }
 
 TEST_F(RatingServerTest, AStudyHasOneServer) {

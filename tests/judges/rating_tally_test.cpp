@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <memory>
 
 #include "core/seed.h"
@@ -111,6 +112,35 @@ TEST(RatingTally, WhatWasReadBitByBitIsWhatIsReadAtOnce) {
     }
     EXPECT_GT(most_disputes, 2u) << "nothing was disputed: the test tests nothing";
   }
+}
+
+TEST(RatingBoard, ThePaceIsOfVotesThatWereMissing) {
+  constexpr std::int64_t kHour_ms = 3'600'000;
+  SmallStudy study(16, {.raters_per_clip = 2, .gold_from = "oracle"});  // 12 clips and 8 gold
+  StudyStore store = study.Open();
+  RatingDesk desk(store, {});
+  AtTheDesk ann(store, desk), bob(store, desk), eve(store, desk);
+  const auto progress = [&](std::int64_t now_ms) { return RatingBoard(store, now_ms).at("progress"); };
+  const auto label = [](const StudyClip&) { return "cannot_tell"; };
+  EXPECT_GT(ann.RateAll(label), 28);
+  EXPECT_EQ(progress(ann.now_ms).at("last_hour"), 20) << "neither practice nor repeats are votes";
+  EXPECT_EQ(progress(ann.now_ms).at("hours_left"), 1);
+  const std::vector<StudyStore::Said> said = store.CurrentBy(ann.id);
+  const HumanVerdict vote = std::ranges::find(said, Showing::kCounted, &StudyStore::Said::showing)->verdict;
+  HumanVerdict other = ann.Watched(vote.presentation, "failure");
+  other.supersedes = vote.id;
+  ann.now_ms += kHour_ms + 1;
+  ASSERT_EQ(ann.Say(other).status, 200);
+  EXPECT_EQ(progress(ann.now_ms).at("last_hour"), 0) << "what is said otherwise fills no place";
+  EXPECT_TRUE(progress(ann.now_ms).at("hours_left").is_null());
+  bob.now_ms = eve.now_ms = ann.now_ms;
+  bob.RateAll(label);
+  EXPECT_GE(eve.RateAll(label), 16) << "practice and gold are for everybody";
+  EXPECT_EQ(progress(ann.now_ms).at("last_hour"), 20) << "a third vote fills no place";
+  desk.Withdraw(bob.Me(), {.keep = false, .erase = false}, 9);
+  EXPECT_EQ(progress(ann.now_ms).at("last_hour"), 8) << "votes that do not count are none; gold has eve's instead";
+  EXPECT_EQ(progress(ann.now_ms).at("missing"), 12);
+  EXPECT_EQ(progress(ann.now_ms).at("hours_left"), 1.5);
 }
 
 TEST(RatingTally, ClipsThatWereAddedAreThere) {

@@ -124,5 +124,17 @@ TEST(Quality, KnownClipsAndRepeatsAreCounted) {
   EXPECT_EQ(quality.repeats_same, 0);
 }
 
+TEST(Quality, AFirstAnswerThatWasChangedAfterItsRepeatIsComparedAllTheSame) {
+  const std::unordered_map<std::int64_t, StudyClip> clips = {{1, StudyClip()}, {2, StudyClip()}};
+  const std::vector<StudyStore::Ballot> ballots = {
+      {.id = 2, .rater = 1, .clip = 1, .label = "success", .showing = Showing::kRepeat, .rt_ms = 5000},
+      {.id = 3, .supersedes = 1, .rater = 1, .clip = 1, .label = "success", .rt_ms = 5000},
+      {.id = 4, .rater = 1, .clip = 2, .label = "success", .showing = Showing::kRepeat, .rt_ms = 5000}};
+  const RaterQuality quality = QualityOfRater(ballots, clips, 0.1);
+  EXPECT_EQ(quality.repeats_seen, 1) << "of the other clip the first answer was undone: nothing to compare with";
+  EXPECT_EQ(quality.repeats_same, 1);
+  EXPECT_EQ(quality.verdicts, 3);
+}
+
 }  // namespace
 }  // namespace evac

@@ -61,6 +61,39 @@ TEST(RatingWords, WhatIsWrongIsNamed) {
   EXPECT_THAT(problem("rt_ms", nullptr), IsEmpty()) << "null is as if it were not there";
 }
 
+TEST(RatingWords, ATabInANoteLosesNoVerdict) {
+  nlohmann::json body = Body();
+  body["note"] = "reach\tgood\r\n\tgrasp\tbad";
+  const auto parsed = ParseVerdict(body.dump());
+  ASSERT_TRUE(parsed.value) << parsed.problem;
+  EXPECT_EQ(parsed.value->note, "reach\tgood\r\n\tgrasp\tbad") << "as it was typed";
+  for (const char* control : {"\x01", "\x0b", "\x1b"}) {
+    body["note"] = std::string("a") + control + "b";
+    EXPECT_THAT(ParseVerdict(body.dump()).problem, HasSubstr("note: has control characters"));
+  }
+}
+
+TEST(RatingWords, ATabThatStayedOpenForWeeksLosesNoVerdict) {
+  constexpr double kDay_ms = 24 * 3600e3;
+  nlohmann::json body = Body();
+  body["shown_at_ms"] = 20 * kDay_ms, body["first_play_ms"] = 20 * kDay_ms + 500, body["decided_ms"] = 30 * kDay_ms;
+  body["rt_ms"] = 10 * kDay_ms, body["visible_ms"] = 8 * kDay_ms, body["stalls_ms"] = 8 * kDay_ms;
+  const auto parsed = ParseVerdict(body.dump());
+  ASSERT_TRUE(parsed.value) << parsed.problem;
+  EXPECT_EQ(parsed.value->decided_ms, 30 * kDay_ms) << "what it was, not what a limit makes of it";
+  EXPECT_EQ(parsed.value->rt_ms, 10 * kDay_ms);
+  EXPECT_EQ(parsed.value->visible_ms, 8 * kDay_ms);
+  body["rt_ms"] = 1e300;
+  EXPECT_THAT(ParseVerdict(body.dump()).problem, HasSubstr("rt_ms: wanted 0"));
+}
+
+TEST(RatingWords, ARangeOfAnotherKindIsNoneAndOneOutsideOfTheFileIsOne) {
+  for (const char* one : {"bytes=0-", "bytes=5-9", "bytes=-4", "bytes=100-", "bytes=-0"})
+    EXPECT_TRUE(IsOneRange(one)) << one;
+  for (const char* other : {"", "items=0-", "bytes", "bytes=", "bytes=-", "bytes=5-4", "bytes=0-1,5-6", "bytes=1-2x"})
+    EXPECT_FALSE(IsOneRange(other)) << other;
+}
+
 TEST(RatingWords, RangesStayInsideTheFile) {
   const auto range = [](const char* header) {
     const auto found = ParseRange(header, 100);

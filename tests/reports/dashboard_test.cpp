@@ -11,17 +11,21 @@
 
 #include "core/error.h"
 #include "reports/dashboard_paths.h"
+#include "reports/dashboard_run.h"
 #include "tests/reports/stored_run.h"
+#include "tests/support/command.h"
 #include "tests/support/temp_folder.h"
 
 namespace evac {
 namespace {
 
+using testing::AllOf;
 using testing::HasSubstr;
 using testing::Not;
 
-DashboardOptions OptionsFor(std::vector<std::filesystem::path> runs) {
+DashboardOptions OptionsFor(std::vector<std::filesystem::path> runs, const std::string& host = "127.0.0.1") {
   DashboardOptions options;
+  options.host = host;
   options.runs = std::move(runs);
   options.look_every_s = 0.05;
   options.program = "evac test";
@@ -31,15 +35,16 @@ DashboardOptions OptionsFor(std::vector<std::filesystem::path> runs) {
 /// A dashboard at work, on a port of its own.
 class Served {
  public:
-  explicit Served(std::vector<std::filesystem::path> runs)
-      : dashboard_(OptionsFor(std::move(runs))),
+  explicit Served(std::vector<std::filesystem::path> runs, const std::string& host = "127.0.0.1")
+      : host_(host),
+        dashboard_(OptionsFor(std::move(runs), host)),
         thread_([this] { dashboard_.Serve(); }) {}
   ~Served() {
     dashboard_.Stop();
     thread_.join();
   }
   httplib::Client Client() const {
-    httplib::Client client("127.0.0.1", dashboard_.port());
+    httplib::Client client(host_, dashboard_.port());
     client.set_read_timeout(60);
     return client;
   }
@@ -50,6 +55,7 @@ class Served {
   }
 
  private:
+  std::string host_;
   Dashboard dashboard_;
   std::thread thread_;
 };
@@ -94,6 +100,44 @@ TEST(Dashboard, ShowsWhatARunWroteMeanwhileAndTellsThatThereIsMore) {
   EXPECT_EQ(nlohmann::json::parse(client.Get("/runs/0/report.json")->body).at("episodes").size(), 6u);
 }
 
+TEST(Dashboard, APageCarriesTheStampOfWhatItWasCountedFrom) {
+  StoredRun run("stamped", "ss", "ss");
+  TempFolder empty;
+  const Served served({empty.path() / "soon", run.folder()});
+  httplib::Client client = served.Client();
+  const std::string then = StampOf(run.folder());
+  const std::string page = client.Get("/runs/1/")->body, index = client.Get("/")->body;
+  EXPECT_THAT(page, HasSubstr("data-run=\"1\" data-stamp=\"" + then + "\""));
+  EXPECT_THAT(index, HasSubstr("data-stamp=\"[&quot;none none &quot;,&quot;" + then + "&quot;]\""));
+  EXPECT_THAT(client.Get("/runs/0/")->body, AllOf(HasSubstr("data-stamp=\"none none \""), HasSubstr("class=\"live\"")));
+  run.Add("41-0100", 's', 'f');
+  EXPECT_NE(StampOf(run.folder()), then);
+  EXPECT_THAT(client.Get("/runs/1/")->body, HasSubstr("data-stamp=\"" + StampOf(run.folder()) + "\""));
+}
+
+TEST(Dashboard, ToReadARunIsNoNewsOfIt) {
+  StoredRun run("finished", "s", "s");
+  { const Store closed = std::move(run.store()); }
+  const Served served({run.folder()});
+  const std::string page = served.Client().Get("/runs/0/")->body;
+  EXPECT_THAT(page, HasSubstr("data-stamp=\"" + StampOf(run.folder()) + "\""));
+}
+
+TEST(Dashboard, InABrowserAPageThatWasOldWhenItsNewsCameSaysSo) {
+  const StoredRun run("browsed", "s", "s");
+  const Served served({run.folder(), run.folder()});
+  httplib::Client client = served.Client();
+  const std::string stamp = StampOf(run.folder());
+  TempFolder folder;
+  std::ofstream(folder / "index.html") << client.Get("/")->body;
+  std::ofstream(folder / "run.html") << client.Get("/runs/1/")->body;
+  const CommandResult read = RunCommand({"/usr/bin/python3", "-B", EVAC_SOURCE_DIR "/tests/reports/live_page.py",
+                                         (folder / "index.html").string(), (folder / "run.html").string(), stamp});
+  if (read.exit_code == 77) GTEST_SKIP() << read.out;
+  EXPECT_EQ(read.exit_code, 0) << read.err << read.out;
+  EXPECT_THAT(read.out, HasSubstr("0 failed"));
+}
+
 TEST(Dashboard, GivesVideosInPieces) {
   const StoredRun run("videos", "s", "s");
   const Served served({run.folder()});
@@ -135,6 +179,15 @@ TEST(Dashboard, AnswersReadersAloneAndNoOtherSitesName) {
   EXPECT_EQ(client.Delete("/runs/0/")->status, 405);
   EXPECT_EQ(served.StatusOf("/", {{"Host", "evil.example"}}), 403);
   EXPECT_EQ(served.StatusOf("/", {{"Host", "localhost:1234"}}), 200);
+}
+
+TEST(Dashboard, AnswersByTheLoopbackAddressThatItWasToldToListenAt) {
+  const StoredRun run("elsewhere", "s", "s");
+  const Served served({run.folder()}, "127.0.0.2");
+  EXPECT_EQ(served.StatusOf("/"), 200);
+  EXPECT_EQ(served.StatusOf("/", {{"Host", "127.0.0.2"}}), 200);
+  for (const char* host : {"evil.example", "127.0.0.2.evil.example", "127.0.0.3"})
+    EXPECT_EQ(served.StatusOf("/", {{"Host", host}}), 403) << host;
 }
 
 TEST(Dashboard, ARunThatIsNotThereYetIsListedWithTheReason) {
@@ -185,6 +238,12 @@ TEST(DashboardPath, LoopbackHasFewNames) {
   for (const char* host :
        {"", "127.0.0.1.evil.example", "localhost.evil", "127.0.0.1:", "127.0.0.1:x", "[::1", "[::2]"})
     EXPECT_FALSE(IsLoopbackHost(host)) << host;
+  EXPECT_TRUE(IsLoopbackHost("127.0.0.2:80", "127.0.0.2"));
+  EXPECT_TRUE(IsLoopbackHost("localhost:80", "127.0.0.2"));
+  for (const char* host : {"", ":80", "127.0.0.2:x", "127.0.0.20", "127.0.0.2.evil.example"})
+    EXPECT_FALSE(IsLoopbackHost(host, "127.0.0.2")) << host;
+  EXPECT_FALSE(IsLoopbackHost("127.0.0.2"));
+  EXPECT_FALSE(IsLoopbackHost("", ""));
 }
 
 }  // namespace

@@ -212,6 +212,20 @@ TEST(Page, MissingVerdictsAreSaidWithTheCommandThatGivesThem) {
               Not(HasSubstr("evac judge RUN")));
 }
 
+TEST(Page, MissingVerdictsOfAJudgeAreSaidWithACommandThatTheProgramTakes) {
+  const SampleRun run({{"a", "pick", "1", "uu", "uu"}});
+  const auto page = [&run](const std::string& judge) { return ReportPage(run.Summary({.judge = judge}), kBeside); };
+  EXPECT_THAT(page("oracle,classifier:1a2b"),
+              HasSubstr("<code>evac judge RUN --judge classifier --weights FILE</code>, then <code>evac report RUN</code>, "
+                        "adds them."));
+  EXPECT_THAT(page("vlm:qwen-1a2b3c4d"), HasSubstr("<code>evac judge RUN --judge vlm --config PAGE</code>"));
+  EXPECT_THAT(page("human"),
+              HasSubstr("<code>evac rate new STUDY --run RUN</code>, then <code>evac rate serve STUDY</code>, then "
+                        "<code>evac rate resolve STUDY</code>, then <code>evac report RUN</code>, adds them."));
+  EXPECT_THAT(page("<crowd>"), HasSubstr("evac rate resolve STUDY --as &lt;crowd&gt;"));
+  EXPECT_THAT(page("human"), Not(HasSubstr("--judge human")));
+}
+
 TEST(Page, ARunWithoutEpisodesOrWithoutARealWorldStillHasAPage) {
   RunData data = ReadRun(SampleRun({{"a", "pick", "1", "s", "s"}}).store());
   data.worlds[0].is_real = false;

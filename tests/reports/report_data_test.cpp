@@ -146,6 +146,18 @@ TEST(Headlines, EveryRunHasAllFourAnswers) {
   }
 }
 
+TEST(Headlines, WhoIsMissingIsAskedByACommandThatTheProgramTakes) {
+  const SampleRun run({{"a", "pick", "1", "uu", "uu"}});
+  const auto text = [&run](const std::string& judge) {
+    return AllText(HeadlinesOf(ReportDataOf(run.Summary({.judge = judge}))));
+  };
+  EXPECT_THAT(text("oracle"), HasSubstr("4 episodes are not judged yet: evac judge RUN --judge oracle"));
+  EXPECT_THAT(text("classifier:1a2b"), HasSubstr("yet: evac judge RUN --judge classifier --weights FILE"));
+  EXPECT_THAT(text("vlm:qwen"), HasSubstr("yet: evac judge RUN --judge vlm --config PAGE"));
+  EXPECT_THAT(text("human"), HasSubstr("yet: evac rate new STUDY --run RUN, then evac rate serve STUDY, then evac rate "
+                                       "resolve STUDY"));
+}
+
 TEST(Methods, NameTheTestsThatWereUsedAndNoOthers) {
   const std::string text = MethodsParagraph(LargeReport());
   EXPECT_THAT(text, HasSubstr("4 policies on 2 tasks in 2 worlds (real (the reference), sim)"));

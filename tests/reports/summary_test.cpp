@@ -103,6 +103,15 @@ TEST(Summary, AJudgesShortNameStandsForOneOrIsRefused) {
   EXPECT_EQ(LastJudge("oracle,vlm:x"), "vlm:x");
 }
 
+TEST(Summary, EveryKindOfJudgeHasItsCommands) {
+  EXPECT_THAT(JudgingCommands("oracle"), testing::ElementsAre("evac judge RUN --judge oracle"));
+  EXPECT_EQ(JudgingCommands("classifier"), JudgingCommands("classifier:1a2b"));
+  EXPECT_EQ(JudgingCommands("vlm"), JudgingCommands("vlm:qwen-1a2b3c4d"));
+  EXPECT_EQ(JudgingCommands("human").back(), "evac rate resolve STUDY");
+  EXPECT_EQ(JudgingCommands("human:pilot:r3").back(), "evac rate resolve STUDY --each-rater");
+  EXPECT_EQ(JudgingCommands("second").back(), "evac rate resolve STUDY --as second");
+}
+
 TEST(Summary, OtherJudgesCountTheSameEpisodesWithTheirOwnVerdicts) {
   SampleRun run({{"take_bottle", "pick", "good", "sse", "ss"}, {"take_bottle", "pick", "bad", "fff", "ff"}});
   for (const Episode& episode : run.store().Episodes()) {

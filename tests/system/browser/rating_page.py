@@ -188,6 +188,9 @@ def first_rater(server, ann):
     undo(ann)
     reload_in_a_clip(ann)
     keys(ann)
+    pause_in_a_clip(ann)
+    menu_after_a_verdict(ann)
+    change(ann)
     second_tab(ann)
     line_goes_away(ann, server)
     ann.rate_all(lambda k: "failure" if k % 4 == 3 else "success")
@@ -211,6 +214,13 @@ def reload(browser):
     browser.js("window.isOld = true")
     browser.call("Page.reload")
     browser.wait("!window.isOld && document.readyState === 'complete' && typeof rating === 'object'")
+
+
+def wait_here(browser, expression):
+    """The page before may not have let go yet: this one takes over then."""
+    browser.wait(f"{expression} || document.querySelector('#dialog').open && document.querySelector('#dialog').textContent.includes('another tab')")
+    browser.js("document.querySelector('#dialog').open && document.querySelector('#dialog button.primary')?.click()")
+    browser.wait(expression)
 
 
 def undo(ann):
@@ -253,6 +263,8 @@ def keys(ann):
     browser.press("4")
     browser.press("x")
     check(browser.js("rating.stages === 1 && rating.flags.has('blur_hides')"), "digits are stages, after X flags")
+    check(browser.js("[...document.querySelectorAll('.stage, .flag')].every((b, k) => b.querySelector('kbd').hidden === !b.querySelector('kbd').textContent)"),
+          "what has no key shows none")
     browser.press("c")
     browser.press("c")
     check(browser.js("rating.confidence === 2 && document.querySelector('[data-sure=\"2\"]').getAttribute('aria-pressed') === 'true'"),
@@ -268,6 +280,7 @@ def keys(ann):
     browser.js("document.querySelector('#hand').click()")
     check("Backspace" in text(browser, "dl.keys"), "the help shows the right hand's keys", text(browser, "dl.keys"))
     browser.js("document.querySelector('#dialog button.primary').click()")
+    check(text(browser, ".flag kbd") == "6", "the flags show the right hand's digits", text(browser, ".flag kbd"))
     browser.press("7")
     check(browser.js("rating.stages === 3"), "7 is the second stage for the right hand", browser.js("rating.stages"))
     browser.press("7")
@@ -282,6 +295,68 @@ def keys(ann):
     browser.wait("document.querySelector('.history')")
     look(browser, "history")
     browser.js("document.querySelector('#dialog button.primary').click()")
+
+
+def pause_in_a_clip(ann):
+    browser = ann.browser
+    browser.js("rating.player.replay()")  # the dialogs before have stopped it
+    ann.ready()
+    clip = ann.clip()
+    browser.press("x")
+    browser.press("2")
+    browser.press("n")
+    browser.press("q")
+    browser.press("Escape")
+    browser.js("[...document.querySelectorAll('.bar button')].find(b => b.textContent === 'Pause').click()")
+    browser.wait("!document.querySelector('.rate')")
+    browser.press("Enter")
+    browser.wait("document.querySelector('.rate')")
+    check(ann.clip() == clip and browser.js("!document.querySelector('.verdict').disabled"), "after a pause the same clip goes on, seen as it was")
+    check(browser.js("rating.flags.has('object_disappears') && document.querySelector('textarea').value === 'q'"), "and what was marked is marked")
+    browser.press("2")
+    check(browser.js("rating.flags.size === 0 && rating.stages === 0"), "flags that were open are open: digits are theirs")
+    ann.say("s", "success")
+    ann.ready()
+    browser.press("1")
+    check(browser.js("rating.stages === 1 && !document.querySelector('.flags').open"), "the next clip's flags are closed: digits are stages")
+    browser.press("1")
+
+
+def menu_after_a_verdict(ann):
+    """And what was fetched ahead is not what the server would give again."""
+    browser = ann.browser
+    ann.ready()
+    clip = ann.clip()
+    browser.js("rating.prefetched = Promise.resolve({clip: {done: true}, source: null})")
+    browser.press("s")
+    ann.said[clip] = "success"
+    browser.js("openMenu()")
+    time.sleep(1)
+    check(browser.js("!document.querySelector('.rate')"), "the next clip does not come over the menu")
+    browser.press("Enter")
+    browser.wait("document.querySelector('.rate')")
+    check(ann.clip() != clip, "nobody is at the end because an old answer says so")
+
+
+def change(ann):
+    browser = ann.browser
+    ann.ready()
+    here, clip = ann.clip(), next(clip for clip, row in current().items() if row["note"] == "sfu")  # of keys(): with all that can be said
+    asked = browser.js(f"get('/api/history').then(said => said.verdicts.findIndex(one => one.presentation === {clip!r}))")
+    browser.press("h")
+    browser.wait("document.querySelector('#dialog').open && document.querySelector('.history')")
+    browser.js(f"document.querySelectorAll('.history button')[{asked}].click()")
+    browser.wait(f"rating.clip?.presentation === {clip!r} && rating.isOpen")
+    form = browser.js("[rating.stages, [...rating.flags].join(), rating.note, rating.confidence].join(' ')")
+    check(form == "1 blur_hides sfu 2", "a change begins with what was said", form)
+    browser.press("u")
+    ann.said[clip] = "cannot_tell"
+    browser.wait(f"rating.clip?.presentation === {here!r}")
+    ann.sent()
+    row = current()[clip]
+    check((row["label"], row["stages"], row["flags"], row["confidence"], row["note"]) == ("cannot_tell", 1, "blur_hides", 2, "sfu"),
+          "and changes nothing else", row)
+    check(browser.js("!rating.isOpen && !rating.supersedes"), "the clip after it is rated as any other")
 
 
 def second_tab(ann):
@@ -316,6 +391,7 @@ def line_goes_away(ann, server):
     browser.wait("!document.querySelector('#unsent').hidden")
     check("1 unsent" in text(browser, "#unsent"), "what is not sent is counted", text(browser, "#unsent"))
     ann.ready()
+    check(browser.js("inHand().length === 2 && inHand().includes(outbox.waiting[0].body.presentation)"), "a clip whose verdict waits is not asked for again")
     look(browser, "offline")
     clip = ann.clip()
     browser.press("s")
@@ -338,6 +414,22 @@ def compare(ann, name):
 
 def leave(rater):
     browser = rater.browser
+    browser.press("Enter")
+    browser.wait("document.querySelector('.rate')")
+    rater.ready()
+    browser.offline(True)
+    browser.press("s")
+    browser.wait("outbox.waiting.length === 1")
+    browser.js("void leave()")
+    browser.wait("document.querySelector('#erase')")
+    browser.js("document.querySelector('#dialog button.primary').click()")
+    browser.wait("document.querySelector('#dialog').open && !document.querySelector('#erase')")
+    check("could not be sent" in text(browser, "#dialog"), "nobody leaves with verdicts that are to count and wait", text(browser, "#dialog"))
+    browser.js("document.querySelector('#dialog button').click()")
+    before = len(rows())
+    browser.offline(False)
+    rater.sent()
+    check(len(rows()) == before + 1, "when the line is back they are sent", (before, len(rows())))
     browser.js("void leave()")
     browser.wait("document.querySelector('#erase')")
     look(browser, "leave")
@@ -348,6 +440,30 @@ def leave(rater):
     check(True, "who left is out")
     if FOLDER:
         browser.screenshot(FOLDER / "no-invitation-1280.png")
+
+
+def somebody_elses_link(rater, link):
+    browser = rater.browser
+    before = browser.js("session.me.rater")
+    for button in ("first-of-type", "nth-of-type(2)"):
+        browser.open(link)
+        browser.wait("document.querySelector('#dialog').open")
+        check(rater.name in text(browser, "#dialog"), "a link that is not theirs asks who is here", text(browser, "#dialog"))
+        browser.js(f"document.querySelector('#dialog button:{button}').click()")
+        wait_here(browser, "document.querySelector('.done') || document.querySelector('#consent')")
+    check(browser.js("Boolean(document.querySelector('#consent'))"), "and counts when they say so")
+    browser.open(browser.js("location.origin") + "/")
+    wait_here(browser, "document.querySelector('.done')")
+    check(browser.js("session.me.rater") == before, "until somebody has joined by it, the first one is here")
+
+
+def interrupted(judge, clip):
+    """Between the first look and the decision."""
+    browser = judge.browser
+    reload(browser)
+    wait_here(browser, "document.querySelector('.others')")
+    check(judge.clip() == clip, "an adjudicator who was interrupted finds the others' verdicts of the same clip")
+    check(browser.js("document.activeElement.matches('.decision.success')"), "and what was said first")
 
 
 def adjudicate(judge):
@@ -366,11 +482,24 @@ def adjudicate(judge):
         browser.wait("document.querySelector('.others')")
         if decided == 0:
             look(browser, "adjudicate")
+            interrupted(judge, clip)
         browser.press("Enter")
         browser.wait(f"document.querySelector('.done') || (rating.clip?.presentation !== {clip!r} && document.querySelector('.rate') && !document.querySelector('.others'))")
         decided += 1
     check(decided > 0, "there was something to decide", decided)
     check(json.loads(evac("status", STUDY, "--json"))["disputes"] == [], "no dispute is left")
+
+
+def goes_on(browser):
+    """The board: nothing moves under the reader, and it comes back after a refusal."""
+    browser.js("document.querySelector('.scroll[aria-label=Raters]').focus(); window.scrollTo(0, 60); window.before = scrollY")
+    browser.js("refreshBoard()")
+    check(browser.js("document.activeElement.getAttribute('aria-label') === 'Raters' && scrollY === before"), "a board that is refreshed stays where it was")
+    browser.js("window.fetched = fetch; window.fetch = () => Promise.resolve(new Response('{}', {status: 500})); window.before = board.timer; refreshBoard()")
+    browser.wait("!document.querySelector('#banner').hidden")
+    check(browser.js("board.timer !== before"), "a refused refresh is tried again")
+    browser.js("window.fetch = fetched; refreshBoard()")
+    browser.wait("document.querySelector('#banner').hidden")
 
 
 def main():
@@ -389,6 +518,7 @@ def main():
         for rater in (ann, bob, cleo):
             compare(rater, rater.name)
             check(len(rater.said) >= 24, f"{rater.name} rated 24 clips or more", len(rater.said))
+        somebody_elses_link(cleo, links("rater", 1, server.url)[0])
         dan.join()
         leave(dan)
         judge = Rater(links("adjudicator", 1, server.url)[0], "Eve")
@@ -398,6 +528,7 @@ def main():
         people.append(lead)
         lead.join()
         look(lead.browser, "board")
+        goes_on(lead.browser)
         told = json.loads(evac("status", STUDY, "--json"))
         check(f"{told['progress']['votes']} votes" in text(lead.browser, ".board"), "the board shows the store's numbers", text(lead.browser, "header"))
         check(len(told["unplayable"]) >= 3 and "could not play" in text(lead.browser, ".board"), "the lead hears what did not play", told["unplayable"])
