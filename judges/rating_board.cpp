@@ -91,7 +91,7 @@ Json RatersJson(const StudyStore& store, const RatingTally& tally) {
                     {"counts", rater.counts},
                     {"verdicts", quality.verdicts},
                     {"success_share", quality.success_share},
-                    {"median_rt_s", quality.median_rt_ms / 1000},
+                    {"median_rt_s", quality.median_rt_ms ? Json(*quality.median_rt_ms / 1000) : Json(nullptr)},
                     {"gold_right", quality.gold_right},
                     {"gold_seen", quality.gold_seen},
                     {"repeats_same", quality.repeats_same},

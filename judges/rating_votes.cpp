@@ -97,8 +97,8 @@ Defined<Interval> AlphaInterval(const std::vector<Pairs>& pairs, double alpha, i
   return IntervalsOf(resampled).percentile;
 }
 
-double Median(std::vector<double> values) {
-  if (values.empty()) return 0;
+std::optional<double> Median(std::vector<double> values) {
+  if (values.empty()) return std::nullopt;
   std::ranges::sort(values);
   return Quantile(values, 0.5);
 }
@@ -249,7 +249,7 @@ RaterQuality QualityOfRater(const std::vector<StudyStore::Ballot>& ballots,
     if (*answer != ballot.label) is_one_answer = false;
     if (ballot.label == "success") ++successes;
     if (IsTooFast(ballot, clip, period_s)) ++too_fast;
-    rt_ms.push_back(ballot.rt_ms);
+    if (ballot.showing != Showing::kImport) rt_ms.push_back(ballot.rt_ms);
   }
   if (quality.verdicts == 0) return quality;
   quality.success_share = static_cast<double>(successes) / static_cast<double>(quality.verdicts);

@@ -64,7 +64,8 @@ RatingAgreement RatersAgreement(const std::vector<RatedClip>& clips, int raters_
 /// What the lead should look at; nothing is ever dropped by itself.
 struct RaterQuality {
   std::int64_t verdicts = 0;
-  double success_share = 0, median_rt_ms = 0;
+  double success_share = 0;
+  std::optional<double> median_rt_ms{};  ///< of those that were given here: imported ones have no time
   std::int64_t gold_right = 0, gold_seen = 0;
   std::int64_t repeats_same = 0, repeats_seen = 0;  ///< of clips that have both answers now
   std::vector<std::string> concerns{};  ///< sentences

@@ -91,7 +91,7 @@ function table(heads, rows, label) {
 function ratersTable(data) {
   return table(['Rater', 'Role', 'Status', 'Verdicts', 'Says success', 'Median', 'Known right', 'Same again'], data.raters.map(rater => [
     rater.rater + (rater.name ? ` ${rater.name}` : ''), rater.role, rater.status + (rater.counts ? '' : ', not counted'), String(rater.verdicts), rater.verdicts ? `${(100 * rater.success_share).toFixed(0)} %` : '–',
-    rater.verdicts ? `${rater.median_rt_s.toFixed(1)} s` : '–', rater.gold_seen ? `${rater.gold_right} of ${rater.gold_seen}` : '–', rater.repeats_seen ? `${rater.repeats_same} of ${rater.repeats_seen}` : '–']), 'Raters');
+    rater.median_rt_s === null ? '–' : `${rater.median_rt_s.toFixed(1)} s`, rater.gold_seen ? `${rater.gold_right} of ${rater.gold_seen}` : '–', rater.repeats_seen ? `${rater.repeats_same} of ${rater.repeats_seen}` : '–']), 'Raters');
 }
 
 function ratesTable(data) {

@@ -124,6 +124,15 @@ TEST(Quality, KnownClipsAndRepeatsAreCounted) {
   EXPECT_EQ(quality.repeats_same, 0);
 }
 
+TEST(Quality, ImportedVerdictsHaveNoTime) {
+  const std::unordered_map<std::int64_t, StudyClip> clips = {{1, StudyClip()}, {2, StudyClip()}};
+  std::vector<StudyStore::Ballot> ballots = {
+      {.rater = 1, .clip = 1, .label = "success", .showing = Showing::kImport}};
+  EXPECT_FALSE(QualityOfRater(ballots, clips, 0.1).median_rt_ms);
+  ballots.push_back({.rater = 1, .clip = 2, .label = "success", .rt_ms = 5000});
+  EXPECT_EQ(QualityOfRater(ballots, clips, 0.1).median_rt_ms, 5000);
+}
+
 TEST(Quality, AFirstAnswerThatWasChangedAfterItsRepeatIsComparedAllTheSame) {
   const std::unordered_map<std::int64_t, StudyClip> clips = {{1, StudyClip()}, {2, StudyClip()}};
   const std::vector<StudyStore::Ballot> ballots = {
