@@ -64,7 +64,8 @@ ExitCode Encode(const EncodeArguments& arguments) {
   const std::vector<std::filesystem::path> shards = train::ShardPaths(arguments.shards);
   std::atomic<std::size_t> encoded = 0;
   ForEachShard(arguments, shards.size(), [&](std::size_t i) {
-    const train::EncodeOptions options{codec, Sha256HexOfFile(shards[i]), ProductsOf(arguments)};
+    const train::EncodeOptions options{codec, Sha256HexOfFile(shards[i]), ProductsOf(arguments),
+                                       config.vae.scale_factor};
     if (train::IsEncoded(shards[i], options)) return;
     train::EncodeShard(vae, shards[i], options);
     fmt::print(stderr, "{}: encoded, {} of {}\n", train::LatentsPath(shards[i]).string(), ++encoded, shards.size());
@@ -101,13 +102,13 @@ ExitCode Imagine(const EncodeArguments& arguments) {
   for (const train::Split split : {train::Split::kTrain, train::Split::kHoldout}) {
     if (!train::HasSplit(from, split)) continue;
     train::ShardSet set(from, split);
-    set.OpenLatents(config.vae.z_channels, config.vae.Stride());
+    set.OpenLatents(config.vae.z_channels, config.vae.Stride(), config.vae.scale_factor);
     if (set.codec() != codec)
       throw TensorError(arguments.codec + " did not make the shards' latents: wanted `evac encode` with it first");
     ForEachShard(arguments, set.shards().size(), [&](std::size_t i) {
       const std::filesystem::path shard = set.shards()[i].path, own = to / shard.filename();
       LinkInto(to, shard);
-      if (train::IsEncoded(own, {codec, Sha256HexOfFile(shard), products})) return;
+      if (train::IsEncoded(own, {codec, Sha256HexOfFile(shard), products, config.vae.scale_factor})) return;
       train::WriteImaginedLatents(model, set, i, to, products, {.steps = arguments.steps});
       ++imagined;
       fmt::print(stderr, "{}: imagined, {} of {} of this split\n", train::LatentsPath(own).string(), i + 1,

@@ -35,11 +35,11 @@ Recordings ReadRecordings(const std::filesystem::path& path) try {
                      path.string(), error.what());
 }
 
-/// `clip_id` of one shard.
+/// `clip_id` of one shard, one per clip.
 at::Tensor ClipIds(const std::filesystem::path& shard) {
   const nn::MappedTensors file(TensorFile::Open(shard));
   const at::Tensor ids = file.Get("clip_id");
-  nn::CheckShape(shard.string() + ": clip_id", ids, {-1});
+  nn::CheckShape(shard.string() + ": clip_id", ids, {std::max<std::int64_t>(0, file.Get("clip_start").numel() - 1)});
   return ids.to(at::kLong).clone();
 }
 

@@ -19,7 +19,7 @@ struct PackedClip : train::Clip {
 
 /// One split of some packings, the clips in the order of the shards.
 struct PackedSet {
-  /// @throws TensorError as ShardSet; InvalidInput if shards.json lacks what is said of recordings.
+  /// @throws TensorError as ShardSet, and if a shard has not one clip_id per clip; InvalidInput if shards.json lacks what is said of recordings.
   PackedSet(const train::ShardFolders& folders, train::Split split);
 
   train::ShardSet shards;

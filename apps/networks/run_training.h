@@ -17,7 +17,7 @@ struct TrainingKind {
   bool is_small = false;  ///< gains nothing from a library's threads
 };
 
-/// What all trainings do around their own part: page, command line, progress, interrupts, threads.
+/// What all trainings do around their own part: page, command line, progress, interrupts, threads, one process in OUT.
 /// @param train  (const train::JobPlace&, const Options&) → train::TrainerSummary
 template <class Options, class Train>
 ExitCode RunTraining(const TrainArguments& arguments, const TrainingKind& kind, const Train& train) {
@@ -28,6 +28,7 @@ ExitCode RunTraining(const TrainArguments& arguments, const TrainingKind& kind, 
   TrainingProgress progress(stderr);
   const train::JobPlace place = PlaceOf(arguments, progress);
   CheckHoldouts(place.shards);
+  const RunLock lock = HoldFolder(arguments.out);
   nn::KeepFreedMemory();
   const nn::LibraryThreads threads(kind.is_small ? 1 : LibraryThreadsOf(place, options.job));
   return End(train(place, options), arguments.out, kind.file.c_str());

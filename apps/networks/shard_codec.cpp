@@ -9,7 +9,7 @@ ShardCodec::ShardCodec(const std::filesystem::path& weights, const nn::VaeConfig
     : path_(weights), config_(config), weights_(weights), vae_(nn::Scope(weights_, train::kCodecPrefix), config) {}
 
 void ShardCodec::Open(train::ShardSet& shards) const {
-  shards.OpenLatents(config_.z_channels, config_.Stride());
+  shards.OpenLatents(config_.z_channels, config_.Stride(), config_.scale_factor);
   if (shards.codec() != CodecSha256(path_))
     throw TensorError(path_.string() + " did not make the shards' latents (they are of codec " + shards.codec() +
                       "): wanted `evac encode` with this codec");

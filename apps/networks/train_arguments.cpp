@@ -7,6 +7,7 @@
 
 #include "apps/interrupts.h"
 #include "core/config.h"
+#include "core/file.h"
 #include "core/hash.h"
 #include "worldmodel/evac_config.h"
 
@@ -21,6 +22,16 @@ std::string BegunWith(const TrainArguments& arguments) {
   if (arguments.init.empty()) return text;
   text += (arguments.init_widen ? " widened init " : " init ") + Sha256HexOfFile(arguments.init);
   for (const std::string& prefix : arguments.init_except) text += " except " + prefix;
+  return text;
+}
+
+/// ", best hold-out 0.03 at step 650, 12 steps left out: …": what else there is to say of it.
+std::string HowItWent(const train::TrainerSummary& summary) {
+  std::string text;
+  if (summary.best) text += fmt::format(", best hold-out {:.6g} at step {}", *summary.best, summary.best_step);
+  if (!summary.best && summary.holdouts_since_best > 0) text += ", no hold-out was a number";
+  if (summary.left_out > 0)
+    text += fmt::format(", {} steps left out: their loss or gradient was not finite", summary.left_out);
   return text;
 }
 
@@ -74,6 +85,11 @@ train::JobPlace PlaceOf(const TrainArguments& arguments, TrainingProgress& progr
           BegunWith(arguments)};
 }
 
+RunLock HoldFolder(const std::filesystem::path& out) {
+  MakeFolders(out);
+  return RunLock(out / "lock");
+}
+
 int LibraryThreadsOf(const train::JobPlace& place, const train::JobOptions& options) {
   return Workers(place, options) > 1 ? 1 : place.threads;
 }
@@ -89,9 +105,7 @@ ExitCode End(const train::TrainerSummary& summary, const std::filesystem::path& 
                "nothing was left to do: the training in {} is planned for {} steps and has done them; more --steps go "
                "on for longer\n",
                out.string(), summary.steps);
-  const std::string best =
-      summary.best ? fmt::format(", best hold-out {:.6g} at step {}", *summary.best, summary.best_step) : "";
-  fmt::print("{}: {} after {} steps{}\n", (out / file).string(), summary.why, summary.step, best);
+  fmt::print("{}: {} after {} steps{}\n", (out / file).string(), summary.why, summary.step, HowItWent(summary));
   return ExitCode::kOk;
 }
 

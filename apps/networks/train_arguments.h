@@ -9,6 +9,7 @@
 
 #include "apps/networks/training_progress.h"
 #include "core/error.h"
+#include "core/store_lock.h"
 #include "worldmodel/train/train_codec.h"
 
 namespace evac {
@@ -38,6 +39,10 @@ void Override(const TrainArguments& arguments, train::TrainerOptions& options);
 
 /// @param arguments, progress  outlive what is returned. Its `config` is read from --config, if that was given.
 train::JobPlace PlaceOf(const TrainArguments& arguments, TrainingProgress& progress);
+
+/// Makes OUT and holds it for this process: two trainings would write one another's files.
+/// @throws InvalidInput naming the process that holds it
+RunLock HoldFolder(const std::filesystem::path& out);
 
 /// Threads that share the parts of a step use one core each.
 int LibraryThreadsOf(const train::JobPlace& place, const train::JobOptions& options);

@@ -1,6 +1,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <unistd.h>
+
 #include <functional>
 #include <thread>
 
@@ -8,6 +10,7 @@
 #include "apps/networks/train_arguments.h"
 #include "apps/networks/training_page.h"
 #include "core/file.h"
+#include "core/store_lock.h"
 #include "tests/apps/learning_shards.h"
 #include "tests/apps/printed.h"
 #include "tests/support/temp_folder.h"
@@ -18,6 +21,7 @@ namespace {
 
 using testing::AllOf;
 using testing::HasSubstr;
+using testing::Not;
 using testing::ThrowsMessage;
 
 /// A network for LearningShards and their codec.
@@ -79,6 +83,42 @@ TEST_F(TrainCommand, GoesOnWithTheSamePageAndFilesAlone) {
               HasSubstr("is planned for 1 steps and has done them; more --steps go on"));
   Replace("page.yaml", "steps: 1000", "steps: 900");  // no shape depends on it
   EXPECT_THAT([&] { TrainCodec(); }, refused);
+}
+
+TEST_F(TrainCommand, AFolderThatAnotherTrainingWritesIsRefusedWithItsProcess) {
+  const auto refused =
+      ThrowsMessage<Error>(HasSubstr("process " + std::to_string(::getpid()) + " is writing here; wait for it"));
+  for (const char* out : {"codec", "judge", "policy"}) MakeFolders(Path(out));
+  {
+    const RunLock codec(Path("codec/lock")), judge(Path("judge/lock")), policy(Path("policy/lock"));
+    EXPECT_THAT([&] { TrainCodec(); }, refused);
+    EXPECT_FALSE(std::filesystem::exists(Path("codec/metrics.csv")));
+    for (const std::string learner : {"judge", "policy"})
+      EXPECT_THAT([&] { Train({learner, Path("shards"), "--steps", "1", "--out", Path(learner)}); }, refused) << learner;
+    EXPECT_THAT([&] {
+      Train({"judge", Path("shards"), "--init", Path("page.yaml"), "--calibrate-only", "--out", Path("judge")});
+    },
+                refused);
+  }
+  EXPECT_THAT(TrainCodec(), HasSubstr("done after 1 steps")) << "the lock went with its holder";
+}
+
+TEST_F(TrainCommand, TheEndSaysWhatWasNoNumber) {
+  const auto end = [](const train::TrainerSummary& summary) {
+    testing::internal::CaptureStdout();
+    EXPECT_EQ(End(summary, "out", "codec.safetensors"), ExitCode::kOk);
+    return testing::internal::GetCapturedStdout();
+  };
+  train::TrainerSummary summary;
+  summary.step = summary.steps = summary.steps_now = 30;
+  summary.why = "done";
+  EXPECT_EQ(end(summary), "out/codec.safetensors: done after 30 steps\n");
+  summary.left_out = 10;
+  summary.holdouts_since_best = 3;
+  EXPECT_THAT(end(summary), AllOf(HasSubstr("no hold-out was a number"),
+                                  HasSubstr("10 steps left out: their loss or gradient was not finite")));
+  summary.best = 0.5;
+  EXPECT_THAT(end(summary), AllOf(HasSubstr("best hold-out 0.5"), Not(HasSubstr("was a number"))));
 }
 
 TEST_F(TrainCommand, KnowsWhatEachTrainingIsBegunWith) {

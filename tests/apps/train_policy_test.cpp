@@ -177,6 +177,21 @@ void CropClips(const std::filesystem::path& folder, std::int64_t corner_px) {
   WriteTensorFile(shard, views, file.file().metadata());
 }
 
+TEST_F(TrainPolicyTest, AShardThatLacksAClipsRecordingIsRefused) {
+  const std::filesystem::path shard = folder_ / "shards" / "shard_00000.safetensors";
+  nn::MappedTensors file(TensorFile::Open(shard));
+  std::vector<at::Tensor> tensors;
+  std::vector<TensorView> views;
+  for (const TensorView& view : file.file().tensors()) {
+    const at::Tensor tensor = file.Get(view.name).clone();
+    tensors.push_back(view.name == "clip_id" ? tensor.narrow(0, 0, tensor.size(0) - 1).contiguous() : tensor);
+    views.push_back(nn::ViewOf(view.name, tensors.back()));
+  }
+  WriteTensorFile(shard, views, file.file().metadata());
+  EXPECT_THAT([&] { PackedSet({folder_ / "shards"}, train::Split::kTrain); },
+              ThrowsMessage<TensorError>(HasSubstr("shard_00000.safetensors: clip_id is ")));
+}
+
 TEST_F(TrainPolicyTest, TheCardsCamerasAreThoseOfAWholePicture) {
   const auto cameras = [&] { return CamerasOf(PackedSet({folder_ / "shards"}, train::Split::kTrain)); };
   const double whole_px = cameras().front().fx_px;

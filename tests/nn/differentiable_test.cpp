@@ -4,10 +4,12 @@
 #include <ATen/ops/layer_norm.h>
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <functional>
 
 #include "tests/nn/support.h"
 #include "worldmodel/nn/attention.h"
+#include "worldmodel/nn/float_math.h"
 
 namespace evac::nn {
 namespace {
@@ -49,6 +51,29 @@ TEST(FastGradients, OfGroupNormAreThoseOfLibtorch) {
     };
     ExpectSame(fast, plain, {Noise({3, 11, 13, 64}, 1) * 2 + 1, Noise({64}, 2) * 0.3 + 1, Noise({64}, 3)}, 1);
   }
+}
+
+TEST(FloatMath, ExponentialStaysFiniteAboveAndNoNumberStaysNone) {
+  for (const float x : {-87.0F, -1.0F, 0.0F, 1.0F, 87.9F, 88.0F})
+    EXPECT_NEAR(kernels::Exponential(x) / std::exp(static_cast<double>(x)), 1, 1e-6) << x;
+  for (const float x : {88.5F, 177.4F, 1e30F, HUGE_VALF})
+    EXPECT_EQ(kernels::Exponential(x), kernels::Exponential(88.0F)) << x;
+  EXPECT_TRUE(std::isnan(kernels::Exponential(std::nanf(""))));
+}
+
+TEST(FastGradients, OfGroupNormWithSiluAreThoseOfLibtorchWhereOneRowIsFarOut) {
+  Tensor x = at::zeros({1, 200, 200, 32});
+  x.select(1, 3).select(1, 7).fill_(-1);  // 170 deviations from all others: SiLU of it is 0
+  const std::vector<Tensor> inputs = {x, Noise({32}, 2) * 0.01 + 1, Noise({32}, 3)};
+  const auto fast = [](const std::vector<Tensor>& in) { return FastGroupNorm(in[0], in[1], in[2], {32, 1e-5, true}); };
+  const auto plain = [](const std::vector<Tensor>& in) {
+    const Tensor turned = in[0].flatten(1, 2).transpose(1, 2).contiguous();
+    return at::silu(at::group_norm(turned, 32, in[1], in[2], 1e-5).transpose(1, 2).reshape(in[0].sizes()));
+  };
+  std::vector<Tensor> precise;
+  for (const Tensor& input : inputs) precise.push_back(input.to(at::kDouble));
+  const std::vector<Tensor> wanted = AnswerAndGradients(plain, precise), found = AnswerAndGradients(fast, inputs);
+  for (std::size_t i = 0; i < wanted.size(); ++i) EXPECT_LT(RelativeDifference(found[i], wanted[i]), 1e-4) << i;
 }
 
 TEST(FastGradients, OfLayerNormAreThoseOfLibtorch) {

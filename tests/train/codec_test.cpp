@@ -1,6 +1,9 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <cmath>
+#include <optional>
+
 #include "core/hash.h"
 #include "tests/nn/support.h"
 #include "tests/support/temp_folder.h"
@@ -98,6 +101,45 @@ TEST(EncodeShard, WritesTheLatentsOfEveryPictureAndMap) {
   const Tensor map = vae.Encode(PicturesFrom(shard.maps[7])).Sample({}) * config.scale_factor;
   EXPECT_LT(nn::LargestDifference(shard.map_latents[7], map), 2e-3) << "halves";
   EXPECT_EQ(shards.codec(), "the codec's hash");
+}
+
+TEST(EncodeShard, LatentsTimesAnotherScaleFactorAreRefused) {
+  const TempFolder folder;
+  WriteSyntheticShards(folder.path(), {});
+  nn::VaeConfig config = SmallCodec(2);
+  config.scale_factor = 1;
+  nn::RandomWeights random(1);
+  EncodeSyntheticShards(nn::Vae(nn::Scope(random, kCodecPrefix), config), folder.path());
+  const std::filesystem::path shard = ShardPaths(folder.path()).front();
+  const auto is_encoded = [&](std::optional<double> scale_factor) {
+    return IsEncoded(shard, {"codec", Sha256HexOfFile(shard), "float32", scale_factor});
+  };
+  const auto open = [&](std::optional<double> scale_factor) {
+    ShardSet(folder.path(), Split::kTrain).OpenLatents(config.z_channels, config.Stride(), scale_factor);
+  };
+  EXPECT_TRUE(is_encoded(1));
+  EXPECT_TRUE(is_encoded({})) << "not asked";
+  EXPECT_FALSE(is_encoded(0.5));
+  EXPECT_NO_THROW(open(1));
+  EXPECT_THAT([&] { open(0.5); },
+              testing::ThrowsMessage<TensorError>(
+                  testing::AllOf(testing::HasSubstr("latents_00000.safetensors"),
+                                 testing::HasSubstr("scale_factor is '1', wanted '0.5'"))));
+  EXPECT_TRUE(MayBeScaledBy({{"codec", "codec"}}, 0.5)) << "latents of earlier versions do not say it";
+}
+
+TEST(MeasureCodec, AnObjectFarOutsideThePictureIsNotSeen) {
+  nn::RandomWeights random(1);
+  const nn::Vae vae(nn::Scope(random, kCodecPrefix), SmallCodec(2));
+  const TempFolder folder;
+  WriteSyntheticShards(folder.path(), {});
+  EXPECT_NE(MeasureCodec(vae, ShardSet(folder.path(), Split::kTrain), 12).psnr_object, 0);
+  for (const double far : {1e30, -1e30, HUGE_VAL, -HUGE_VAL}) {
+    ChangeSyntheticShard(folder.path(), [&](const std::string& name, Tensor& tensor) {
+      if (name == "object_px") tensor.fill_(far);
+    });
+    EXPECT_EQ(MeasureCodec(vae, ShardSet(folder.path(), Split::kTrain), 12).psnr_object, 0) << far;
+  }
 }
 
 TEST(ShardSet, RefusesWhatNoTrainingCanRead) {

@@ -2,6 +2,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <cmath>
+
 #include "tests/nn/support.h"
 #include "tests/support/temp_folder.h"
 #include "tests/train/synthetic_shards.h"
@@ -155,6 +157,49 @@ TEST(TrainForecast, DoesNotGoOnWithOtherVariants) {
   EXPECT_THAT([&] { go_on(2, 1); }, ThrowsMessage<TensorError>(HasSubstr("is a training with other options")))
       << "as many, that ended otherwise";
   EXPECT_EQ(go_on(100, 0), "done");
+}
+
+/// The mean loss of some steps of shards, untrained.
+double LossOf(const std::filesystem::path& folder, const ForecastTrainingOptions& options) {
+  const nn::ModelConfig config = ForecastConfig(1);
+  const ShardSet shards(folder, Split::kTrain);
+  nn::RandomWeights random(1);
+  const nn::ObjectForecast forecast(nn::Scope(random, nn::kForecastPrefix), config);
+  const ForecastTraining training(shards, config, options);
+  const at::NoGradGuard no_gradients;
+  double sum = training.Measure(forecast).loss;
+  for (std::int64_t step = 0; step < 4; ++step) sum += training.Loss(forecast, {1, step, 0, 0}).item<double>();
+  return sum / 5;
+}
+
+TEST(ForecastTraining, WhatIsInfinitelyFarAwayIsNotSeenAndNoReasonForALossThatIsNone) {
+  const TempFolder folder;
+  WriteSyntheticShards(folder / "shards", {.failures = 3});
+  for (const double far : {HUGE_VAL, -HUGE_VAL, 1e30}) {
+    ChangeSyntheticShard(folder / "shards", [&](const std::string& name, Tensor& tensor) {
+      if (name == "object_px") tensor.narrow(0, 0, 3 * 9).fill_(far);  // three clips of six
+    });
+    EXPECT_TRUE(std::isfinite(LossOf(folder / "shards", Quick(1).forecast))) << far;
+  }
+}
+
+TEST(ForecastTraining, SuccessesAloneAreDrawnHoweverMuchFailuresCount) {
+  const TempFolder folder;
+  WriteSyntheticShards(folder / "shards", {});
+  for (const double weight : {1e300, HUGE_VAL}) {
+    ForecastTrainingOptions options = Quick(1).forecast;
+    options.batch = 2;
+    options.failure_weight = weight;
+    EXPECT_TRUE(std::isfinite(LossOf(folder / "shards", options))) << weight;
+  }
+}
+
+TEST(Variants, WithAnOutcomeThatIsNoneAreRefused) {
+  const TempFolder folder;
+  WriteSyntheticShards(folder / "shards", {});
+  WriteVariants(folder / "shards", 2, RecipeOf(folder / "shards"));
+  EXPECT_THAT([&] { ShardSet(folder / "shards", Split::kTrain).OpenVariants(); },
+              ThrowsMessage<TensorError>(HasSubstr("variant 0 has outcome 2, wanted 1 for success")));
 }
 
 TEST(Variants, OfOtherShardsOrOfClipsThatAreNotThereAreRefused) {

@@ -120,6 +120,24 @@ void WriteSyntheticShards(const std::filesystem::path& folder, const SyntheticSh
   std::ofstream(folder / "shards.json") << "{\"shards\": [" << list << "]}\n";
 }
 
+void ChangeSyntheticShard(const std::filesystem::path& folder,
+                          const std::function<void(const std::string& name, Tensor& tensor)>& change,
+                          const TensorMetadata& metadata) {
+  const std::filesystem::path path = folder / "shard_00000.safetensors";
+  const nn::MappedTensors file(TensorFile::Open(path));
+  std::vector<Tensor> tensors;
+  std::vector<TensorView> views;
+  for (const TensorView& view : file.file().tensors()) {
+    Tensor tensor = file.Get(view.name).clone();
+    change(view.name, tensor);
+    tensors.push_back(tensor.contiguous());
+    views.push_back(nn::ViewOf(view.name, tensors.back()));
+  }
+  TensorMetadata all = metadata;
+  all.insert(file.file().metadata().begin(), file.file().metadata().end());  // what is said already stays
+  WriteTensorFile(path, views, all);
+}
+
 void EncodeSyntheticShards(const nn::Vae& vae, const std::filesystem::path& folder, const std::string& products) {
   for (const std::filesystem::path& shard : ShardPaths(folder))
     EncodeShard(vae, shard, {"codec", Sha256HexOfFile(shard), products});

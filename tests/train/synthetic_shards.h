@@ -1,9 +1,11 @@
 #pragma once
 
 #include <filesystem>
+#include <functional>
 #include <string>
 
 #include "worldmodel/nn/vae.h"
+#include "worldmodel/train/shards.h"
 
 namespace evac::train {
 
@@ -29,6 +31,13 @@ struct SyntheticShards {
 
 /// Writes shard_00000 (train), shard_00001 (hold-out) and shards.json, as docs/formats/shards.md says.
 void WriteSyntheticShards(const std::filesystem::path& folder, const SyntheticShards& options);
+
+/// Writes the training shard anew.
+/// @param change    is given each tensor's name and a copy of it, to change or to replace
+/// @param metadata  keys that are said otherwise
+void ChangeSyntheticShard(const std::filesystem::path& folder,
+                          const std::function<void(const std::string& name, Tensor& tensor)>& change,
+                          const TensorMetadata& metadata = {});
 
 /// The latents of every shard of a folder, as `evac encode` makes them, of a codec named "codec".
 void EncodeSyntheticShards(const nn::Vae& vae, const std::filesystem::path& folder,

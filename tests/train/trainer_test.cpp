@@ -10,6 +10,7 @@
 #include <iterator>
 
 #include "tests/support/temp_folder.h"
+#include "tests/train/regression.h"
 #include "worldmodel/train/curves.h"
 
 namespace evac::train {
@@ -91,35 +92,10 @@ TEST(Dice, IsFair) {
   EXPECT_NEAR(dice.Normal({10000}).std().item<double>(), 1, 0.03);
 }
 
-/// A network of two parameters, and noisy data that it can learn.
-struct Regression {
-  Tensor weight = at::zeros({3, 1}), bias = at::zeros({1});
-  std::vector<NamedTensor> Parameters() const { return {{"weight", weight}, {"bias", bias}}; }
-  Tensor Loss(const StepPlace& place) const {
-    Dice dice(place, 1);
-    const Tensor x = dice.Normal({16, 3}), noise = dice.Normal({16, 1}) * 0.1;
-    const Tensor y = at::matmul(x, at::tensor({1.0F, -2.0F, 0.5F}).reshape({3, 1})) + 3 + noise;
-    return (at::matmul(x, weight) + bias - y).square().mean();
-  }
-  Tensor All() const { return at::cat({weight.detach().flatten(), bias.detach()}).clone(); }
-};
-
-TrainerOptions Quick(std::int64_t steps) {
-  TrainerOptions options;
-  options.steps = steps;
-  options.learning_rate = 0.05;
-  options.adamw.weight_decay = 0;
-  options.average_decay = 0.9;
-  options.clip_norm = 10;
-  options.decay_from = 0.5;
-  options.seed = 5;
-  return options;
-}
-
 TEST(Trainer, LearnsWhatTheLossSays) {
   const TempFolder folder;
   Regression regression;
-  Trainer trainer(regression.Parameters(), Quick(400), folder.path());
+  Trainer trainer(regression.Parameters(), QuickTrainer(400), folder.path());
   const TrainerSummary summary = trainer.Run({.loss = [&](const StepPlace& place) { return regression.Loss(place); }});
   EXPECT_EQ(summary.why, "done");
   EXPECT_NEAR(regression.weight[1].item<double>(), -2, 0.05);
@@ -135,7 +111,7 @@ std::size_t Occurrences(const std::string& text, const std::string& part) {
 TEST(Trainer, DrawsHowItWent) {
   const TempFolder folder;
   Regression regression;
-  TrainerOptions options = Quick(60);
+  TrainerOptions options = QuickTrainer(60);
   options.holdout_every = 20;
   double score = 4;
   Trainer(regression.Parameters(), options, folder.path())
@@ -162,13 +138,13 @@ TEST(Curves, OfNothingOrOfOneNumberAreStillAPicture) {
 TEST(Trainer, GoesOnAfterAnyKillAsIfNothingHadHappened) {
   const TempFolder whole_folder, killed_folder;
   Regression whole;
-  Trainer(whole.Parameters(), Quick(60), whole_folder.path()).Run({.loss = [&](const StepPlace& p) { return whole.Loss(p); }});
+  Trainer(whole.Parameters(), QuickTrainer(60), whole_folder.path()).Run({.loss = [&](const StepPlace& p) { return whole.Loss(p); }});
   struct Killed {};
   Tensor last;
   std::int64_t reached = 0;
   for (const std::int64_t kill_at : {7, 20, 21, 59, 1000}) {
     Regression killed;  // as a new process: nothing is left but the folder
-    TrainerOptions options = Quick(60);
+    TrainerOptions options = QuickTrainer(60);
     options.checkpoint_every_s = 0;
     Trainer trainer(killed.Parameters(), options, killed_folder.path());
     EXPECT_EQ(trainer.step(), reached) << "what was done before is not done again";
@@ -193,7 +169,7 @@ std::string Text(const std::filesystem::path& path) {
 TEST(Trainer, KeepsTheBestOfTheHoldoutAndStopsWhenItGetsNoBetter) {
   const TempFolder folder;
   Regression regression;
-  TrainerOptions options = Quick(1000);
+  TrainerOptions options = QuickTrainer(1000);
   options.holdout_every = 10;
   options.patience = 3;
   int asked = 0;
@@ -217,19 +193,19 @@ TEST(Trainer, KeepsTheBestOfTheHoldoutAndStopsWhenItGetsNoBetter) {
 TEST(Trainer, StopsWhenAskedToAndSavesWhatItHas) {
   const TempFolder folder;
   Regression regression;
-  Trainer trainer(regression.Parameters(), Quick(100), folder.path());
+  Trainer trainer(regression.Parameters(), QuickTrainer(100), folder.path());
   const TrainerSummary summary = trainer.Run({.loss = [&](const StepPlace& place) { return regression.Loss(place); },
                                               .interrupted = [&] { return trainer.step() >= 12; }});
   EXPECT_EQ(summary.why, "interrupted");
   Regression again;
-  EXPECT_EQ(Trainer(again.Parameters(), Quick(100), folder.path()).step(), 12);
+  EXPECT_EQ(Trainer(again.Parameters(), QuickTrainer(100), folder.path()).step(), 12);
 }
 
 TEST(Trainer, AccumulatedPartsAreOneStepOfTheirMean) {
   const TempFolder one, two;
   Regression whole, parts;
   const auto data = [](const Regression& r, const StepPlace& place) { return r.Loss({place.seed, place.step, 0, 0}); };
-  TrainerOptions options = Quick(5);
+  TrainerOptions options = QuickTrainer(5);
   Trainer(whole.Parameters(), options, one.path()).Run({.loss = [&](const StepPlace& p) { return data(whole, p); }});
   options.accumulate = 2;
   Trainer(parts.Parameters(), options, two.path()).Run({.loss = [&](const StepPlace& p) { return data(parts, p); }});
@@ -238,7 +214,7 @@ TEST(Trainer, AccumulatedPartsAreOneStepOfTheirMean) {
 
 TEST(Trainer, PartsOfAStepSideBySideAreThoseOneAfterTheOther) {
   const TempFolder one, two;
-  TrainerOptions options = Quick(20);
+  TrainerOptions options = QuickTrainer(20);
   options.accumulate = 2;
   Regression alone, first, second;
   Trainer(alone.Parameters(), options, one.path()).Run({.loss = [&](const StepPlace& p) { return alone.Loss(p); }});
@@ -257,31 +233,31 @@ TEST(Trainer, PartsOfAStepSideBySideAreThoseOneAfterTheOther) {
 TEST(Trainer, ReplicasOfOtherParametersAreRefused) {
   const TempFolder folder;
   Regression regression;
-  Trainer trainer(regression.Parameters(), Quick(3), folder.path());
+  Trainer trainer(regression.Parameters(), QuickTrainer(3), folder.path());
   EXPECT_THROW(trainer.AddReplica({{{"weight", at::zeros({3, 1})}}, {}}), TensorError);
 }
 
 TEST(Trainer, RefusesTheCheckpointOfAnotherTraining) {
   const TempFolder folder;
   Regression regression;
-  Trainer(regression.Parameters(), Quick(3), folder.path()).Run({.loss = [&](const StepPlace& p) { return regression.Loss(p); }});
-  TrainerOptions other = Quick(3);
+  Trainer(regression.Parameters(), QuickTrainer(3), folder.path()).Run({.loss = [&](const StepPlace& p) { return regression.Loss(p); }});
+  TrainerOptions other = QuickTrainer(3);
   other.learning_rate = 0.1;
   Regression again;
   EXPECT_THROW(Trainer(again.Parameters(), other, folder.path()), TensorError);
-  EXPECT_THROW(Trainer({{"weight", at::zeros({3, 1})}}, Quick(3), folder.path()), TensorError);
+  EXPECT_THROW(Trainer({{"weight", at::zeros({3, 1})}}, QuickTrainer(3), folder.path()), TensorError);
 }
 
 TEST(Trainer, AStepWhoseLossIsNotFiniteMovesNothing) {
   const TempFolder folder;
   Regression regression;
-  Trainer trainer(regression.Parameters(), Quick(30), folder.path());
+  Trainer trainer(regression.Parameters(), QuickTrainer(30), folder.path());
   trainer.Run({.loss = [&](const StepPlace& place) {
     const Tensor loss = regression.Loss(place);
     return place.step % 3 == 1 ? loss / 0.0 : loss;
   }});
   EXPECT_TRUE(std::isfinite(regression.All().sum().item<double>()));
-  TrainerOptions hopeless = Quick(200);
+  TrainerOptions hopeless = QuickTrainer(200);
   const TempFolder other;
   Regression second;
   EXPECT_THROW(Trainer(second.Parameters(), hopeless, other.path()).Run({.loss = [&](const StepPlace& place) {
@@ -292,7 +268,7 @@ TEST(Trainer, AStepWhoseLossIsNotFiniteMovesNothing) {
 
 TEST(Trainer, CountsTheStepsThatFitIntoTheMinutesOnceAndKeepsThem) {
   const TempFolder folder;
-  TrainerOptions options = Quick(100000);
+  TrainerOptions options = QuickTrainer(100000);
   options.minutes = 0.01;
   Regression first;
   Trainer trainer(first.Parameters(), options, folder.path());
@@ -307,7 +283,7 @@ TEST(Trainer, CountsTheStepsThatFitIntoTheMinutesOnceAndKeepsThem) {
 
 TEST(Trainer, OtherMinutesThanItIsPlannedForAreRefusedAndMoreStepsGoOn) {
   const TempFolder folder, by_steps;
-  TrainerOptions options = Quick(100000);
+  TrainerOptions options = QuickTrainer(100000);
   options.minutes = 0.01;
   const auto train = [](const TrainerOptions& given, const TempFolder& at) {
     Regression regression;
@@ -325,7 +301,7 @@ TEST(Trainer, OtherMinutesThanItIsPlannedForAreRefusedAndMoreStepsGoOn) {
   options.steps = first.steps + 3;
   EXPECT_EQ(train(options, folder).steps_now, 3);
 
-  train(Quick(5), by_steps);
+  train(QuickTrainer(5), by_steps);
   options.minutes = 0.01;
   EXPECT_THAT([&] { train(options, by_steps); },
               testing::ThrowsMessage<TensorError>(testing::HasSubstr("is planned for 5 steps and has done 5")));
@@ -342,11 +318,11 @@ TEST(Trainer, AStepThatIsToBeKeptIsNotBehindTheLast) {
               .keep = [&](std::int64_t step) { found.push_back(step); }});
     return found;
   };
-  EXPECT_THAT(kept(Quick(10), {4, 10}), testing::ElementsAre(4, 10));
-  EXPECT_THAT([&] { kept(Quick(10), {4, 11}); },
+  EXPECT_THAT(kept(QuickTrainer(10), {4, 10}), testing::ElementsAre(4, 10));
+  EXPECT_THAT([&] { kept(QuickTrainer(10), {4, 11}); },
               testing::ThrowsMessage<TensorError>(testing::HasSubstr("step 11 is to be kept, wanted 1 to 10")));
-  EXPECT_THROW(kept(Quick(10), {0}), TensorError);
-  TrainerOptions by_minutes = Quick(10);
+  EXPECT_THROW(kept(QuickTrainer(10), {0}), TensorError);
+  TrainerOptions by_minutes = QuickTrainer(10);
   by_minutes.minutes = 0.01;
   EXPECT_THROW(kept(by_minutes, {1'000'000'000}), TensorError) << "as soon as it is planned";
 }
@@ -355,7 +331,7 @@ TEST(Trainer, TheSmoothedLossOutlivesStepsWhoseLossIsNotFinite) {
   const TempFolder folder;
   Regression regression;
   std::vector<double> said;
-  Trainer(regression.Parameters(), Quick(6), folder.path())
+  Trainer(regression.Parameters(), QuickTrainer(6), folder.path())
       .Run({.loss =
                 [&](const StepPlace& place) {
                   const Tensor loss = regression.Loss(place);
@@ -372,7 +348,7 @@ TEST(Trainer, TheSmoothedLossOutlivesStepsWhoseLossIsNotFinite) {
 TEST(Trainer, AFiniteHoldoutIsBetterThanOneThatIsNone) {
   const TempFolder folder;
   Regression regression;
-  TrainerOptions options = Quick(4);
+  TrainerOptions options = QuickTrainer(4);
   options.holdout_every = 1;
   std::vector<double> scores = {std::nan(""), 5, std::nan(""), 7};
   std::size_t asked = 0;

@@ -18,6 +18,7 @@
 namespace evac::train {
 namespace {
 
+using testing::AllOf;
 using testing::HasSubstr;
 using testing::ThrowsMessage;
 
@@ -102,7 +103,8 @@ TEST_F(WorldStartTest, AForecastIsGivenWhereThePageHasOneAndNowhereElse) {
 }
 
 TEST_F(WorldStartTest, AnExceptionThatBeginsNoKeyIsRefused) {
-  WorldStart start{.codec = Codec(), .init = "init"};
+  ASSERT_EQ(Train(Place("plain", false), {.codec = Codec()}), "done");
+  WorldStart start{.codec = Codec(), .init = Weights("plain")};
   const auto train = [&] { Train(Place("out", false), start); };
   for (const char* prefix : {"model.difusion_model.", "first_stage_model", "object_forecast"}) {
     start.init_except = {"model.diffusion_model.out.", prefix};
@@ -111,6 +113,70 @@ TEST_F(WorldStartTest, AnExceptionThatBeginsNoKeyIsRefused) {
   }
   start.init_except = {"model.diffusion_model.out."};
   EXPECT_NO_THROW(CheckStart(Config(false), start));
+}
+
+/// Weights of a network that is told frame by frame were taken by one that is not, and no word said.
+TEST_F(WorldStartTest, KeysThatThePageHasNoUseForAreRefusedByName) {
+  JobPlace told = Place("told", false);
+  told.config.unet.frame_actions = true;
+  ASSERT_EQ(Train(told, {.codec = Codec()}), "done");
+  WorldStart start{.codec = Codec(), .init = Weights("told")};
+  const auto train = [&] { Train(Place("untold", false), start); };
+  const auto refused = ThrowsMessage<TensorError>(
+      AllOf(HasSubstr("does not fit the page of sizes"), HasSubstr("keys are not the network's"),
+            HasSubstr("model.diffusion_model.frame_action_embedding.")));
+  EXPECT_THAT(train, refused);
+  start.init_widen = true;
+  EXPECT_THAT(train, refused) << "it is shown more, not less";
+  start.init_widen = false;
+  start.init_except = {"model.diffusion_model.frame_action_embedding."};
+  EXPECT_EQ(Train(Place("untold", false), start), "done") << "left behind where it is named";
+  start.init = Weights("untold");
+  EXPECT_THAT([&] { Train(Place("again", false), start); }, ThrowsMessage<TensorError>(HasSubstr("begins no key")));
+}
+
+TEST_F(WorldStartTest, AnObjectForecastThatThePageLacksIsRefused) {
+  WorldStart start{Codec()};
+  start.forecast = Forecast();
+  ASSERT_EQ(Train(Place("world"), start), "done");
+  start = {.codec = Codec(), .init = Weights("world")};
+  EXPECT_THAT([&] { Train(Place("plain", false), start); },
+              ThrowsMessage<TensorError>(HasSubstr("its model has an object_forecast, wanted object_forecast: true")));
+}
+
+TEST_F(WorldStartTest, WeightsThatLearnedFromAnotherNoiseAreRefused) {
+  ASSERT_EQ(Train(Place("plain", false), {.codec = Codec()}), "done");
+  WorldStart start{.codec = Codec(), .init = Weights("plain")};
+  JobPlace other = Place("other", false);
+  other.config.schedule.linear_end *= 2;
+  EXPECT_THAT([&] { Train(other, start); },
+              ThrowsMessage<TensorError>(HasSubstr("the schedule is another than the configuration's")));
+  start.init_except = {"alphas_cumprod"};
+  EXPECT_EQ(Train(other, start), "done") << "where it is meant";
+}
+
+TEST_F(WorldStartTest, StripStepsThatNoSamplerTakesAreRefusedBeforeAnythingIsWritten) {
+  for (const std::int64_t steps : {0, 1, 1001}) {
+    WorldOptions options = ShownTheFirst(1);
+    options.strip_steps = steps;
+    EXPECT_THAT([&] { TrainWorld(Place("out", false), options, {.codec = Codec()}, {}); },
+                ThrowsMessage<TensorError>(HasSubstr("strip_steps is " + std::to_string(steps) + ", wanted 2 to 1000")));
+    EXPECT_FALSE(std::filesystem::exists(folder_ / "out"));
+  }
+}
+
+TEST_F(WorldStartTest, TheCardSaysOfWhichStepTheWeightsAre) {
+  const auto card = [&](std::int64_t holdout_every) {
+    const std::string out = "every " + std::to_string(holdout_every);
+    WorldOptions options = ShownTheFirst(2);
+    options.job.trainer.holdout_every = holdout_every;
+    const TrainerSummary summary = TrainWorld(Place(out, false), options, {.codec = Codec()}, {});
+    return std::pair(summary.best_step, TensorFile::Open(Weights(out)).metadata());
+  };
+  const auto [best_step, measured] = card(1);
+  EXPECT_EQ(measured.at("best_step"), std::to_string(best_step));
+  EXPECT_EQ(measured.at("steps"), "2");
+  EXPECT_FALSE(card(0).second.contains("best_step")) << "none was measured";
 }
 
 TEST_F(WorldStartTest, TheHoldoutsLatentsAreOfTheSameCodec) {

@@ -35,7 +35,8 @@ Levels LevelsAt(const NoiseSchedule& schedule, const Tensor& steps, std::int64_t
 Tensor WithNoisyMemory(const NoiseSchedule& schedule, const Tensor& latents, const TeacherForcing& forcing) {
   const std::int64_t rows = latents.size(0), frames = forcing.angle.size(1);
   const Tensor angle = forcing.angle.clamp(0, 1.57);
-  const Tensor steps = ((1 - angle.cos()) * 1000 / static_cast<double>(forcing.divisor)).to(at::kLong);
+  const auto all = static_cast<double>(schedule.steps());  // the published 1000
+  const Tensor steps = ((1 - angle.cos()) * all / static_cast<double>(forcing.divisor)).to(at::kLong);
   const Levels levels = LevelsAt(schedule, std::get<0>(steps.sort(1)).flatten(), 4);
   const Tensor memory = latents.narrow(2, 0, frames).transpose(1, 2).flatten(0, 1);  // [BV N, z, h, w]
   const Tensor noisy = (memory * levels.signal + forcing.noise * levels.noise)

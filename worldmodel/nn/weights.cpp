@@ -28,9 +28,10 @@ void RequireSame(const MappedTensors& tensors, const NoiseSchedule::Buffer& ours
   }
 }
 
+}  // namespace
+
 /// Of the buffers two are asked: how much noise there is, which decides the others, and what clean latents are scaled
 /// by (spec 8.1).
-/// @returns why the file's schedule is put aside, or nothing.
 std::string CompareSchedule(const MappedTensors& tensors, const ModelConfig& config) {
   const std::int64_t last = config.schedule.steps - 1;
   const double end = tensors.Get("alphas_cumprod").to(at::kFloat)[last].item<double>();
@@ -43,8 +44,6 @@ std::string CompareSchedule(const MappedTensors& tensors, const ModelConfig& con
   return tensors.file().name() + ": the schedule does not end in pure noise (alphas_cumprod[" + std::to_string(last) +
          "] is " + std::to_string(end) + ", wanted 0): the configuration's is used";
 }
-
-}  // namespace
 
 FileWeights::FileWeights(const std::filesystem::path& path, const ModelConfig& config, const LoadOptions& options)
     : tensors_(TensorFile::OpenCheckpoint(path)), options_(options) {

@@ -23,6 +23,13 @@ struct LoadReport {
   std::string schedule;                   ///< why the file's schedule is not used; empty: it is the configuration's own
 };
 
+/// How the noise schedule that lies in a file is to the configuration's, which is the one that is used.
+/// @param tensors  of a file whose keys fit (CompareKeys)
+/// @returns why the file's is put aside, in a sentence; empty: it is the configuration's own
+/// @throws TensorError naming the first number that differs: both end in pure noise and are not the same, or latents are
+///   scaled otherwise.
+std::string CompareSchedule(const MappedTensors& tensors, const ModelConfig& config);
+
 /// The parameters of one file, as a network asks for them. Tensors keep the file mapped as long as they live.
 class FileWeights final : public ParameterSource {
  public:

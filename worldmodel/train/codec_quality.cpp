@@ -41,11 +41,14 @@ struct Errors {
   double Psnr() const { return count == 0 ? 0 : -10 * std::log10(std::max(sum / static_cast<double>(count), 1e-12)); }
 };
 
-/// The square about the object that lies in the picture; undefined if there is none.
+/// The square about the object that lies in the picture; undefined if there is none, or nobody knows where it is.
 Tensor AroundObject(const Tensor& picture, const Tensor& object_px) {
   const double x = object_px[0].item<double>(), y = object_px[1].item<double>();
   const std::int64_t height = picture.size(1), width = picture.size(2), reach = std::max<std::int64_t>(4, height / 6);
-  if (!std::isfinite(x) || !std::isfinite(y)) return {};
+  const auto is_near = [&](double middle, std::int64_t side) {  // what is no number is not; nor need it fit an integer
+    return middle > static_cast<double>(-reach) && middle < static_cast<double>(side + reach);
+  };
+  if (!is_near(x, width) || !is_near(y, height)) return {};
   const auto part = [&](double middle, std::int64_t side) {
     const auto at = static_cast<std::int64_t>(middle);
     const std::int64_t from = std::clamp<std::int64_t>(at - reach, 0, side), to = std::clamp<std::int64_t>(at + reach, 0, side);

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "worldmodel/train/option_limits.h"
+
 namespace evac::train {
 namespace {
 
@@ -20,11 +22,22 @@ Tensor DiscWeight(const Tensor& middle_px, const Tensor& like, double radius_px,
   return is_inside.to(at::kFloat) * (inside - 1) + 1;
 }
 
+void Check(const CodecTrainingOptions& o) {
+  constexpr const char* kTraining = "codec training";
+  if (o.batch < 1) throw TensorError("codec training: batch is " + std::to_string(o.batch) + ", wanted at least 1");
+  RequireShares(kTraining, {{"map_share", o.map_share}, {"contact_share", o.contact_share}});
+  RequireWeights(kTraining, {{"squared_weight", o.squared_weight},
+                             {"kl_weight", o.kl_weight},
+                             {"latent_noise", o.latent_noise},
+                             {"foreground_weight", o.foreground_weight},
+                             {"foreground_radius", o.foreground_radius}});
+}
+
 }  // namespace
 
 CodecTraining::CodecTraining(const ShardSet& shards, const nn::VaeConfig& config, const CodecTrainingOptions& options)
     : shards_(shards), config_(config), options_(options) {
-  if (options.batch < 1) throw TensorError("codec training: batch is " + std::to_string(options.batch) + ", wanted at least 1");
+  Check(options);
   for (std::size_t s = 0; s < shards.shards().size(); ++s) {
     const Tensor rows = shards.shards()[s].contact.nonzero().flatten();
     for (std::int64_t i = 0; i < rows.numel(); ++i) contacts_.push_back({s, rows.data_ptr<std::int64_t>()[i]});

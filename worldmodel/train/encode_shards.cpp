@@ -31,7 +31,8 @@ void EncodeShard(const nn::Vae& vae, const std::filesystem::path& shard, const E
                    {"version", "1"},
                    {"codec", options.codec},
                    {"shard_sha256", options.shard_sha256},
-                   {"products", options.products}});
+                   {"products", options.products},
+                   {"scale_factor", ScaleText(vae.scale_factor())}});
 }
 
 bool IsEncoded(const std::filesystem::path& shard, const EncodeOptions& options) {
@@ -42,7 +43,8 @@ bool IsEncoded(const std::filesystem::path& shard, const EncodeOptions& options)
     return found != file.metadata().end() && found->second == wanted;
   };
   return says("codec", options.codec) && says("shard_sha256", options.shard_sha256) &&
-         says("products", options.products);
+         says("products", options.products) &&
+         (!options.scale_factor || MayBeScaledBy(file.metadata(), *options.scale_factor));
 }
 
 }  // namespace evac::train

@@ -10,6 +10,7 @@
 #include <numbers>
 
 #include "worldmodel/nn/hand_turns.h"
+#include "worldmodel/train/option_limits.h"
 #include "worldmodel/train/world_batch.h"
 
 namespace evac::train {
@@ -61,6 +62,12 @@ void Check(const ForecastTrainingOptions& o) {
     throw TensorError("forecast training: failure_weight is " + std::to_string(o.failure_weight) + ", wanted at least 1");
   if (!(o.drop >= 0 && o.drop < 1))
     throw TensorError("forecast training: drop is " + std::to_string(o.drop) + ", wanted 0 or more and below 1");
+  constexpr const char* kTraining = "forecast training";
+  RequireShares(kTraining, {{"variant_share", o.variant_share}, {"late_start", o.late_start}});
+  RequireWeights(kTraining, {{"picture_gain", o.picture_gain},
+                             {"picture_noise", o.picture_noise},
+                             {"success_weight", o.success_weight},
+                             {"finder_weight", o.finder_weight}});
 }
 
 }  // namespace
@@ -97,15 +104,17 @@ ForecastTraining::View ForecastTraining::PickView(Dice& dice) const {
     return all[static_cast<std::size_t>(dice.Below(static_cast<std::int64_t>(all.size())))];
   };
   const bool varied = !shards_.variants().empty() && dice.Chance(options_.variant_share);
-  View view;
-  do {
-    if (varied) {
-      view.track = TrackOf(one_of(shards_.variants()));
-    } else {
-      const Clip& clip = one_of(shards_.clips());
-      view.track = TrackOf(clip, dice.Chance(options_.late_start) ? dice.Below(clip.frames) : 0);
-    }
-  } while (options_.failure_weight > 1 && view.track.outcome == 1 && !dice.Chance(1 / options_.failure_weight));
+  const auto any = [&] {
+    if (varied) return TrackOf(one_of(shards_.variants()));
+    const Clip& clip = one_of(shards_.clips());
+    return TrackOf(clip, dice.Chance(options_.late_start) ? dice.Below(clip.frames) : 0);
+  };
+  const auto is_left_out = [&](const Track& track) {
+    return options_.failure_weight > 1 && track.outcome == 1 && !dice.Chance(1 / options_.failure_weight);
+  };
+  constexpr int kMostDraws = 1000;  // all may have succeeded
+  View view{any(), {}};
+  for (int draw = 1; draw < kMostDraws && is_left_out(view.track); ++draw) view.track = any();
   view.frames = {view.track.frames() - 1};
   while (static_cast<std::int64_t>(view.frames.size()) < options_.frames)
     view.frames.push_back(dice.Below(view.track.frames()));
@@ -156,7 +165,9 @@ Tensor ForecastTraining::LossOf(const nn::ObjectForecast::Answer& answer, const 
   // in the first picture: a bell over the finer cells, and where their mean lies
   const std::int64_t finer = config_.vae.Stride() / nn::ObjectForecast::kCell_px;
   const double spread_cells = 3.0 / static_cast<double>(nn::ObjectForecast::kCell_px);
-  const Tensor seen = IsWithin(batch.first, w, h).to(at::kFloat), at_place = batch.first.nan_to_num(0);
+  const Tensor within = IsWithin(batch.first, w, h), seen = within.to(at::kFloat);
+  // anywhere will do where it is not seen, but a number: 0 times an infinite error is none
+  const Tensor at_place = at::where(within.unsqueeze(1), batch.first, at::zeros_like(batch.first));
   const auto squared = [&](std::int64_t axis, std::int64_t side) {  // [BV, side finer], cells
     const Tensor cell = ((at_place.select(1, axis) + 0.5) * static_cast<double>(finer) - 0.5).unsqueeze(1);
     return (at::arange(side * finer, at::kFloat) - cell).square();

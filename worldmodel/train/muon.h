@@ -17,8 +17,9 @@ struct MatrixPlace {
   std::int64_t count() const { return rows * columns; }
 };
 
-/// Those of the parameters that have two axes or more and at least 16 rows and columns; the others (offsets, gains,
-/// tables, a network's last layer of a few channels) stay AdamW's.
+/// Those of the parameters that have two axes or more and at least 16 rows and columns, tables of so many rows among
+/// them (positional_embedding, a domain_embedding of 16 domains or more); the others (offsets, gains, smaller tables, a
+/// network's last layer of a few channels) stay AdamW's.
 std::vector<MatrixPlace> MatricesOf(const std::vector<NamedTensor>& parameters);
 
 /// `matrix` with its singular values brought near 1 (about .7 to 1.2) by five steps of Newton and Schulz's iteration

@@ -27,11 +27,23 @@ void RequireText(const TensorFile& file, const std::string& key, const std::stri
   if (found != wanted) throw TensorError(file.name() + ": " + key + " is '" + found + "', wanted '" + wanted + "'");
 }
 
-std::vector<std::string> TasksOf(const TensorFile& file) {
-  std::vector<std::string> tasks;
-  std::istringstream names(Text(file, "tasks"));
-  for (std::string name; std::getline(names, name, ',');) tasks.push_back(name);
-  return tasks;
+/// Of metadata, with commas between them.
+std::vector<std::string> NamesOf(const TensorFile& file, const std::string& key) {
+  std::vector<std::string> found;
+  std::istringstream names(Text(file, key));
+  for (std::string name; std::getline(names, name, ',');) found.push_back(name);
+  return found;
+}
+
+/// Who reads a view's or an arm's numbers by its name finds them there.
+void RequireNames(const TensorFile& file, std::int64_t views) {
+  const std::vector<std::string> cameras = NamesOf(file, "cameras");
+  if (std::ssize(cameras) != views)
+    throw TensorError(file.name() + ": cameras is '" + Text(file, "cameras") + "', wanted " + std::to_string(views) +
+                      " names, one per view of its frames");
+  const std::string arms = Text(file, "arms");
+  if (arms != "right" && arms != "left,right")
+    throw TensorError(file.name() + ": arms is '" + arms + "', wanted 'right' or 'left,right'");
 }
 
 /// A tensor of the wanted type and shape (-1: any).
@@ -44,6 +56,16 @@ Tensor Checked(const nn::MappedTensors& file, const std::string& name, at::Scala
   return tensor;
 }
 
+/// The same, of finite numbers: one that is none makes the loss none, and all weights after it.
+Tensor CheckedNumbers(const nn::MappedTensors& file, const std::string& name, at::IntArrayRef shape) {
+  const Tensor tensor = Checked(file, name, at::kFloat, shape);
+  const Tensor broken = tensor.isfinite().logical_not();
+  if (!broken.any().item<bool>()) return tensor;
+  const auto row = broken.nonzero()[0][0].item<std::int64_t>();
+  throw TensorError(file.file().name() + ": row " + std::to_string(row) + " of " + name + " holds " +
+                    std::to_string(tensor.masked_select(broken)[0].item<double>()) + ", wanted finite numbers");
+}
+
 Shard Read(const std::filesystem::path& path, const nn::MappedTensors& file) {
   Shard shard;
   shard.path = path;
@@ -52,12 +74,15 @@ Shard Read(const std::filesystem::path& path, const nn::MappedTensors& file) {
   shard.maps = Checked(file, "maps", at::kByte, shard.frames.sizes());
   shard.clip_start = Checked(file, "clip_start", at::kLong, {-1});
   const std::int64_t clips = shard.clip_start.size(0) - 1;
+  if (clips < 1)
+    throw TensorError(path.string() + ": clip_start has " + std::to_string(clips + 1) +
+                      " numbers, wanted at least 2: the first row of a clip, and the end");
   shard.task = Checked(file, "task", at::kInt, {clips});
   shard.outcome = Checked(file, "outcome", at::kChar, {clips});
-  shard.actions = Checked(file, "actions", at::kFloat, {f, 16});
-  shard.deltas = Checked(file, "deltas", at::kFloat, {f, 14});
-  shard.c2w = Checked(file, "c2w", at::kFloat, {f, v, 4, 4});
-  shard.k = Checked(file, "k", at::kFloat, {f, v, 3, 3});
+  shard.actions = CheckedNumbers(file, "actions", {f, 16});
+  shard.deltas = CheckedNumbers(file, "deltas", {f, 14});
+  shard.c2w = CheckedNumbers(file, "c2w", {f, v, 4, 4});
+  shard.k = CheckedNumbers(file, "k", {f, v, 3, 3});
   shard.object_px = Checked(file, "object_px", at::kFloat, {f, v, 2});
   shard.contact = Checked(file, "contact", at::kByte, {f});
   return shard;
@@ -132,10 +157,28 @@ void RequireSameShard(const TensorFile& latents, const std::filesystem::path& sh
                     found + "', shards.json says '" + wanted + "': wanted `evac encode` again");
 }
 
+/// What latents say that they were multiplied by.
+constexpr const char* kScaleFactor = "scale_factor";
+
+/// Latents are times the factor of the page that asks for them; those of earlier versions do not say it.
+void RequireScale(const TensorFile& latents, double wanted) {
+  if (MayBeScaledBy(latents.metadata(), wanted)) return;
+  throw TensorError(latents.name() + ": scale_factor is '" + Text(latents, kScaleFactor) + "', wanted '" +
+                    ScaleText(wanted) + "' as on the page of sizes: `evac encode` with this page");
+}
+
 /// FNV-1a, from what was hashed before.
 std::uint64_t Hashed(std::uint64_t hash, std::span<const std::byte> bytes) {
   for (const std::byte byte : bytes) hash = (hash ^ std::to_integer<std::uint64_t>(byte)) * 0x100000001b3;
   return hash;
+}
+
+/// @param of  which clip of which file, for the message
+std::int8_t CheckedOutcome(const std::string& of, std::int8_t outcome) {
+  if (outcome < -1 || outcome > 1)
+    throw TensorError(of + " has outcome " + std::to_string(outcome) +
+                      ", wanted 1 for success, 0 for failure or -1 where it is unknown");
+  return outcome;
 }
 
 /// @param tasks  of this shard's numbers, what they are in the set
@@ -152,12 +195,24 @@ std::vector<Clip> ClipsOf(const Shard& shard, std::size_t index, const std::vect
       throw TensorError(shard.path.string() + ": clip " + std::to_string(i) + " is of task " + std::to_string(task) +
                         ", wanted 0 … " + std::to_string(std::ssize(tasks) - 1) + ", one of its metadata's");
     clips.push_back({index, starts[i], starts[i + 1] - starts[i], tasks[static_cast<std::size_t>(task)],
-                     shard.outcome.data_ptr<std::int8_t>()[i]});
+                     CheckedOutcome(shard.path.string() + ": clip " + std::to_string(i),
+                                    shard.outcome.data_ptr<std::int8_t>()[i])});
   }
   return clips;
 }
 
 }  // namespace
+
+std::string ScaleText(double scale_factor) {
+  char text[32];
+  std::snprintf(text, sizeof text, "%.17g", scale_factor);
+  return text;
+}
+
+bool MayBeScaledBy(const TensorMetadata& latents, double scale_factor) {
+  const auto found = latents.find(kScaleFactor);
+  return found == latents.end() || found->second == ScaleText(scale_factor);
+}
 
 std::filesystem::path LatentsPath(const std::filesystem::path& shard) { return Beside(shard, "latents_"); }
 
@@ -196,7 +251,7 @@ ShardSet::ShardSet(const ShardFolders& folders, Split split) {
     append(names, ", ", folder.string());
     const TensorFile first = TensorFile::Open(paths.front());
     append(recipes, ",", Text(first, "recipe"));
-    for (const std::string& task : TasksOf(first)) {  // whether this split has clips of it or not
+    for (const std::string& task : NamesOf(first, "tasks")) {  // whether this split has clips of it or not
       if (std::find(tasks_.begin(), tasks_.end(), task) == tasks_.end()) tasks_.push_back(task);
     }
     for (const std::filesystem::path& path : paths) Add(path, split);
@@ -214,13 +269,14 @@ void ShardSet::Add(const std::filesystem::path& path, Split split) {
   RequireText(file.file(), "version", "1");
   if (Text(file.file(), "split") != NameOf(split)) return;
   Shard shard = Read(path, file);
+  RequireNames(file.file(), shard.frames.size(1));
   if (!shards_.empty()) nn::CheckShape(path.string() + ": frames", shard.frames, {-1, views(), height_px(), width_px(), 3});
   if (shards_.empty()) metadata_ = file.file().metadata();
   CheckSame(path.string(), file.file().metadata());
   const auto arms_read = file.file().metadata().find(kArmsRead);
   if (arms_read != file.file().metadata().end()) metadata_.insert(*arms_read);
   std::vector<std::int32_t> tasks;
-  for (const std::string& task : TasksOf(file.file())) {
+  for (const std::string& task : NamesOf(file.file(), "tasks")) {
     const auto found = std::find(tasks_.begin(), tasks_.end(), task);
     if (found == tasks_.end())
       throw TensorError(path.string() + ": task '" + task + "' is none of its folder's first shard");
@@ -246,7 +302,7 @@ void ShardSet::CheckSame(const std::string& name, const TensorMetadata& metadata
   }
 }
 
-void ShardSet::OpenLatents(std::int64_t z, std::int64_t stride) {
+void ShardSet::OpenLatents(std::int64_t z, std::int64_t stride, std::optional<double> scale_factor) {
   std::map<std::filesystem::path, std::string> pages;  // of each folder
   products_.clear();
   for (Shard& shard : shards_) {
@@ -261,6 +317,7 @@ void ShardSet::OpenLatents(std::int64_t z, std::int64_t stride) {
     shard.map_latents = Checked(file, "map_latents", at::kHalf, shape);
     if (codec_.empty()) codec_ = Text(file.file(), "codec");
     RequireText(file.file(), "codec", codec_);
+    if (scale_factor) RequireScale(file.file(), *scale_factor);
     const std::filesystem::path folder = shard.path.parent_path();
     if (!pages.contains(folder)) pages[folder] = ReadText(folder / "shards.json");
     RequireSameShard(file.file(), shard.path, pages[folder]);
@@ -292,7 +349,7 @@ void ShardSet::OpenVariants() {
     const Tensor clip = Checked(file, "clip", at::kLong, {-1});
     const std::int64_t count = clip.size(0), clips = shard.clip_start.size(0) - 1;
     const Tensor start = Checked(file, "start", at::kLong, {count + 1}), outcome = Checked(file, "outcome", at::kChar, {count});
-    shard.variant_actions = Checked(file, "actions", at::kFloat, {-1, 16});
+    shard.variant_actions = CheckedNumbers(file, "actions", {-1, 16});
     const std::int64_t rows = shard.variant_actions.size(0);
     shard.variant_object_px = Checked(file, "object_px", at::kFloat, {rows, views(), 2});
     const auto* starts = start.data_ptr<std::int64_t>();
@@ -303,7 +360,8 @@ void ShardSet::OpenVariants() {
                           std::to_string(clips) + " and has rows " + std::to_string(starts[i]) + " to " +
                           std::to_string(starts[i + 1]) + " of " + std::to_string(rows));
       variants_.push_back({index, shard.clip_start.data_ptr<std::int64_t>()[of], starts[i], starts[i + 1] - starts[i],
-                           outcome.data_ptr<std::int8_t>()[i]});
+                           CheckedOutcome(path.string() + ": variant " + std::to_string(i),
+                                          outcome.data_ptr<std::int8_t>()[i])});
     }
   }
 }

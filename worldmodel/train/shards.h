@@ -53,18 +53,21 @@ class ShardSet {
  public:
   /// @throws TensorError naming the file and what was found and wanted: packing not done, shards that are missing, none of
   ///   this split, a tensor that is missing or misshapen, another version, shards of different pictures, periods, cameras,
-  ///   statistics or kinds of arms
+  ///   statistics or kinds of arms; a shard of no clips, with other than one camera's name per view, with unknown arms,
+  ///   with an outcome that is none, or with actions, deltas, c2w or k that are not finite
   ShardSet(const ShardFolders& folders, Split split);
   ShardSet(const std::filesystem::path& folder, Split split) : ShardSet(ShardFolders{folder}, split) {}
 
   /// @param z  latent channels
   /// @param stride  of the codec, pixels
-  /// @throws TensorError if a shard has no latents yet, they are of another size, of different codecs, or were made of
-  ///   another file than shards.json says the shard is
-  void OpenLatents(std::int64_t z, std::int64_t stride);
+  /// @param scale_factor  of the page; empty: not asked
+  /// @throws TensorError if a shard has no latents yet, they are of another size, of different codecs, were made of
+  ///   another file than shards.json says the shard is, or say that they were multiplied by another factor
+  void OpenLatents(std::int64_t z, std::int64_t stride, std::optional<double> scale_factor = {});
 
   /// Reads the variants of those shards that have some.
-  /// @throws TensorError if they are of another packing, misshapen, or of clips that are not there
+  /// @throws TensorError if they are of another packing, misshapen, of clips that are not there, with an outcome that
+  ///   is none, or with actions that are not finite
   void OpenVariants();
 
   const std::vector<Variant>& variants() const { return variants_; }
@@ -100,6 +103,10 @@ class ShardSet {
   std::uint64_t variants_hash_ = 0;
 };
 
+/// `scale_factor` as latents' metadata says it.
+std::string ScaleText(double scale_factor);
+/// Whether latents were multiplied by this, or do not say by what (those of earlier versions).
+bool MayBeScaledBy(const TensorMetadata& latents, double scale_factor);
 /// The file of the latents that belong to a shard.
 std::filesystem::path LatentsPath(const std::filesystem::path& shard);
 /// The file of its variants.

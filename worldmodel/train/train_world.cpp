@@ -114,6 +114,13 @@ void CheckViewWeights(const WorldTrainingOptions& options, const nn::ModelConfig
                       std::to_string(config.views) + ": one per view");
 }
 
+/// Strips are drawn at the first hold-out, hours after a number that no sampler takes was given.
+void CheckStripSteps(const WorldOptions& options, const nn::ModelConfig& config) {
+  if (options.strip_steps < 2 || options.strip_steps > config.schedule.steps)
+    throw TensorError("training: strip_steps is " + std::to_string(options.strip_steps) + ", wanted 2 to " +
+                      std::to_string(config.schedule.steps) + ", the steps of the page's schedule");
+}
+
 std::string Number(double value) {
   char text[32];
   std::snprintf(text, sizeof text, "%.6g", value);
@@ -124,6 +131,18 @@ std::string Numbers(const std::vector<double>& values) {
   std::string text;
   for (const double value : values) text += (text.empty() ? "" : ", ") + Number(value);
   return text;
+}
+
+/// What is written beside the weights.
+TensorMetadata CardOf(const TrainerSummary& summary, const ShardSet& shards, std::uint64_t seed) {
+  TensorMetadata card = WhatFor(shards.metadata());
+  card.insert({{"steps", std::to_string(summary.step)},
+               {"seed", std::to_string(seed)},
+               {"holdout", summary.best ? Number(*summary.best) : ""},
+               {"recipe", shards.metadata().at("recipe")},
+               {"codec", shards.codec()}});
+  if (summary.best) card["best_step"] = std::to_string(summary.best_step);
+  return card;
 }
 
 }  // namespace
@@ -145,10 +164,11 @@ TrainerSummary TrainWorld(const JobPlace& place, const WorldOptions& given, cons
   options.world.windows.memory = place.config.memory;
   CheckHoldoutSize(options.job);
   CheckViewWeights(options.world, place.config);
+  CheckStripSteps(options, place.config);
   CheckStart(place.config, start);
   ShardSet shards(place.shards, Split::kTrain), holdout(place.shards, Split::kHoldout);
   for (ShardSet* set : {&shards, &holdout}) {
-    set->OpenLatents(place.config.vae.z_channels, place.config.vae.Stride());
+    set->OpenLatents(place.config.vae.z_channels, place.config.vae.Stride(), place.config.vae.scale_factor);
     CheckShards(*set, place.config, start);
   }
   CheckHoldout(holdout, shards);
@@ -186,13 +206,8 @@ TrainerSummary TrainWorld(const JobPlace& place, const WorldOptions& given, cons
                    .on_progress = place.on_progress});
   if (!summary.IsDone()) return summary;
   trainer.WithBest([&] {
-    TensorMetadata card = WhatFor(shards.metadata());
-    card.insert({{"steps", std::to_string(summary.step)},
-                 {"seed", std::to_string(options.job.trainer.seed)},
-                 {"holdout", summary.best ? Number(*summary.best) : ""},
-                 {"recipe", shards.metadata().at("recipe")},
-                 {"codec", shards.codec()}});
-    Save(place.out / "weights.safetensors", weights, place.config, card);
+    Save(place.out / "weights.safetensors", weights, place.config,
+         CardOf(summary, shards, options.job.trainer.seed));
   });
   return summary;
 }

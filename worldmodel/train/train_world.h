@@ -9,8 +9,9 @@ namespace evac::train {
 struct WorldStart {
   std::filesystem::path codec;  ///< of OUT/codec.safetensors, or a whole checkpoint whose codec is meant
   std::filesystem::path init = {};  ///< a checkpoint to go on from, every key of which must fit; empty: random
-  /// Of `init`: keys that begin so are drawn anew ("model.diffusion_model.out." for another number of channels). What
-  /// `codec` and `forecast` give is taken from them all the same.
+  /// Of `init`: keys that begin so are drawn anew ("model.diffusion_model.out." for another number of channels), or left
+  /// behind where the page has none. What `codec` and `forecast` give is taken from them all the same. With
+  /// "alphas_cumprod" or "scale_arr" among them the noise may be another than `init` learned from.
   std::vector<std::string> init_except = {};
   bool init_widen = false;  ///< `init` is of a model that was shown less (WidenedWeights)
   std::filesystem::path forecast = {};  ///< of OUT/forecast.safetensors; empty: `init` has one, or the sizes have none
@@ -18,7 +19,8 @@ struct WorldStart {
 };
 
 /// @throws TensorError if the sizes have an `object_forecast` and nothing gives one, or one is given that they have not;
-///   or if an exception begins no key that `init` gives.
+///   if an exception begins no key that `init` gives; if a key of `init` that is not excepted is missing, is none of the
+///   network's or has another shape, by name; or if its noise schedule is another (nn::CompareSchedule).
 void CheckStart(const nn::ModelConfig& config, const WorldStart& start);
 
 /// What weights are for, as the shards that they learned from say, for the weights' metadata: period_s, cameras, arms,

@@ -18,15 +18,24 @@ namespace {
 constexpr std::int64_t kPlanFrom = 4;  ///< steps that are not timed: caches and buffers are still cold
 constexpr double kPlanSeconds = 10;    ///< timing takes about as long
 constexpr std::int64_t kNotFiniteAtMost = 100;
+constexpr std::int64_t kUnplanned = std::int64_t{1} << 40;  ///< steps, so many that those done are no part of them
 
 void Require(bool holds, const char* name, double found, const char* wanted) {
   if (!holds) throw TensorError(std::string("training: ") + name + " is " + std::to_string(found) + ", wanted " + wanted);
+}
+
+void CheckMeasuring(const TrainerOptions& o) {
+  Require(o.holdout_every >= 0, "holdout_every", static_cast<double>(o.holdout_every), "at least 0");
+  Require(o.patience >= 0, "patience", static_cast<double>(o.patience), "at least 0");
+  Require(o.patience == 0 || o.holdout_every > 0, "patience", static_cast<double>(o.patience),
+          "0 where holdout_every is 0: nothing is measured");
 }
 
 void Check(const TrainerOptions& o) {
   Require(o.steps > 0, "steps", static_cast<double>(o.steps), "at least 1");
   Require(o.minutes >= 0, "minutes", o.minutes, "at least 0");
   Require(o.learning_rate > 0, "learning_rate", o.learning_rate, "a number above 0");
+  Require(o.warmup_steps >= 0, "warmup_steps", static_cast<double>(o.warmup_steps), "at least 0");
   Require(o.decay_from >= 0 && o.decay_from <= 1, "decay_from", o.decay_from, "0 to 1");
   Require(o.average_decay >= 0 && o.average_decay < 1, "average_decay", o.average_decay, "0 to below 1");
   Require(o.accumulate > 0, "accumulate", static_cast<double>(o.accumulate), "at least 1");
@@ -35,6 +44,11 @@ void Check(const TrainerOptions& o) {
   if (o.optimiser != "adamw" && o.optimiser != "muon")
     throw TensorError("training: optimiser is '" + o.optimiser + "', wanted adamw or muon");
   Require(o.adamw.beta2 >= 0 && o.adamw.beta2 < 1, "beta2", o.adamw.beta2, "0 to below 1");
+  Require(o.adamw.epsilon > 0, "epsilon", o.adamw.epsilon, "a number above 0");
+  Require(o.adamw.weight_decay >= 0, "weight_decay", o.adamw.weight_decay, "at least 0");
+  Require(o.clip_norm >= 0, "clip_norm", o.clip_norm, "at least 0");
+  Require(o.checkpoint_every_s >= 0, "checkpoint_every_s", o.checkpoint_every_s, "at least 0");
+  CheckMeasuring(o);
 }
 
 template <typename... Args>
@@ -70,6 +84,7 @@ std::string TrainerProgress::Line() const {
   line += Text(" steps, loss %.5f", loss);
   if (holdout) line += Text(", hold-out %.5f", *holdout);
   if (best) line += Text(" (best %.5f)", *best);
+  if (left_out > 0) line += Text(", %lld left out: not finite", static_cast<long long>(left_out));
   if (steps_per_s > 0) line += Text(", %.2f steps/s", steps_per_s);
   if (steps_per_s > 0 && steps > 0) line += ", " + Duration(static_cast<double>(steps - step) / steps_per_s) + " left";
   return line;
@@ -107,8 +122,12 @@ double Trainer::LossOfParts(std::size_t worker, const TrainerCallbacks& callback
   return sum;
 }
 
+/// What learning rate and losses are told. Before minutes are turned into steps nobody knows, and the page's `steps`
+/// mean nothing: the training is at its very beginning.
+std::int64_t Trainer::StepsInAll() const { return planned_ ? steps_ : kUnplanned; }
+
 double Trainer::LossOfStep(const TrainerCallbacks& callbacks) {
-  const double done = static_cast<double>(step_) / static_cast<double>(steps_);
+  const double done = static_cast<double>(step_) / static_cast<double>(StepsInAll());
   std::vector<std::future<double>> others;
   for (std::size_t worker = 1; worker <= replicas_.size(); ++worker) {
     others.push_back(std::async(std::launch::async, [this, worker, done, &callbacks] {
@@ -130,12 +149,14 @@ Trainer::StepOutcome Trainer::Step(const TrainerCallbacks& callbacks) {
   StepOutcome outcome;
   outcome.loss = LossOfStep(callbacks);
   outcome.gradient_norm = Norm(state_.gradients);
-  outcome.learning_rate = LearningRateAt(options_, step_, steps_);
+  outcome.learning_rate = LearningRateAt(options_, step_, StepsInAll());
   if (!std::isfinite(outcome.gradient_norm) || !std::isfinite(outcome.loss)) {
     Tensor(state_.gradients).zero_();
+    ++left_out_;
     if (++not_finite_ >= kNotFiniteAtMost)
-      throw TensorError("training: the loss is not finite for 100 steps, at step " + std::to_string(step_) +
-                        ": a smaller learning_rate may help");
+      throw TensorError("training: loss or gradient is not finite for " + std::to_string(kNotFiniteAtMost) +
+                        " steps in a row, at step " + std::to_string(step_) +
+                        ": the data hold what is no number, or learning_rate is too large");
     return outcome;
   }
   not_finite_ = 0;
@@ -189,7 +210,8 @@ void Trainer::HoldOut(const TrainerCallbacks& callbacks) {
   With(Averaged(), [&] {
     last_score_ = callbacks.holdout();
     ++holdouts_since_best_;
-    if (!best_score_ || *last_score_ < *best_score_ || (std::isfinite(*last_score_) && !std::isfinite(*best_score_))) {
+    // What is no number says nothing of the weights it was measured with.
+    if (std::isfinite(*last_score_) && (!best_score_ || *last_score_ < *best_score_)) {
       best_score_ = last_score_;
       best_step_ = step_;
       best_ = state_.values.clone();
@@ -214,7 +236,7 @@ void Trainer::Report(const TrainerCallbacks& callbacks) const {
   if (!callbacks.on_progress) return;
   const auto timed = static_cast<double>(run_steps_ - timed_from_);
   callbacks.on_progress({step_, planned_ ? steps_ : 0, smooth_loss_, timed / std::max(SecondsSince(run_started_), 1e-6),
-                         last_score_, best_score_});
+                         last_score_, best_score_, left_out_});
 }
 
 std::string Trainer::WhyEnd(const TrainerCallbacks& callbacks) const {
@@ -252,7 +274,7 @@ TrainerSummary Trainer::Run(const TrainerCallbacks& callbacks) {
     }
   }
   WriteCurves(folder_);
-  return {step_, steps_, why, best_score_, best_step_, run_steps_};
+  return {step_, steps_, why, best_score_, best_step_, run_steps_, left_out_, holdouts_since_best_};
 }
 
 }  // namespace evac::train

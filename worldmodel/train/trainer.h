@@ -33,7 +33,8 @@ struct TrainerOptions {
   double average_decay = 0;        ///< of the moving average of the weights (EMA); 0: there is none
   std::int64_t accumulate = 1;     ///< parts of a step whose gradients are averaged
   std::int64_t holdout_every = 0;  ///< steps; 0: no hold-out
-  std::int64_t patience = 0;       ///< ends after so many hold-outs without a better one; 0: never
+  /// Ends after so many hold-outs without a better one; 0: never. Above 0 wants `holdout_every`.
+  std::int64_t patience = 0;
   double checkpoint_every_s = 60;  ///< 0: after every step
   std::uint64_t seed = 0;
   std::string identity;  ///< what else decides the numbers: data, network, loss. A checkpoint of another is refused
@@ -47,7 +48,9 @@ struct TrainerProgress {
   double loss = 0;                   ///< of the last steps where it was finite, smoothed
   double steps_per_s = 0;
   std::optional<double> holdout, best;
-  /// "1200/6000 steps, loss .0312, hold-out .0298 (best .0291), 2.4 steps/s, 33 min left"
+  std::int64_t left_out = 0;  ///< steps that moved nothing, since the training began: Trainer::Step
+  /// "1200/6000 steps, loss .0312, hold-out .0298 (best .0291), 2.4 steps/s, 33 min left", and before the speed
+  /// "7 left out: not finite" where there are such
   std::string Line() const;
 };
 
@@ -75,9 +78,11 @@ struct Replica {
 struct TrainerSummary {
   std::int64_t step = 0, steps = 0;
   std::string why;  ///< "done", "interrupted", "no better for 5 hold-outs"
-  std::optional<double> best;
+  std::optional<double> best;  ///< a finite number: none before the first hold-out that is one
   std::int64_t best_step = 0;
-  std::int64_t steps_now = 0;  ///< those that this process did
+  std::int64_t steps_now = 0;            ///< those that this process did
+  std::int64_t left_out = 0;             ///< of all steps, those whose loss or gradient was not finite
+  std::int64_t holdouts_since_best = 0;  ///< without a best: all that were measured
   bool IsDone() const { return why != "interrupted"; }
 };
 
@@ -98,7 +103,8 @@ class Trainer {
   void AddReplica(Replica replica);
 
   /// Trains from the checkpoint's step, or from 0, to the end.
-  /// @throws TensorError if the loss is not finite for 100 steps in a row, or a step to be kept is behind the last
+  /// A step whose loss or gradient is not finite moves nothing and is counted.
+  /// @throws TensorError after 100 such steps in a row, or if a step to be kept is behind the last
   TrainerSummary Run(const TrainerCallbacks& callbacks);
 
   std::int64_t step() const { return step_; }
@@ -120,6 +126,7 @@ class Trainer {
   void HoldOut(const TrainerCallbacks& callbacks);
   std::string WhyEnd(const TrainerCallbacks& callbacks) const;
   void PlanSteps();
+  std::int64_t StepsInAll() const;
   void CheckKept(const TrainerCallbacks& callbacks) const;
   void Report(const TrainerCallbacks& callbacks) const;
   void Record(const StepOutcome& outcome, double seconds);
@@ -137,9 +144,10 @@ class Trainer {
   TrainerOptions options_;
   std::filesystem::path folder_;
   AdamWState state_;
-  Tensor best_;  ///< [count], what the best hold-out was measured with
+  Tensor best_;  ///< [count], what the best hold-out that is a finite number was measured with
   std::optional<double> best_score_, last_score_;
-  std::int64_t best_step_ = 0, step_ = 0, steps_ = 0, holdouts_since_best_ = 0, not_finite_ = 0;
+  std::int64_t best_step_ = 0, step_ = 0, steps_ = 0, holdouts_since_best_ = 0;
+  std::int64_t not_finite_ = 0, left_out_ = 0;  ///< steps whose loss is none: in a row, in all
   bool planned_ = false;  ///< the number of steps stands
   double smooth_loss_ = std::numeric_limits<double>::quiet_NaN();  ///< until there was one
   std::int64_t run_steps_ = 0, timed_from_ = 0;  ///< by this process; those after which time is taken

@@ -1,3 +1,4 @@
+#include <cmath>
 #include <cstdio>
 #include <cstdlib>
 
@@ -26,6 +27,8 @@ class Metadata {
     if (found == file_.metadata().end()) throw TensorError(file_.name() + ": its metadata has no '" + key + "'");
     return found->second;
   }
+  /// Of a key that checkpoints of earlier versions may lack.
+  std::int64_t WholeOr0(const char* key) const { return Has(key) ? Whole(key) : 0; }
   std::int64_t Whole(const char* key) const { return std::strtoll(Text(key).c_str(), nullptr, 10); }
   double Number(const char* key) const { return std::strtod(Text(key).c_str(), nullptr); }
   const std::string& file() const { return file_.name(); }
@@ -85,17 +88,19 @@ void Trainer::Load() {
   if (state_.average.defined()) CopyFrom(file, "average", state_.average);
   step_ = metadata.Whole("step");
   not_finite_ = metadata.Whole("not_finite");
+  left_out_ = metadata.WholeOr0("left_out");
   smooth_loss_ = metadata.Number("smooth_loss");
   if (options_.minutes > 0 && metadata.Text("planned") == "1") {
     planned_ = true;
     steps_ = metadata.Whole("steps");
     RequireSameMinutes(metadata, options_.minutes);
   }
-  if (!metadata.Has("best_score")) return;
+  holdouts_since_best_ = metadata.WholeOr0("holdouts_since_best");
+  // An earlier version took a first hold-out for the best though it was no number.
+  if (!metadata.Has("best_score") || !std::isfinite(metadata.Number("best_score"))) return;
   best_ = file.Get("best").clone().to(state_.values.device());
   best_score_ = metadata.Number("best_score");
   best_step_ = metadata.Whole("best_step");
-  holdouts_since_best_ = metadata.Whole("holdouts_since_best");
 }
 
 void Trainer::Save() const {
@@ -110,13 +115,14 @@ void Trainer::Save() const {
                              {"steps", std::to_string(steps_)},
                              {"planned", planned_ ? "1" : "0"},
                              {"not_finite", std::to_string(not_finite_)},
+                             {"left_out", std::to_string(left_out_)},
+                             {"holdouts_since_best", std::to_string(holdouts_since_best_)},
                              {"smooth_loss", Exact(smooth_loss_)}};
   if (planned_ && options_.minutes > 0) metadata["minutes"] = Exact(options_.minutes);
   if (best_score_) {
     tensors.push_back({"best", best_});
     metadata["best_score"] = Exact(*best_score_);
     metadata["best_step"] = std::to_string(best_step_);
-    metadata["holdouts_since_best"] = std::to_string(holdouts_since_best_);
   }
   std::vector<TensorView> views;
   for (NamedTensor& tensor : tensors) {

@@ -3,11 +3,6 @@
 #include <algorithm>
 
 namespace evac::train {
-namespace {
-
-constexpr const char* kFirstLayer = "model.diffusion_model.input_blocks.0.0.weight";
-
-}  // namespace
 
 CheckpointWeights::CheckpointWeights(const std::filesystem::path& path) : tensors_(TensorFile::OpenCheckpoint(path)) {}
 

@@ -11,7 +11,8 @@
 /// Where a training's first weights come from.
 namespace evac::train {
 
-/// Parameters of one file by key, strictly: a key that is missing or of another shape is an error.
+/// Parameters of one file by key: a key that is missing or of another shape is an error. Keys that nobody asks for are
+/// no concern of it: CheckStart looks for them (train_world.h).
 class CheckpointWeights final : public nn::ParameterSource {
  public:
   explicit CheckpointWeights(const std::filesystem::path& path);
@@ -50,6 +51,9 @@ class RoutedWeights final : public nn::ParameterSource {
  private:
   std::vector<Route> routes_;
 };
+
+/// The denoiser's weights that grow with what it is shown.
+inline constexpr const char* kFirstLayer = "model.diffusion_model.input_blocks.0.0.weight";
 
 /// The codec of a file that holds it alone or with a whole model.
 inline constexpr const char* kCodecPrefix = "first_stage_model";

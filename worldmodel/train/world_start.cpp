@@ -1,5 +1,8 @@
 #include <algorithm>
+#include <utility>
 
+#include "worldmodel/nn/weight_keys.h"
+#include "worldmodel/nn/weights.h"
 #include "worldmodel/train/train_world.h"
 #include "worldmodel/train/weight_files.h"
 
@@ -24,31 +27,68 @@ void CheckForecast(const nn::ModelConfig& config, const WorldStart& start) {
   if (!config.object_forecast && !start.forecast.empty())
     throw TensorError("the page of sizes has object_forecast: false, wanted true, or no --forecast " +
                       start.forecast.string());
+  if (!config.object_forecast && GivesForecast(start))
+    throw TensorError(start.init.string() +
+                      ": its model has an object_forecast, wanted object_forecast: true on the page of sizes");
   if (config.object_forecast && start.forecast.empty() && !GivesForecast(start))
     throw TensorError("the page of sizes has object_forecast: true and no forecast is given: wanted --forecast, or "
                       "--init with weights that hold one");
 }
 
-void CheckExceptions(const nn::ModelConfig& config, const WorldStart& start) {
-  if (start.init_except.empty()) return;
-  std::vector<std::string> from_others = {kCodecPrefix};
-  if (!start.forecast.empty()) from_others.push_back(nn::kForecastPrefix);
-  const std::vector<nn::ParameterShape> keys = nn::CheckpointKeys(config);
+/// Beginnings of the keys that other files than `init` give.
+std::vector<std::string> FromOthers(const WorldStart& start) {
+  std::vector<std::string> prefixes = {kCodecPrefix};
+  if (!start.forecast.empty()) prefixes.push_back(nn::kForecastPrefix);
+  return prefixes;
+}
+
+/// What is excepted is a key of the page, drawn anew, or one of the file that the page lacks, left behind.
+void CheckExceptions(const nn::ModelConfig& config, const WorldStart& start, const TensorFile& init) {
+  std::vector<std::string> keys;
+  for (nn::ParameterShape& parameter : nn::CheckpointKeys(config)) keys.push_back(std::move(parameter.key));
+  for (const TensorView& tensor : init.tensors()) keys.push_back(tensor.name);
+  const std::vector<std::string> from_others = FromOthers(start);
   for (const std::string& prefix : start.init_except) {
-    const bool begins = std::ranges::any_of(keys, [&](const nn::ParameterShape& parameter) {
-      return parameter.key.starts_with(prefix) && !BeginsWithAny(parameter.key, from_others);
-    });
+    const bool begins = std::ranges::any_of(
+        keys, [&](const std::string& key) { return key.starts_with(prefix) && !BeginsWithAny(key, from_others); });
     if (!begins)
       throw TensorError("--init-except '" + prefix +
                         "' begins no key that --init gives: `evac weights inspect --list` says them");
   }
 }
 
+/// What is neither excepted nor given by others fits key by key, as a network's file does: what the page has no use for
+/// would be left behind without a word, and the rest be another network than the one that was trained.
+void CheckKeys(const nn::ModelConfig& config, const WorldStart& start, const TensorFile& init) {
+  std::vector<std::string> aside = FromOthers(start);
+  aside.insert(aside.end(), start.init_except.begin(), start.init_except.end());
+  nn::KeyFit fit = nn::CompareKeys(init, config);
+  for (std::vector<std::string>* complaints : {&fit.missing, &fit.extra, &fit.misshapen})
+    std::erase_if(*complaints, [&](const std::string& complaint) { return BeginsWithAny(complaint, aside); });
+  if (start.init_widen)  // WidenedWeights says what of it does not fit
+    std::erase_if(fit.misshapen, [](const std::string& complaint) { return complaint.starts_with(kFirstLayer); });
+  if (!fit.Fits())
+    throw TensorError(init.name() + " does not fit the page of sizes: " + fit.Complaint() +
+                      " (--init-except PREFIX leaves out what is not to be taken over)");
+}
+
+/// Weights know the noise that they learned from.
+void CheckSchedule(const nn::ModelConfig& config, const WorldStart& start, const nn::MappedTensors& init) {
+  for (const char* buffer : {"alphas_cumprod", "scale_arr"}) {
+    if (BeginsWithAny(buffer, start.init_except)) return;
+  }
+  nn::CompareSchedule(init, config);
+}
+
 }  // namespace
 
 void CheckStart(const nn::ModelConfig& config, const WorldStart& start) {
   CheckForecast(config, start);
-  CheckExceptions(config, start);
+  if (start.init.empty()) return;
+  const nn::MappedTensors init(TensorFile::OpenCheckpoint(start.init));
+  CheckExceptions(config, start, init.file());
+  CheckKeys(config, start, init.file());
+  CheckSchedule(config, start, init);
 }
 
 }  // namespace evac::train

@@ -7,6 +7,7 @@
 #include "worldmodel/nn/hand_views.h"
 #include "worldmodel/nn/weight_keys.h"
 #include "worldmodel/train/forecast_training.h"
+#include "worldmodel/train/option_limits.h"
 #include "worldmodel/train/reach.h"
 
 namespace evac::train {
@@ -24,8 +25,30 @@ Tensor PerRow(const std::vector<float>& values, std::int64_t dims) {
   return at::tensor(values).reshape(shape);
 }
 
+void CheckRanges(const WorldTrainingOptions& o) {
+  constexpr const char* kTraining = "world training";
+  RequireShares(kTraining, {{"rollout_share", o.windows.rollout_share},
+                            {"contact_share", o.windows.contact_share},
+                            {"closing_share", o.windows.closing_share},
+                            {"opening_share", o.windows.opening_share},
+                            {"drop", o.drop},
+                            {"memory_noise_share", o.memory_noise_share},
+                            {"terminal_share", o.terminal_share},
+                            {"self_memory_share", o.self_memory_share},
+                            {"self_memory_from", o.self_memory_from}});
+  RequireWeights(kTraining, {{"memory_noise", o.memory_noise},
+                             {"squared_below", o.squared_below},
+                             {"reach_weight", o.reach_weight},
+                             {"object_weight", o.object_weight},
+                             {"change_weight", o.change_weight}});
+  RequireAboveZero(kTraining, {{"object_radius", o.object_radius}, {"step_weight_cap", o.step_weight_cap}});
+}
+
 void Check(const WorldTrainingOptions& o, const nn::ModelConfig& config) {
   if (o.batch < 1) throw TensorError("world training: batch is " + std::to_string(o.batch) + ", wanted at least 1");
+  if (config.schedule.zero_terminal_snr && config.schedule.steps < 2)  // the one step would be all noise and none
+    throw TensorError("world training: schedule.steps is " + std::to_string(config.schedule.steps) +
+                      ", wanted at least 2 with zero_terminal_snr");
   if (o.windows.chunk != config.chunk || o.windows.memory != config.memory)
     throw TensorError("world training: windows of " + std::to_string(o.windows.memory) + " + " +
                       std::to_string(o.windows.chunk) + " frames, the model has " + std::to_string(config.memory) +
@@ -37,8 +60,7 @@ void Check(const WorldTrainingOptions& o, const nn::ModelConfig& config) {
   if (o.self_memory_chunks < 1)
     throw TensorError("world training: self_memory_chunks is " + std::to_string(o.self_memory_chunks) +
                       ", wanted at least 1");
-  if (!(o.squared_below >= 0))
-    throw TensorError("world training: squared_below is " + std::to_string(o.squared_below) + ", wanted 0 or more");
+  CheckRanges(o);
   if (o.log_uniform && !(o.ratio_from > 0 && o.ratio_to > o.ratio_from))
     throw TensorError("world training: noise / signal from " + std::to_string(o.ratio_from) + " to " +
                       std::to_string(o.ratio_to) + ", wanted 0 < from < to");

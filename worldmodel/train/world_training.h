@@ -64,6 +64,7 @@ std::vector<NamedTensor> TrainedParameters(const TrainableWeights& weights, cons
 class WorldTraining {
  public:
   /// @param model  made from weights that are trained; it must outlive this, and so must the shards
+  /// @throws TensorError for options that make no training, or that are out of range (option_limits.h)
   WorldTraining(const nn::EvacModel& model, const ShardSet& shards, const WorldTrainingOptions& options);
 
   /// The loss at a place.
