@@ -5,6 +5,7 @@
 #include "core/npy.h"
 #include "core/store.h"
 #include "core/store_codec.h"
+#include "tests/fuzz/small_shards.h"
 #include "tests/support/synthetic_recording.h"
 
 namespace {
@@ -65,6 +66,22 @@ void MakePageSeeds(const fs::path& folder) {
   }
 }
 
+/// One of each file of a packing, after the number that says which it is (shards_fuzz.cpp), and a first shard held out.
+void MakeShardSeeds(const fs::path& folder) {
+  const fs::path packing = folder / "packing";
+  const auto seed = [&](const char* name, const char kind, const char* file) {
+    evac::WriteText(folder / name, kind + evac::ReadFile(packing / file));
+  };
+  WriteSmallShards(packing, "holdout");
+  seed("holdout", 0, "shard_00000.safetensors");
+  WriteSmallShards(packing);
+  seed("train", 0, "shard_00000.safetensors");
+  seed("latents", 1, "latents_00000.safetensors");
+  seed("variants", 2, "variants_00000.safetensors");
+  seed("list", 3, "shards.json");
+  fs::remove_all(packing);
+}
+
 /// CORPUS/npy_fuzz: one array per type. CORPUS/recording_fuzz: a camera's pages and a collection's row, each after the
 /// letter that says which it is. CORPUS/proprio_fuzz and CORPUS/video_fuzz: a track and a video of four steps.
 void MakeCorpus(const fs::path& corpus) {
@@ -86,6 +103,7 @@ void MakeCorpus(const fs::path& corpus) {
   fs::remove_all(clip);
   MakeStoreSeeds(corpus / "store_fuzz");
   MakePageSeeds(corpus / "suite_fuzz");
+  MakeShardSeeds(corpus / "shards_fuzz");
   evac::WriteText(corpus / "weights_card_fuzz/desk",
                   "0.1\n" + evac::ReadFile(EVAC_SOURCE_DIR "/worldmodel/weights/desk/statistics.yaml"));
 }

@@ -54,6 +54,12 @@ TEST(ShardSet, AShardOfNoClipsIsRefused) {
                   "clip_start has " + std::to_string(numbers) + " numbers, wanted at least 2");
 }
 
+TEST(ShardSet, PicturesOfNoViewsOrPixelsAreRefused) {
+  for (const std::int64_t side : {1, 2, 3})
+    ExpectRefused(Of("frames", [&](Tensor& t) { t = t.narrow(side, 0, 0); }), {},
+                  "wanted at least one view of at least one pixel");
+}
+
 TEST(ShardSet, CamerasThatAreNotOnePerViewAreRefused) {
   for (const char* cameras : {"", "head", "head,hand_right,hand_left"})
     ExpectRefused(kNothing, {{"cameras", cameras}},

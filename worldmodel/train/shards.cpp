@@ -71,6 +71,9 @@ Shard Read(const std::filesystem::path& path, const nn::MappedTensors& file) {
   shard.path = path;
   shard.frames = Checked(file, "frames", at::kByte, {-1, -1, -1, -1, 3});
   const std::int64_t f = shard.frames.size(0), v = shard.frames.size(1);
+  if (v < 1 || shard.frames.size(2) < 1 || shard.frames.size(3) < 1)
+    throw TensorError(path.string() + ": frames is " + nn::ShapeText(shard.frames.sizes()) +
+                      ", wanted at least one view of at least one pixel");
   shard.maps = Checked(file, "maps", at::kByte, shard.frames.sizes());
   shard.clip_start = Checked(file, "clip_start", at::kLong, {-1});
   const std::int64_t clips = shard.clip_start.size(0) - 1;

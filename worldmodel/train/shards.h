@@ -53,8 +53,8 @@ class ShardSet {
  public:
   /// @throws TensorError naming the file and what was found and wanted: packing not done, shards that are missing, none of
   ///   this split, a tensor that is missing or misshapen, another version, shards of different pictures, periods, cameras,
-  ///   statistics or kinds of arms; a shard of no clips, with other than one camera's name per view, with unknown arms,
-  ///   with an outcome that is none, or with actions, deltas, c2w or k that are not finite
+  ///   statistics or kinds of arms; a shard of no clips or of pictures without a pixel, with other than one camera's name
+  ///   per view, with unknown arms, with an outcome that is none, or with actions, deltas, c2w or k that are not finite
   ShardSet(const ShardFolders& folders, Split split);
   ShardSet(const std::filesystem::path& folder, Split split) : ShardSet(ShardFolders{folder}, split) {}
 
