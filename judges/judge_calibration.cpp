@@ -14,12 +14,6 @@ using Verdicts = std::map<std::string, Verdict>;  // of one episode, by judge
 
 bool IsDecided(Label label) { return label == Label::kSuccess || label == Label::kFailure; }
 
-void Add(const JudgedItem& item, Confusion& confusion) {
-  const bool judge = item.judge == Label::kSuccess, truth = item.truth == Label::kSuccess;
-  ++(judge ? (truth ? confusion.both_success : confusion.only_judge_success)
-           : (truth ? confusion.only_human_success : confusion.both_failure));
-}
-
 JudgeQualityRow RowOf(const std::vector<JudgedItem>& items, const std::string& kind, const std::string& name,
                       std::string JudgedItem::*field) {
   return QualityOn(items, kind + " " + name, [&](const JudgedItem& item) { return item.*field == name; });
@@ -45,6 +39,9 @@ std::vector<std::string> Missing(const std::vector<JudgedItem>& items, const Jud
       missing.push_back(fmt::format("{}: {} successes and {} failures, wanted {} items with {} of each", row.group,
                                     successes, failures, wanted.min_items_per_task, wanted.min_per_class));
   }
+  const Estimate kappa = QualityOn(items, "all", [](const JudgedItem&) { return true; }).statistics.kappa;
+  if (kappa.value && *kappa.value < 1 && !kappa.interval)  // a judge that never erred has no spread to see
+    missing.push_back(fmt::format("how far kappa can be believed: {}", kappa.interval.reason()));
   return missing;
 }
 
@@ -152,7 +149,7 @@ std::vector<JudgedItem> JudgedItems(const Store& store, const std::string& judge
     const Verdict& its = verdicts->second.at(judge);
     items.push_back({pair.task, pair.policy + "@" + pair.checkpoint, episode.key.world,
                      real_worlds.contains(episode.key.world), its.label, verdicts->second.at(truth).label,
-                     its.probability});
+                     its.probability, pair.initial_state});
   }
   return items;
 }
@@ -162,17 +159,19 @@ JudgeQualityRow QualityOn(const std::vector<JudgedItem>& items, const std::strin
   JudgeQualityRow row{.group = group};
   std::vector<double> probabilities;
   std::vector<int> outcomes;
+  ConfusionByState states;
   for (const JudgedItem& item : items) {
     if (!is_in(item) || !IsDecided(item.truth)) continue;
     row.errors += item.judge == Label::kInvalid;
     row.cannot_tell += item.judge == Label::kCannotTell;
     if (!IsDecided(item.judge)) continue;
-    Add(item, row.confusion);
+    states[{item.task, item.initial_state}].Add(item.judge == Label::kSuccess, item.truth == Label::kSuccess);
     if (!item.probability) continue;
     probabilities.push_back(*item.probability);
     outcomes.push_back(item.truth == Label::kSuccess);
   }
-  row.statistics = StatisticsOf(row.confusion);
+  row.confusion = SumOf(states);
+  row.statistics = StatisticsByState(states);
   row.calibration = CalibrationOf(probabilities, outcomes);
   return row;
 }

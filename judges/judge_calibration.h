@@ -18,6 +18,7 @@ struct JudgedItem {
   bool is_real = false;             ///< of a real world's clip; else of a simulated or imagined one
   Label judge = Label::kCannotTell, truth = Label::kCannotTell;
   std::optional<double> probability{};  ///< of success, as the judge gave it
+  std::string initial_state{};          ///< kappa's interval holds over others
 };
 
 /// Every episode that has a current verdict of both.

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <functional>
 #include <map>
 #include <set>
 
@@ -17,17 +18,21 @@ constexpr double kGain_db = 2;  ///< over a still picture, for a chunk to be of 
 constexpr const char* kReal = "real";
 
 /// Outcomes of rows that have one in both columns.
-Confusion ConfusionOf(const std::vector<FidelityRow>& rows, const std::string& kind, FidelityColumn column) {
-  Confusion confusion;
+ConfusionByState ConfusionsOf(const std::vector<FidelityRow>& rows, const std::string& kind, FidelityColumn column) {
+  ConfusionByState states;
   for (const FidelityRow& row : rows) {
     const std::optional<bool>& said = column == FidelityColumn::kAgain ? row.again : row.model;
     if (row.kind != kind || !row.real || !said) continue;
-    confusion.both_success += *row.real && *said;
-    confusion.only_judge_success += !*row.real && *said;
-    confusion.only_human_success += *row.real && !*said;
-    confusion.both_failure += !*row.real && !*said;
+    states[{row.pair.task, row.pair.initial_state}].Add(*said, *row.real);
   }
-  return confusion;
+  return states;
+}
+
+/// How many there are of some items, in each state.
+std::vector<Count> CountsOf(const ConfusionByState& states, const std::function<Count(const Confusion&)>& of) {
+  std::vector<Count> counts;
+  for (const auto& [state, confusion] : states) counts.push_back(of(confusion));
+  return counts;
 }
 
 /// Of whose imagined clip the judge could tell how it ended.
@@ -142,24 +147,27 @@ std::optional<std::int64_t> UsableHorizon(const std::vector<ChunkDrift>& chunks)
 }  // namespace
 
 OutcomeMatch MatchOf(const std::vector<FidelityRow>& rows, const std::string& kind, FidelityColumn column) {
-  const Confusion confusion = ConfusionOf(rows, kind, column);
+  const ConfusionByState states = ConfusionsOf(rows, kind, column);
   OutcomeMatch match;
   match.asked = std::ranges::count(rows, kind, &FidelityRow::kind);
-  match.n = confusion.total();
-  const auto rate = [&match](std::int64_t count, std::int64_t of, const char* none) {
-    if (of > 0) return WilsonInterval(count, of);
+  match.n = SumOf(states).total();
+  const auto rate = [&](const std::function<Count(const Confusion&)>& of, const char* none) {
+    const std::vector<Count> counts = CountsOf(states, of);
+    if (SumOf(counts).trials > 0) return ClusteredWilsonInterval(counts);
     const Undefined why{match.asked == 0 ? "nothing was asked" : match.n == 0 ? "no pairs" : none};
     Estimate estimate;
     estimate.value = why;
     estimate.interval = why;
     return estimate;
   };
-  const std::int64_t failed = confusion.only_judge_success + confusion.both_failure,
-                     succeeded = confusion.only_human_success + confusion.both_success;
-  match.agreement = rate(confusion.both_success + confusion.both_failure, match.n, "no pairs");
-  match.hallucinated = rate(confusion.only_judge_success, failed, "nothing truly failed");
-  match.missed = rate(confusion.only_human_success, succeeded, "nothing truly succeeded");
-  match.kappa = StatisticsOf(confusion).kappa;
+  match.agreement = rate([](const Confusion& c) { return Count{c.both_success + c.both_failure, c.total()}; }, "no pairs");
+  match.hallucinated = rate(
+      [](const Confusion& c) { return Count{c.only_judge_success, c.only_judge_success + c.both_failure}; },
+      "nothing truly failed");
+  match.missed = rate(
+      [](const Confusion& c) { return Count{c.only_human_success, c.only_human_success + c.both_success}; },
+      "nothing truly succeeded");
+  match.kappa = StatisticsByState(states).kappa;
   return match;
 }
 

@@ -76,7 +76,8 @@ struct FidelityCell {
          agreement = Undefined{"no pairs"};
 };
 
-/// How often two columns of outcomes agree, and how they do not.
+/// How often two columns of outcomes agree, and how they do not. Intervals are of other initial states: what policies do
+/// in one state counts by its design effect (ClusteredWilsonInterval, StatisticsByState).
 struct OutcomeMatch {
   std::int64_t asked = 0;  ///< rows of that kind
   std::int64_t n = 0;      ///< of those, with an outcome in both columns: all else is over these

@@ -74,7 +74,7 @@ std::string MatchTable(const Fidelity& fidelity) {
   for (const Fidelity::Counterfactual& one : fidelity.counterfactuals) rows += MatchRow(one.kind, one.match);
   return TableHead({"what was asked", "pairs", "agreement", "hallucinated", "missed", "kappa"}) + rows + "</tbody></table></div>" +
          WhereItGoesWrong(fidelity) + "<p class=\"quiet\">Hallucinated: imagined success of what truly failed. Missed: imagined failure of what truly "
-         "succeeded. Intervals: Wilson, 95 %.</p>";
+         "succeeded. Intervals: 95 %, Wilson on as many trials as the initial states are worth; of kappa, by initial state.</p>";
 }
 
 std::string CellTable(const Fidelity& fidelity) {

@@ -83,9 +83,7 @@ void Describe(const GateRule& rule, const Estimate& difference, std::int64_t n, 
 
 /// The difference of the pairs, its interval on their effective number.
 Estimate DifferenceOf(const GatePairs& pairs, double confidence) {
-  Estimate difference = TangoDifference(pairs.effective, confidence);
-  difference.value = TangoDifference(pairs.all, confidence).value;
-  difference.n = pairs.all.pairs;
+  Estimate difference = TangoOfClusters(pairs.all, pairs.effective, confidence);
   difference.method = OnPairs("Tango", {pairs.all.pairs, pairs.effective.pairs});
   return difference;
 }

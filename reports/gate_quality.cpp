@@ -121,7 +121,7 @@ void HoldKappa(const GateRule& rule, const RunSummary& run, const GateSides& sid
   if (std::ranges::find(run.judges, rule.against) == run.judges.end())
     throw InvalidInput("gate rule '{}': against: found '{}', wanted a judge of the run: {}", rule.name, rule.against,
                        fmt::join(run.judges, ", "));
-  Confusion table;
+  ConfusionByState states;
   for (const JudgedEpisode& judged : run.episodes) {
     const EpisodeKey& key = judged.episode.key;
     if (key.world != sides.world || (!rule.task.empty() && key.pair.task != rule.task) || !judged.Counts()) continue;
@@ -130,11 +130,10 @@ void HoldKappa(const GateRule& rule, const RunSummary& run, const GateSides& sid
     if (other == verdicts->second.end()) continue;
     const Label label = other->second.label;
     if (label != Label::kSuccess && label != Label::kFailure) continue;
-    const bool one = judged.outcome == Outcome::kSuccess, two = label == Label::kSuccess;
-    ++(one ? (two ? table.both_success : table.only_judge_success)
-           : (two ? table.only_human_success : table.both_failure));
+    states[{key.pair.task, key.pair.initial_state}].Add(judged.outcome == Outcome::kSuccess, label == Label::kSuccess);
   }
-  const auto kappa = [=](double confidence) { return StatisticsOf(table, confidence).kappa; };
+  const Confusion table = SumOf(states);
+  const auto kappa = [&](double confidence) { return StatisticsByState(states, confidence).kappa; };
   Hold(rule, {kappa(1 - 2 * rule.alpha), [=](double c) { return kappa(c).interval; }, *rule.at_least}, evidence);
   RuleDecision& decision = evidence.decision;
   decision.policy.clear();

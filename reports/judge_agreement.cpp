@@ -7,6 +7,7 @@
 #include "core/statistics/rate_difference.h"
 #include "core/statistics/rater_agreement.h"
 #include "reports/counted_judges.h"
+#include "reports/wording.h"
 
 namespace evac {
 namespace {
@@ -25,24 +26,34 @@ std::string TruthOf(const RunSummary& summary) {
 
 bool Decides(const Verdict& verdict) { return verdict.label == Label::kSuccess || verdict.label == Label::kFailure; }
 
-struct Probabilities {
-  std::vector<double> stated;
-  std::vector<int> outcomes;
+/// What a judge and the truth said of the episodes of one world.
+struct Said {
+  ConfusionByState states;
+  std::vector<double> probabilities;  ///< where the judge gave one, and
+  std::vector<int> outcomes;          ///< what truly happened
+  std::int64_t apart = 0;
+
+  void Add(const PairKey& pair, const Verdict& verdict, const Verdict& truth) {
+    if (!Decides(verdict) || !Decides(truth)) {
+      ++apart;
+      return;
+    }
+    const bool is = truth.label == Label::kSuccess;
+    states[{pair.task, pair.initial_state}].Add(verdict.label == Label::kSuccess, is);
+    if (!verdict.probability) return;
+    probabilities.push_back(*verdict.probability);
+    outcomes.push_back(is ? 1 : 0);
+  }
 };
 
-void Count(const Verdict& verdict, const Verdict& truth, JudgeAgreement& agreement, Probabilities& probabilities) {
-  if (!Decides(verdict) || !Decides(truth)) {
-    ++agreement.apart;
-    return;
-  }
-  const bool said = verdict.label == Label::kSuccess, is = truth.label == Label::kSuccess;
-  agreement.confusion.both_success += said && is;
-  agreement.confusion.only_judge_success += said && !is;
-  agreement.confusion.only_human_success += !said && is;
-  agreement.confusion.both_failure += !said && !is;
-  if (!verdict.probability) return;
-  probabilities.stated.push_back(*verdict.probability);
-  probabilities.outcomes.push_back(is ? 1 : 0);
+/// Its interval holds over other initial states, as kappa's does.
+Estimate BiasOf(const ConfusionByState& states, double confidence) {
+  std::vector<PairedOutcomes> clusters;
+  for (const auto& [state, c] : states) clusters.push_back({{c.only_judge_success, c.only_human_success}, c.total()});
+  const PairedOutcomes all = SumOf(clusters), effective = EffectivePairs(clusters);
+  Estimate bias = TangoOfClusters(all, effective, confidence);
+  bias.method = OnPairs("Tango", {all.pairs, effective.pairs});
+  return bias;
 }
 
 JudgeAgreement AgreementOf(const RunSummary& summary, const std::string& judge, const std::string& truth,
@@ -51,7 +62,7 @@ JudgeAgreement AgreementOf(const RunSummary& summary, const std::string& judge, 
   agreement.judge = judge;
   agreement.against = truth;
   agreement.world = world;
-  Probabilities probabilities;
+  Said said;
   for (const Episode& episode : summary.data.episodes) {
     if (episode.key.world != world) continue;
     const auto verdicts = summary.data.verdicts.find(episode.key.Id());
@@ -59,15 +70,14 @@ JudgeAgreement AgreementOf(const RunSummary& summary, const std::string& judge, 
     const auto own = verdicts->second.find(judge), true_one = verdicts->second.find(truth);
     if (own == verdicts->second.end()) continue;
     ++agreement.judged;
-    if (true_one != verdicts->second.end()) Count(own->second, true_one->second, agreement, probabilities);
+    if (true_one != verdicts->second.end()) said.Add(episode.key.pair, own->second, true_one->second);
   }
-  agreement.with_probability = static_cast<std::int64_t>(probabilities.stated.size());
-  const Confusion& confusion = agreement.confusion;
-  agreement.statistics = StatisticsOf(confusion, summary.options.confidence);
-  agreement.bias = TangoDifference({{confusion.only_judge_success, confusion.only_human_success}, confusion.total()},
-                                   summary.options.confidence);
-  if (!probabilities.stated.empty())
-    agreement.calibration = CalibrationOf(probabilities.stated, probabilities.outcomes);
+  agreement.apart = said.apart;
+  agreement.confusion = SumOf(said.states);
+  agreement.with_probability = std::ssize(said.probabilities);
+  agreement.statistics = StatisticsByState(said.states, summary.options.confidence);
+  agreement.bias = BiasOf(said.states, summary.options.confidence);
+  if (!said.probabilities.empty()) agreement.calibration = CalibrationOf(said.probabilities, said.outcomes);
   return agreement;
 }
 

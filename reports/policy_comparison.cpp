@@ -136,10 +136,7 @@ void ComparePaired(const Side& first, const Side& second, const ComparisonOption
   row.first = RateOfSide(SharedPart(first, second), options.confidence());
   row.second = RateOfSide(SharedPart(second, first), options.confidence());
   const PairedOutcomes effective = EffectivePairsOf(first, second);
-  const Number seen = TangoDifference({row.flips, row.shared}, options.confidence()).value;
-  row.difference = TangoDifference(effective, options.confidence());
-  row.difference.value = seen;
-  row.difference.n = row.shared;
+  row.difference = TangoOfClusters({row.flips, row.shared}, effective, options.confidence());
   row.pairs = {row.shared, effective.pairs};
   row.difference.method = OnPairs("Tango", row.pairs);
   row.test = OnPairs("exact McNemar", row.pairs);

@@ -107,6 +107,17 @@ std::map<std::string, BothWorlds> TablesOf(const PairsByState& pairs) {
   return tables;
 }
 
+/// The model as judge of what the robot would do.
+ConfusionByState ConfusionsOf(const std::string& task, const std::map<std::string, BothWorlds>& tables) {
+  ConfusionByState states;
+  for (const auto& [state, table] : tables)
+    states[{task, state}] = {.both_success = table.both,
+                             .only_judge_success = table.only_model,
+                             .only_human_success = table.only_real,
+                             .both_failure = table.neither};
+  return states;
+}
+
 PairedOutcomes EffectiveOf(const std::map<std::string, BothWorlds>& tables) {
   std::vector<PairedOutcomes> clusters;
   for (const auto& [state, table] : tables) clusters.push_back({{table.only_model, table.only_real}, table.n()});
@@ -227,10 +238,7 @@ void AddRates(const std::map<std::string, BothWorlds>& tables, double confidence
 /// model - real and its test, on the effective number of pairs.
 void AddBias(const std::map<std::string, BothWorlds>& tables, double confidence, TaskTrust& task) {
   const PairedOutcomes effective = EffectiveOf(tables);
-  const Flips flips{task.pairs.only_model, task.pairs.only_real};
-  task.bias = TangoDifference(effective, confidence);
-  task.bias.value = TangoDifference({flips, task.pairs.n()}, confidence).value;
-  task.bias.n = task.pairs.n();
+  task.bias = TangoOfClusters({{task.pairs.only_model, task.pairs.only_real}, task.pairs.n()}, effective, confidence);
   task.bias.method = OnPairs("Tango", {task.pairs.n(), effective.pairs});
   task.test = McNemarExact(effective.flips);
   task.effective_pairs = effective.pairs;
@@ -277,14 +285,9 @@ TaskTrust TrustTask(const std::string& name, const ByState& real, const ByState&
     task.pairs.only_model += table.only_model;
     task.pairs.neither += table.neither;
   }
-  const auto [both, only_real, only_model, neither] = task.pairs;
   AddRates(tables, options.confidence, task);
   AddBias(tables, options.confidence, task);
-  task.agreement = StatisticsOf({.both_success = both,
-                                 .only_judge_success = only_model,
-                                 .only_human_success = only_real,
-                                 .both_failure = neither},
-                                options.confidence);
+  task.agreement = StatisticsByState(ConfusionsOf(name, tables), options.confidence);
   for (const std::string& policy : policies) {
     PredictedRate& rate = task.policies.emplace_back(Predict(policy, paired, options));
     rate.real = ClusteredWilsonInterval(CountsOf(real, policy), options.confidence);

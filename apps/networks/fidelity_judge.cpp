@@ -122,11 +122,9 @@ JudgeQualityOnReal FidelityJudge::QualityOn(Store& store, const std::string& wor
 
   std::vector<double> probabilities;
   std::vector<int> truths;
-  Confusion plain, masked;
-  const auto count = [](std::optional<bool> said, bool truth, Confusion& confusion) {
-    if (!said) return;
-    ++(*said ? truth ? confusion.both_success : confusion.only_judge_success
-             : truth ? confusion.only_human_success : confusion.both_failure);
+  ConfusionByState plain, masked;
+  const auto count = [](std::optional<bool> said, bool truth, const PairKey& pair, ConfusionByState& states) {
+    if (said) states[{pair.task, pair.initial_state}].Add(*said, truth);
   };
   const auto verdicts = store.CurrentVerdicts();
   for (const Episode& episode : store.Episodes()) {
@@ -137,13 +135,13 @@ JudgeQualityOnReal FidelityJudge::QualityOn(Store& store, const std::string& wor
     const Verdict& said = of_episode.at(name_);
     probabilities.push_back(*said.probability);
     truths.push_back(*truth);
-    count(OutcomeOf(said.label), *truth, plain);
-    count(SaidBy(masked_judge.Name(), of_episode), *truth, masked);
+    count(OutcomeOf(said.label), *truth, episode.key.pair, plain);
+    count(SaidBy(masked_judge.Name(), of_episode), *truth, episode.key.pair, masked);
   }
   quality.auroc = AreaUnderRoc(probabilities, truths);
   quality.ece = CalibrationOf(probabilities, truths).ece;
-  quality.kappa = StatisticsOf(plain).kappa;
-  quality.kappa_masked = StatisticsOf(masked).kappa.value;
+  quality.kappa = StatisticsByState(plain).kappa;
+  quality.kappa_masked = StatisticsByState(masked).kappa.value;
   return quality;
 }
 

@@ -96,11 +96,11 @@ int LibraryThreadsOf(const train::JobPlace& place, const train::JobOptions& opti
 
 ExitCode End(const train::TrainerSummary& summary, const std::filesystem::path& out, const char* file) {
   if (!summary.IsDone()) {
-    fmt::print(stderr, "interrupted at step {} of {}: the same command goes on from there\n", summary.step,
-               summary.steps);
+    fmt::print(stderr, "interrupted at step {}{}: the same command goes on from there\n", summary.step,
+               summary.steps > 0 ? fmt::format(" of {}", summary.steps) : "");
     return ExitCode::kInternal;
   }
-  if (summary.steps_now == 0 && summary.step >= summary.steps)
+  if (summary.steps_now == 0 && summary.steps > 0 && summary.step >= summary.steps)
     fmt::print(stderr,
                "nothing was left to do: the training in {} is planned for {} steps and has done them; more --steps go "
                "on for longer\n",

@@ -155,8 +155,9 @@ std::string MarksOf(const JudgeClipSource& learn, const std::filesystem::path& i
   return Joined(marks);
 }
 
+/// @param steps  TrainerSummary::CardOfSteps
 TensorMetadata CardText(const Judged& judged, const JudgeData& data, const JudgeTrainingOptions& options,
-                        std::int64_t steps) {
+                        const TensorMetadata& steps) {
   const JudgeClipSource& learn = data.learn;
   const auto number = [](double value) { return fmt::format("{:.6g}", value); };
   TensorMetadata card = {{"format", kClassifierFormat},
@@ -170,13 +171,13 @@ TensorMetadata CardText(const Judged& judged, const JudgeData& data, const Judge
                          {"unsure", number(judged.card.unsure)},
                          {"recipe", learn.recipe},
                          {"seed", std::to_string(options.job.trainer.seed)},
-                         {"steps", std::to_string(steps)},
                          {"holdout_clips", std::to_string(judged.whole.clips)},
                          {"auroc", number(judged.whole.auroc)},
                          {"kappa", number(judged.whole.kappa)},
                          {"ece", number(judged.whole.ece)},
                          {"kappa_first_view", number(judged.first_view.kappa)},
                          {"licence", "as the project"}};
+  card.insert(steps.begin(), steps.end());
   if (options.looks > 1) card["looks"] = std::to_string(options.looks);
   if (judged.masked) card["kappa_masked"] = number(judged.masked->kappa);
   if (const std::string marks = MarksOf(learn, data.init); !marks.empty()) card["learned_from"] = marks;
@@ -213,7 +214,7 @@ void CalibrateJudge(const train::JobPlace& place, const JudgeTrainingOptions& op
   const Learners<ClassifierNet> learners(shape, options.job.trainer.seed, 1, BeginningOf(place, shape, options, data.init));
   const Judged judged = MeasureAll(learners.net(), data, data.learn.clips, options);
   Say(place, judged);
-  Write(place, learners, judged, data, CardText(judged, data, options, 0));
+  Write(place, learners, judged, data, CardText(judged, data, options, {{"steps", "0"}}));
 }
 
 train::TrainerSummary TrainJudge(const train::JobPlace& place, const JudgeTrainingOptions& given,
@@ -246,7 +247,7 @@ train::TrainerSummary TrainJudge(const train::JobPlace& place, const JudgeTraini
   trainer.WithBest([&] {
     const Judged judged = MeasureAll(net, data, split.calibration, options);
     Say(place, judged);
-    Write(place, learners, judged, data, CardText(judged, data, options, summary.step));
+    Write(place, learners, judged, data, CardText(judged, data, options, summary.CardOfSteps()));
   });
   return summary;
 }

@@ -67,12 +67,12 @@ train::TrainerSummary TrainPolicy(const train::JobPlace& place, const PolicyOpti
   const auto loss = [&](const LearnedNet& of, const train::StepPlace& at) { return training.Loss(of, at); };
   learners.Replicate(trainer, loss);
   const auto measure = [&] { return measuring.Measure(net, kMeasuredMoments); };
-  const auto write = [&](const std::string& file, std::int64_t step) {
-    card["steps"] = std::to_string(step);
-    card["holdout"] = fmt::format("{:.6g}", measure());
-    learners.Write(place.out / file, card);
+  const auto write = [&](const std::string& file, TensorMetadata steps) {
+    steps.insert(card.begin(), card.end());
+    steps["holdout"] = fmt::format("{:.6g}", measure());
+    learners.Write(place.out / file, steps);
   };
-  const auto keep = [&](std::int64_t step) { write(KeptFile(step), step); };
+  const auto keep = [&](std::int64_t step) { write(KeptFile(step), {{"steps", std::to_string(step)}}); };
   const train::TrainerSummary summary = trainer.Run({.loss = [&](const train::StepPlace& at) { return loss(net, at); },
                                                      .holdout = measure,
                                                      .keep_steps = keep_steps,
@@ -80,7 +80,7 @@ train::TrainerSummary TrainPolicy(const train::JobPlace& place, const PolicyOpti
                                                      .interrupted = place.interrupted,
                                                      .on_progress = place.on_progress});
   if (!summary.IsDone()) return summary;
-  trainer.WithBest([&] { write("policy.safetensors", summary.step); });
+  trainer.WithBest([&] { write("policy.safetensors", summary.CardOfSteps()); });
   return summary;
 }
 

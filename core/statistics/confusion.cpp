@@ -58,6 +58,46 @@ void AddKappa(const Confusion& confusion, double confidence, ConfusionStatistics
   result.kappa.interval = Interval{std::max(-1.0, kappa - z * se), std::min(1.0, kappa + z * se)};
 }
 
+/// By how much an item moves kappa, times n: kappa's derivative at the shares (what FCE's variance is the mean square of).
+double Influence(const Shares& s, double chance, bool judge, bool human) {
+  const double agreement = s.both + s.neither;
+  const double more_agreement = (judge == human ? 1 : 0) - agreement;
+  const double more_chance =
+      ((judge ? 1 : 0) - s.judge) * (2 * s.human - 1) + ((human ? 1 : 0) - s.human) * (2 * s.judge - 1);
+  return (more_agreement * (1 - chance) - (1 - agreement) * more_chance) / ((1 - chance) * (1 - chance));
+}
+
+/// Of kappa, from the states' sums of influences; undefined where they cannot show it.
+Number StateSe(const ConfusionByState& states, const Confusion& all, double chance) {
+  const Shares shares(all);
+  double squares = 0, groups = 0;
+  for (const auto& [state, c] : states) {
+    if (c.total() == 0) continue;
+    const auto moved = [&](std::int64_t count, bool judge, bool human) {
+      return static_cast<double>(count) * Influence(shares, chance, judge, human);
+    };
+    const double sum = moved(c.both_success, true, true) + moved(c.only_judge_success, true, false) +
+                       moved(c.only_human_success, false, true) + moved(c.both_failure, false, false);
+    squares += sum * sum;
+    ++groups;
+  }
+  if (groups < 2) return Undefined{"all items are of one initial state"};
+  return std::sqrt(groups / (groups - 1) * squares) / static_cast<double>(all.total());
+}
+
+bool HasRepeats(const ConfusionByState& states) {
+  return std::ranges::any_of(states, [](const auto& state) { return state.second.total() > 1; });
+}
+
+std::int64_t StatesWithItems(const ConfusionByState& states) {
+  return std::ranges::count_if(states, [](const auto& state) { return state.second.total() > 0; });
+}
+
+void RequireCounts(const Confusion& c) {
+  if (std::min({c.both_success, c.only_judge_success, c.only_human_success, c.both_failure}) < 0)
+    throw InvalidInput("statistics: a confusion table with a negative count");
+}
+
 void RequireShare(double share, const char* name) {
   if (!(share >= 0 && share <= 1)) throw InvalidInput("statistics: {} is {}, wanted 0 <= {} <= 1", name, share, name);
 }
@@ -79,9 +119,46 @@ void Check(std::span<const double> probabilities, std::span<const int> outcomes,
 
 }  // namespace
 
+void Confusion::Add(bool judge, bool human) {
+  ++(judge ? (human ? both_success : only_judge_success) : (human ? only_human_success : both_failure));
+}
+
+Confusion& Confusion::operator+=(const Confusion& other) {
+  both_success += other.both_success;
+  only_judge_success += other.only_judge_success;
+  only_human_success += other.only_human_success;
+  both_failure += other.both_failure;
+  return *this;
+}
+
+Confusion SumOf(const ConfusionByState& states) {
+  Confusion sum;
+  for (const auto& [state, confusion] : states) sum += confusion;
+  return sum;
+}
+
+ConfusionStatistics StatisticsByState(const ConfusionByState& states, double confidence) {
+  for (const auto& [state, confusion] : states) RequireCounts(confusion);
+  const Confusion all = SumOf(states);
+  ConfusionStatistics result = StatisticsOf(all, confidence);
+  if (!result.kappa.interval || !HasRepeats(states)) return result;
+  result.kappa.method = "linearised by initial state";
+  const Number by_state = StateSe(states, all, *result.chance);
+  if (!by_state) {
+    result.kappa_se = Undefined{by_state.reason()};
+    result.kappa.interval = Undefined{by_state.reason()};
+    return result;
+  }
+  const double kappa = *result.kappa.value, se = std::max(*by_state, *result.kappa_se),
+               t = TwoSidedT(confidence, static_cast<double>(StatesWithItems(states) - 1));
+  result.kappa_se = se;
+  result.kappa.interval = Interval{std::max(-1.0, kappa - t * se), std::min(1.0, kappa + t * se)};
+  return result;
+}
+
 ConfusionStatistics StatisticsOf(const Confusion& confusion, double confidence) {
   const auto [tp, fp, fn, tn] = confusion;
-  if (std::min({tp, fp, fn, tn}) < 0) throw InvalidInput("statistics: a confusion table with a negative count");
+  RequireCounts(confusion);
   TwoSidedZ(confidence);  // complains
   ConfusionStatistics result;
   result.n = confusion.total();

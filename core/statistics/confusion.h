@@ -1,7 +1,10 @@
 #pragma once
 
 #include <cstdint>
+#include <map>
 #include <span>
+#include <string>
+#include <utility>
 
 #include "core/statistics/estimate.h"
 
@@ -15,7 +18,13 @@ struct Confusion {
   std::int64_t only_human_success = 0;  ///< false negatives
   std::int64_t both_failure = 0;        ///< true negatives
   std::int64_t total() const { return both_success + only_judge_success + only_human_success + both_failure; }
+  void Add(bool judge, bool human);  ///< one item: what each said of it
+  Confusion& operator+=(const Confusion& other);
 };
+
+/// Items by task and initial state: clips of one state, by several policies or seeds, tell less than as many others.
+using ConfusionByState = std::map<std::pair<std::string, std::string>, Confusion>;
+Confusion SumOf(const ConfusionByState& states);
 
 /// Each undefined where its denominator is 0.
 struct ConfusionStatistics {
@@ -35,6 +44,11 @@ struct ConfusionStatistics {
 };
 /// @throws InvalidInput if a count is negative or unless 0 < confidence < 1.
 ConfusionStatistics StatisticsOf(const Confusion& confusion, double confidence = 0.95);
+/// The same of the sum, but for kappa's SE and interval, which hold over other initial states of the kind: errors of the
+/// linearised kappa are summed within each of the G states that have items before they are squared (G / (G - 1) times),
+/// never below that of independent items, and the interval takes Student's t of G - 1 degrees. Undefined for one state of
+/// several items; with one item a state, as above.
+ConfusionStatistics StatisticsByState(const ConfusionByState& states, double confidence = 0.95);
 
 /// What a judge with known errors saw, corrected (Rogan & Gladen 1978).
 struct JudgedRate {

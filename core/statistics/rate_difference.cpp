@@ -123,6 +123,13 @@ PairedOutcomes EffectivePairs(std::span<const PairedOutcomes> clusters) {
   return {flips, std::max<std::int64_t>({1, shrunk(total.pairs), flips.only_first + flips.only_second})};
 }
 
+Estimate TangoOfClusters(const PairedOutcomes& all, const PairedOutcomes& effective, double confidence) {
+  Estimate difference = TangoDifference(effective, confidence);
+  difference.value = TangoDifference(all, confidence).value;
+  difference.n = all.pairs;
+  return difference;
+}
+
 Estimate BonettPriceDifference(const PairedOutcomes& outcomes, double confidence) {
   Estimate difference = PairedDifference(outcomes, confidence);
   difference.method = "Bonett-Price";

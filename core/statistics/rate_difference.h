@@ -36,6 +36,10 @@ Estimate TangoDifference(const PairedOutcomes& outcomes, double confidence = 0.9
 /// @param clusters  each one initial state's pairs. @throws InvalidInput for impossible counts.
 PairedOutcomes EffectivePairs(std::span<const PairedOutcomes> clusters);
 
+/// The difference of all pairs with the interval of their effective number.
+/// @param effective  EffectivePairs of the clusters that `all` is the sum of
+Estimate TangoOfClusters(const PairedOutcomes& all, const PairedOutcomes& effective, double confidence = 0.95);
+
 /// Same initial states: Wald's interval with 1 added to each kind of flip and 2 to the pairs (Bonett & Price 2012). The
 /// quick form; its value is that of the data as they are.
 Estimate BonettPriceDifference(const PairedOutcomes& outcomes, double confidence = 0.95);

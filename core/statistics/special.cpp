@@ -82,6 +82,13 @@ double StudentTwoSided(double t, double degrees) {
   return 2 * boost::math::cdf(boost::math::complement(boost::math::students_t(degrees), std::abs(t)));
 }
 
+double TwoSidedT(double confidence, double degrees) {
+  Require(confidence > 0 && confidence < 1, "confidence", confidence, "0 < confidence < 1");
+  Require(degrees > 0 && std::isfinite(degrees), "degrees", degrees, "above 0");
+  return boost::math::quantile(
+      boost::math::complement(boost::math::students_t(degrees), (1 - confidence) / 2));
+}
+
 double FairBinomialCdf(std::int64_t k, std::int64_t n) {
   Require(n >= 0, "n", static_cast<double>(n), "n >= 0");
   Require(k >= 0 && k <= n, "k", static_cast<double>(k), "0 <= k <= n");

@@ -22,6 +22,8 @@ double BetaQuantile(double p, double a, double b);
 double ChiSquareTail(double x, double degrees);
 /// P(|T| > |t|), T Student with `degrees` degrees of freedom. @param degrees > 0.
 double StudentTwoSided(double t, double degrees);
+/// The t with P(|T| <= t) = confidence, of a two-sided interval. @param confidence in (0, 1). @param degrees > 0.
+double TwoSidedT(double confidence, double degrees);
 /// P(X <= k), X ~ Bin(n, 1/2). @param k in [0, n].
 double FairBinomialCdf(std::int64_t k, std::int64_t n);
 /// P(X = k), X ~ Bin(n, p). @param k in [0, n]. @param p in [0, 1].

@@ -64,9 +64,11 @@ TEST_F(TrainJudgeTest, ATinyClassifierTellsClipsApartThatItHasNotSeen) {
   train::JobPlace place = Place("judge");
   std::string said;
   place.say = [&](const std::string& line) { said += line + "\n"; };
-  Train(place, Quick(150));
+  const train::TrainerSummary summary = Train(place, Quick(150));
   EXPECT_THAT(said, Not(HasSubstr("warning")));
   const WeightFile file(folder_ / "judge" / "judge.safetensors", "evac-classifier 1");
+  EXPECT_EQ(file.Text("steps"), "150");
+  EXPECT_EQ(file.Text("best_step"), std::to_string(summary.best_step));
   EXPECT_GT(file.Number("auroc"), 0.95);
   EXPECT_GT(file.Number("kappa"), 0.8);
   EXPECT_LE(file.Number("kappa_masked"), file.Number("kappa"));

@@ -54,6 +54,17 @@ TEST_F(TrainPolicyTest, CheckpointsOfOneTrainingGetBetter) {
   EXPECT_EQ(policy.Spec().period_s, 0.1);
 }
 
+TEST_F(TrainPolicyTest, CardsSayWhichStepTheirWeightsAreOf) {
+  PolicyOptions options = Quick(6);
+  options.job.trainer.holdout_every = 3;
+  const train::TrainerSummary summary = TrainPolicy(Place("policy"), options, nullptr, {2});
+  const auto card = [&](const char* file) { return TensorFile::Open(folder_ / "policy" / file).metadata(); };
+  EXPECT_EQ(card("policy.safetensors").at("steps"), "6");
+  EXPECT_EQ(card("policy.safetensors").at("best_step"), std::to_string(summary.best_step));
+  EXPECT_EQ(card("policy_000002.safetensors").at("steps"), "2");
+  EXPECT_FALSE(card("policy_000002.safetensors").contains("best_step")) << "kept, the best or not";
+}
+
 TEST_F(TrainPolicyTest, InterruptedAndGoneOnWithItEndsInTheSameBytes) {
   TrainPolicy(Place("whole"), Quick(10), nullptr, {4});
   train::JobPlace place = Place("parts");

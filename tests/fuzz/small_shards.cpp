@@ -56,6 +56,8 @@ void WriteShard(const std::filesystem::path& path, const std::string& split, con
                        {"version", "1"},
                        {"split", split},
                        {"period_s", "0.1"},
+                       {"height_px", std::to_string(kSide)},
+                       {"width_px", std::to_string(kSide)},
                        {"cameras", "head"},
                        {"arms", "right"},
                        {"arms_read", "told"},

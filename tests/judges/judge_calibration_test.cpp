@@ -12,13 +12,16 @@ using testing::HasSubstr;
 /// A run of one task in two worlds with verdicts of an oracle and of a judge, one letter an episode: s, f, ?, i.
 class Judged {
  public:
-  Judged(const std::string& world, const std::string& truth, const std::string& judge) { Add(world, truth, judge); }
+  Judged(const std::string& world, const std::string& truth, const std::string& judge, std::size_t states = 1000) {
+    Add(world, truth, judge, states);
+  }
 
-  Judged& Add(const std::string& world, const std::string& truth, const std::string& judge) {
+  /// @param states  of which there are so many, again and again
+  Judged& Add(const std::string& world, const std::string& truth, const std::string& judge, std::size_t states = 1000) {
     store_.AddWorld({world, "mujoco", world == "real", ""});
     for (std::size_t i = 0; i < truth.size(); ++i) {
       EpisodeRecord record;
-      record.episode.key = {{"take", std::to_string(i), "policy", "v1", 1}, world};
+      record.episode.key = {{"take", std::to_string(i % states), "policy", "v1", 1 + i / states}, world};
       record.episode.stop = StopReason::kStill;
       store_.Add(record);
       Say("oracle", record.episode.key, truth[i]);
@@ -86,6 +89,18 @@ TEST(JudgeCalibration, AGoodJudgeIsAccepted) {
   EXPECT_THAT(report.missing, testing::IsEmpty());
   EXPECT_THAT(report.refusals, testing::IsEmpty());
   EXPECT_THAT(Text(report), HasSubstr("a gate may count this judge"));
+}
+
+TEST(JudgeCalibration, ManyClipsOfFewStatesAreNotManyClips) {
+  const std::string truth = Times(50, "sf"), judge = Times(45, "sf") + Times(5, "fs");
+  const auto low = [&](std::size_t states) {
+    return CalibrateJudge(Judged("real", truth, judge, states).store(), "vlm:x", "oracle").rows.front().statistics.kappa;
+  };
+  EXPECT_EQ(*low(100).value, *low(20).value);
+  EXPECT_LT(low(2).interval->low, low(100).interval->low - 0.2) << "Student's t of one degree";
+  const JudgeCalibrationReport one = CalibrateJudge(Judged("real", truth, judge, 1).store(), "vlm:x", "oracle");
+  EXPECT_THAT(one.missing, testing::ElementsAre(
+                               HasSubstr("how far kappa can be believed: all items are of one initial state")));
 }
 
 TEST(JudgeCalibration, AJudgeThatIsKinderToOneWorldIsRefusedThoughItsKappaIsGood) {

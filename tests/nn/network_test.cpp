@@ -188,6 +188,16 @@ TEST(Unchanged, IsWhatIsNearerThanTheLimitAndInPartWhatIsNearerThanTwice) {
   EXPECT_TRUE(LeaveUnchanged(off, still + change, still).equal(still + change));
 }
 
+TEST(Schedule, OfOneStepCannotEndInNoSignal) {
+  ModelConfig config = CountsFromTheLastFrame(0.2);
+  config.schedule.steps = 1;
+  EXPECT_THAT([&] { config.Check(); },
+              testing::ThrowsMessage<TensorError>(
+                  testing::HasSubstr("schedule.steps is 1, wanted 2 or more with schedule.zero_terminal_snr")));
+  config.schedule.zero_terminal_snr = false;
+  EXPECT_NO_THROW(config.Check());
+}
+
 TEST(Unchanged, IsALimitAboveNothingAndOfWhatIsCountedFromTheLastFrame) {
   EXPECT_NO_THROW(CountsFromTheLastFrame(0.2).Check());
   EXPECT_THAT([] { CountsFromTheLastFrame(-0.1).Check(); },

@@ -49,6 +49,23 @@ TEST(Fidelity, CountsWhatWasHallucinatedAmongWhatTrulyFailed) {
   EXPECT_DOUBLE_EQ(*fidelity.counterfactuals[0].match.hallucinated.value, 1.0 / 3) << "one succeeded in truth: it is no hallucination";
 }
 
+TEST(Fidelity, PoliciesThatErrInTheSameStatesTellNoMoreThanOneOfThem) {
+  const auto match = [](int policies) {
+    std::vector<FidelityRow> rows;
+    for (int i = 0; i < policies; ++i) Add(rows, "closed_loop", std::to_string(i), "ssssssffffff", "------------", "ssssssffssss");
+    return MatchOf(rows, "closed_loop", FidelityColumn::kModel);
+  };
+  const OutcomeMatch one = match(1), five = match(5);
+  EXPECT_EQ(five.n, 5 * one.n);
+  EXPECT_DOUBLE_EQ(*five.hallucinated.value, 4.0 / 6);
+  for (Estimate OutcomeMatch::*number : {&OutcomeMatch::agreement, &OutcomeMatch::hallucinated}) {
+    EXPECT_NEAR((five.*number).interval->low, (one.*number).interval->low, 1e-9);
+    EXPECT_NEAR((five.*number).interval->high, (one.*number).interval->high, 1e-9);
+  }
+  EXPECT_LE(five.kappa.interval->low, one.kappa.interval->low);
+  EXPECT_EQ(one.agreement.method, "Wilson");
+}
+
 TEST(Fidelity, SaysWhichWrongOutcomesAreTheModelsOwn) {
   FidelityInput input = Sample();
   Add(input.rows, "executed", "good", "ssssssssff", "----------", "ssssssssfs");

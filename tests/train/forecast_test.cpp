@@ -54,6 +54,11 @@ TEST(TrainForecast, FindsThingsInPicturesThatItHasNotSeen) {
     EXPECT_EQ(TrainForecast({{folder / "shards"}, folder / out, ForecastConfig(2)}, Quick(steps)).why, "done");
     return Written(folder / out, "finder_px");
   };
+  ForecastOptions measured = Quick(2);
+  measured.job.trainer.holdout_every = 1;
+  const TrainerSummary summary = TrainForecast({{folder / "shards"}, folder / "measured", ForecastConfig(2)}, measured);
+  EXPECT_EQ(Written(folder / "measured", "steps"), 2);
+  EXPECT_EQ(Written(folder / "measured", "best_step"), summary.best_step);
   const double before = off_px("begun", 1), after = off_px("trained", 120);
   EXPECT_LT(after, 1.5) << before;
   EXPECT_GT(before, 2 * after);

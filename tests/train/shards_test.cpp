@@ -54,6 +54,17 @@ TEST(ShardSet, AShardOfNoClipsIsRefused) {
                   "clip_start has " + std::to_string(numbers) + " numbers, wanted at least 2");
 }
 
+TEST(ShardSet, ClipsThatLeaveRowsOutAreRefused) {
+  ExpectRefused(Of("clip_start", [](Tensor& t) { t[0] = 1; }), {}, "clip_start goes from 1 to ");
+  ExpectRefused(Of("clip_start", [](Tensor& t) { t[-1] -= 1; }), {}, ", all rows of its frames");
+  ExpectRefused(Of("clip_start", [](Tensor& t) { t[-1] += 1; }), {}, ", all rows of its frames");
+}
+
+TEST(ShardSet, PicturesOfAnotherSizeThanItsCardSaysAreRefused) {
+  ExpectRefused(kNothing, {{"height_px", "7"}}, "height_px is '");
+  ExpectRefused(kNothing, {{"width_px", "7"}}, "width_px is '");
+}
+
 TEST(ShardSet, PicturesOfNoViewsOrPixelsAreRefused) {
   for (const std::int64_t side : {1, 2, 3})
     ExpectRefused(Of("frames", [&](Tensor& t) { t = t.narrow(side, 0, 0); }), {},

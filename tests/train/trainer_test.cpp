@@ -281,6 +281,18 @@ TEST(Trainer, CountsTheStepsThatFitIntoTheMinutesOnceAndKeepsThem) {
   EXPECT_TRUE(at::equal(first.All(), again.All()));
 }
 
+TEST(Trainer, InterruptedBeforeItsMinutesArePlannedDoesNotSayThePagesSteps) {
+  const TempFolder folder;
+  TrainerOptions options = QuickTrainer(1300);
+  options.minutes = 60;
+  Regression regression;
+  const TrainerSummary summary =
+      Trainer(regression.Parameters(), options, folder.path())
+          .Run({.loss = [&](const StepPlace& place) { return regression.Loss(place); }, .interrupted = [] { return true; }});
+  EXPECT_EQ(summary.step, 1);
+  EXPECT_EQ(summary.steps, 0);
+}
+
 TEST(Trainer, OtherMinutesThanItIsPlannedForAreRefusedAndMoreStepsGoOn) {
   const TempFolder folder, by_steps;
   TrainerOptions options = QuickTrainer(100000);

@@ -71,6 +71,28 @@ std::string Number(double value) {
 
 std::string Field(const char* name, double value) { return std::string(" ") + name + "=" + Number(value); }
 
+/// @param memory, views  the model's
+void CheckSchedule(const ScheduleConfig& schedule, std::int64_t memory, std::int64_t views) {
+  if (schedule.zero_terminal_snr)  // the one step would be all noise and none
+    Require(schedule.steps >= 2, "schedule.steps", schedule.steps, "2 or more with schedule.zero_terminal_snr");
+  if (schedule.carry_plane_m && !schedule.from_last_frame)
+    throw TensorError("schedule.carry_plane_m: wanted schedule.from_last_frame: true as well");
+  if ((schedule.carry_frames != 1 || schedule.carry_first) && !schedule.carry_plane_m)
+    throw TensorError(std::string(schedule.carry_first ? "schedule.carry_first" : "schedule.carry_frames") +
+                      ": wanted schedule.carry_plane_m as well");
+  Require(schedule.carry_frames >= 1 && schedule.carry_frames <= memory, "schedule.carry_frames", schedule.carry_frames,
+          "1 … memory = " + std::to_string(memory));
+  if (!(schedule.carry_unless_changed >= 0 && schedule.carry_unless_changed <= 10))
+    throw TensorError("schedule.carry_unless_changed: found " + Number(schedule.carry_unless_changed) +
+                      ", wanted 0 … 10");
+  if (schedule.carry_unless_changed > 0 && (schedule.carry_frames < 2 || views < 2))
+    throw TensorError("schedule.carry_unless_changed: wanted schedule.carry_frames and views of 2 or more as well");
+  if (!(schedule.unchanged_below >= 0 && schedule.unchanged_below <= 10))
+    throw TensorError("schedule.unchanged_below: found " + Number(schedule.unchanged_below) + ", wanted 0 … 10");
+  if (schedule.unchanged_below > 0 && !schedule.from_last_frame)
+    throw TensorError("schedule.unchanged_below: wanted schedule.from_last_frame: true as well");
+}
+
 }  // namespace
 
 std::string PoseMapConfig::Differences() const {
@@ -124,22 +146,7 @@ void ModelConfig::Check() const {
   if (object_forecast)
     Require(vae.Stride() % ObjectForecast::kCell_px == 0, "the codec's stride", vae.Stride(),
             "a multiple of " + std::to_string(ObjectForecast::kCell_px) + " with object_forecast");
-  if (schedule.carry_plane_m && !schedule.from_last_frame)
-    throw TensorError("schedule.carry_plane_m: wanted schedule.from_last_frame: true as well");
-  if ((schedule.carry_frames != 1 || schedule.carry_first) && !schedule.carry_plane_m)
-    throw TensorError(std::string(schedule.carry_first ? "schedule.carry_first" : "schedule.carry_frames") +
-                      ": wanted schedule.carry_plane_m as well");
-  Require(schedule.carry_frames >= 1 && schedule.carry_frames <= memory, "schedule.carry_frames", schedule.carry_frames,
-          "1 … memory = " + std::to_string(memory));
-  if (!(schedule.carry_unless_changed >= 0 && schedule.carry_unless_changed <= 10))
-    throw TensorError("schedule.carry_unless_changed: found " + Number(schedule.carry_unless_changed) +
-                      ", wanted 0 … 10");
-  if (schedule.carry_unless_changed > 0 && (schedule.carry_frames < 2 || views < 2))
-    throw TensorError("schedule.carry_unless_changed: wanted schedule.carry_frames and views of 2 or more as well");
-  if (!(schedule.unchanged_below >= 0 && schedule.unchanged_below <= 10))
-    throw TensorError("schedule.unchanged_below: found " + Number(schedule.unchanged_below) + ", wanted 0 … 10");
-  if (schedule.unchanged_below > 0 && !schedule.from_last_frame)
-    throw TensorError("schedule.unchanged_below: wanted schedule.from_last_frame: true as well");
+  CheckSchedule(schedule, memory, views);
   if (!(pose_map.lag_frames >= 0 && pose_map.lag_frames <= 1))
     throw TensorError("pose_map.lag_frames: found " + Number(pose_map.lag_frames) + ", wanted 0 … 1");
   Require(unet.hand_views == 0 || unet.hand_views == views, "unet.hand_views", unet.hand_views,

@@ -66,6 +66,14 @@ Tensor CheckedNumbers(const nn::MappedTensors& file, const std::string& name, at
                     std::to_string(tensor.masked_select(broken)[0].item<double>()) + ", wanted finite numbers");
 }
 
+/// Every row belongs to a clip: one that is not would be read by nobody, and nobody would say so.
+void RequireWhole(const std::filesystem::path& path, const Tensor& clip_start, std::int64_t rows) {
+  const auto first = clip_start[0].item<std::int64_t>(), end = clip_start[-1].item<std::int64_t>();
+  if (first != 0 || end != rows)
+    throw TensorError(path.string() + ": clip_start goes from " + std::to_string(first) + " to " + std::to_string(end) +
+                      ", wanted 0 to " + std::to_string(rows) + ", all rows of its frames");
+}
+
 Shard Read(const std::filesystem::path& path, const nn::MappedTensors& file) {
   Shard shard;
   shard.path = path;
@@ -74,12 +82,15 @@ Shard Read(const std::filesystem::path& path, const nn::MappedTensors& file) {
   if (v < 1 || shard.frames.size(2) < 1 || shard.frames.size(3) < 1)
     throw TensorError(path.string() + ": frames is " + nn::ShapeText(shard.frames.sizes()) +
                       ", wanted at least one view of at least one pixel");
+  RequireText(file.file(), "height_px", std::to_string(shard.frames.size(2)));
+  RequireText(file.file(), "width_px", std::to_string(shard.frames.size(3)));
   shard.maps = Checked(file, "maps", at::kByte, shard.frames.sizes());
   shard.clip_start = Checked(file, "clip_start", at::kLong, {-1});
   const std::int64_t clips = shard.clip_start.size(0) - 1;
   if (clips < 1)
     throw TensorError(path.string() + ": clip_start has " + std::to_string(clips + 1) +
                       " numbers, wanted at least 2: the first row of a clip, and the end");
+  RequireWhole(path, shard.clip_start, f);
   shard.task = Checked(file, "task", at::kInt, {clips});
   shard.outcome = Checked(file, "outcome", at::kChar, {clips});
   shard.actions = CheckedNumbers(file, "actions", {f, 16});

@@ -71,13 +71,13 @@ TrainerSummary TrainForecast(const JobPlace& place, const ForecastOptions& given
     const ForecastQuality quality = measure();
     std::vector<TensorView> views;
     for (const NamedTensor& weight : weights.all()) views.push_back(nn::ViewOf(weight.name, weight.tensor.detach()));
-    WriteTensorFile(place.out / "forecast.safetensors", views,
-                    {{"format", "pt"},
-                     {"steps", std::to_string(summary.step)},
-                     {"seed", std::to_string(options.job.trainer.seed)},
-                     {"recipe", shards.metadata().at("recipe")},
-                     {"agreement", Text("%.3f", quality.agreement)},
-                     {"finder_px", Text("%.2f", quality.finder_px)}});
+    TensorMetadata card = {{"format", "pt"},
+                           {"seed", std::to_string(options.job.trainer.seed)},
+                           {"recipe", shards.metadata().at("recipe")},
+                           {"agreement", Text("%.3f", quality.agreement)},
+                           {"finder_px", Text("%.2f", quality.finder_px)}};
+    card.merge(summary.CardOfSteps());
+    WriteTensorFile(place.out / "forecast.safetensors", views, card);
   });
   return summary;
 }

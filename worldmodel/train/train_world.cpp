@@ -136,12 +136,11 @@ std::string Numbers(const std::vector<double>& values) {
 /// What is written beside the weights.
 TensorMetadata CardOf(const TrainerSummary& summary, const ShardSet& shards, std::uint64_t seed) {
   TensorMetadata card = WhatFor(shards.metadata());
-  card.insert({{"steps", std::to_string(summary.step)},
-               {"seed", std::to_string(seed)},
+  card.merge(summary.CardOfSteps());
+  card.insert({{"seed", std::to_string(seed)},
                {"holdout", summary.best ? Number(*summary.best) : ""},
                {"recipe", shards.metadata().at("recipe")},
                {"codec", shards.codec()}});
-  if (summary.best) card["best_step"] = std::to_string(summary.best_step);
   return card;
 }
 

@@ -90,6 +90,12 @@ std::string TrainerProgress::Line() const {
   return line;
 }
 
+TensorMetadata TrainerSummary::CardOfSteps() const {
+  TensorMetadata card = {{"steps", std::to_string(step)}};
+  if (best) card["best_step"] = std::to_string(best_step);
+  return card;
+}
+
 Trainer::Trainer(std::vector<NamedTensor> parameters, const TrainerOptions& options, std::filesystem::path folder)
     : parameters_(std::move(parameters)), options_(options), folder_(std::move(folder)), steps_(options.steps) {
   Check(options_);
@@ -274,7 +280,7 @@ TrainerSummary Trainer::Run(const TrainerCallbacks& callbacks) {
     }
   }
   WriteCurves(folder_);
-  return {step_, steps_, why, best_score_, best_step_, run_steps_, left_out_, holdouts_since_best_};
+  return {step_, planned_ ? steps_ : 0, why, best_score_, best_step_, run_steps_, left_out_, holdouts_since_best_};
 }
 
 }  // namespace evac::train

@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "core/tensor_file.h"
 #include "worldmodel/train/adamw.h"
 #include "worldmodel/train/dice.h"
 #include "worldmodel/train/flat_parameters.h"
@@ -76,7 +77,7 @@ struct Replica {
 };
 
 struct TrainerSummary {
-  std::int64_t step = 0, steps = 0;
+  std::int64_t step = 0, steps = 0;  ///< done, and planned: 0 while minutes are not turned into steps
   std::string why;  ///< "done", "interrupted", "no better for 5 hold-outs"
   std::optional<double> best;  ///< a finite number: none before the first hold-out that is one
   std::int64_t best_step = 0;
@@ -84,6 +85,9 @@ struct TrainerSummary {
   std::int64_t left_out = 0;             ///< of all steps, those whose loss or gradient was not finite
   std::int64_t holdouts_since_best = 0;  ///< without a best: all that were measured
   bool IsDone() const { return why != "interrupted"; }
+  /// What the card of its weights says: `steps` of the training and, where a hold-out was a number, `best_step`, after
+  /// which the weights are those (Trainer::WithBest).
+  TensorMetadata CardOfSteps() const;
 };
 
 /// Writes into its folder:

@@ -46,9 +46,6 @@ void CheckRanges(const WorldTrainingOptions& o) {
 
 void Check(const WorldTrainingOptions& o, const nn::ModelConfig& config) {
   if (o.batch < 1) throw TensorError("world training: batch is " + std::to_string(o.batch) + ", wanted at least 1");
-  if (config.schedule.zero_terminal_snr && config.schedule.steps < 2)  // the one step would be all noise and none
-    throw TensorError("world training: schedule.steps is " + std::to_string(config.schedule.steps) +
-                      ", wanted at least 2 with zero_terminal_snr");
   if (o.windows.chunk != config.chunk || o.windows.memory != config.memory)
     throw TensorError("world training: windows of " + std::to_string(o.windows.memory) + " + " +
                       std::to_string(o.windows.chunk) + " frames, the model has " + std::to_string(config.memory) +

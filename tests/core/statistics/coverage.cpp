@@ -7,6 +7,7 @@
 
 #include "core/seed.h"
 #include "core/statistics/association.h"
+#include "core/statistics/confusion.h"
 #include "core/statistics/paired_bootstrap.h"
 #include "core/statistics/ppi.h"
 #include "core/statistics/rate_difference.h"
@@ -72,6 +73,26 @@ PairedOutcomes DrawPairs(SplitMix64& random, int n, const FlipSetting& setting) 
     outcomes.flips.only_second += u >= setting.only_first && u < setting.only_first + setting.only_second;
   }
   return outcomes;
+}
+
+/// A share of the states is hard to judge; half of all clips are successes, those of one state mostly alike.
+struct KappaSetting {
+  int clips;
+  double hard, errs_there;
+};
+constexpr double kErrsElsewhere = 0.03;
+
+ConfusionByState DrawStates(SplitMix64& random, int n, const KappaSetting& setting) {
+  ConfusionByState states;
+  for (int i = 0; i < n; ++i) {
+    const bool succeeds = Flip(random, 0.5), is_hard = Flip(random, setting.hard);
+    Confusion& state = states[{"", std::to_string(i)}];
+    for (int clip = 0; clip < setting.clips; ++clip) {
+      const bool is = succeeds != Flip(random, 0.2);
+      state.Add(is != Flip(random, is_hard ? setting.errs_there : kErrsElsewhere), is);
+    }
+  }
+  return states;
 }
 
 /// Real outcomes with rate p; the model says the same with probability `agreement`.
@@ -175,6 +196,27 @@ std::vector<Row> Differences(const SimulationOptions& options) {
       rows.push_back(Simulate(
           {fmt::format("{} against {}, flips {} / {}", first, second, setting.only_first, setting.only_second), n, {}},
           {"Tango (paired)", "Bonett-Price (paired)", "Newcombe (unpaired)"}, options, replicate));
+    }
+  }
+  return rows;
+}
+
+std::vector<Row> Kappas(const SimulationOptions& options) {
+  std::vector<Row> rows;
+  for (const int n : kSizes) {
+    for (const KappaSetting& setting : {KappaSetting{1, .2, .5}, {5, .2, .5}, {5, .1, .9}, {10, .1, .9}}) {
+      const double errs = setting.hard * setting.errs_there + (1 - setting.hard) * kErrsElsewhere, kappa = 1 - 2 * errs;
+      const auto replicate = [&](SplitMix64& random, std::span<Tally> tallies) {
+        const ConfusionByState states = DrawStates(random, n, setting);
+        tallies[0].Add(StatisticsByState(states).kappa.interval, kappa);
+        tallies[1].Add(StatisticsOf(SumOf(states)).kappa.interval, kappa);
+      };
+      rows.push_back(Simulate({fmt::format("{} a state, true kappa {:.2f}, errs in {} of the states {} of the time",
+                                           setting.clips == 1 ? "1 clip" : std::to_string(setting.clips) + " clips",
+                                           kappa, setting.hard, setting.errs_there),
+                               n,
+                               {}},
+                              {"by state", "Fleiss-Cohen-Everitt"}, options, replicate));
     }
   }
   return rows;

@@ -30,6 +30,8 @@ struct Row {
 std::vector<Row> Rates(const SimulationOptions& options);
 /// Two rates on the same states: Tango, Bonett-Price; on different states: Newcombe.
 std::vector<Row> Differences(const SimulationOptions& options);
+/// Kappa of a judge who errs alike in clips of one initial state: by state and as if all clips were independent; n states.
+std::vector<Row> Kappas(const SimulationOptions& options);
 /// The real rate from n real trials and 10 n further imagined ones: Wilson on the real ones alone, PPI++'s normal
 /// interval, MOVER, betting.
 std::vector<Row> FewReal(const SimulationOptions& options);

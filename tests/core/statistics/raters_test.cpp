@@ -95,6 +95,56 @@ TEST(ConfusionTable, SwappingJudgeAndHumanKeepsTheAgreementAndTurnsTheBias) {
   EXPECT_NEAR(*one.matthews, *other.matthews, 1e-12);
 }
 
+/// One item per state, in cells of a table; then each item so many times in its state.
+ConfusionByState States(const Confusion& table, std::int64_t repeats) {
+  ConfusionByState states;
+  const auto add = [&](std::int64_t count, bool judge, bool human) {
+    for (std::int64_t i = 0; i < count; ++i) {
+      Confusion& state = states[{"lift", std::to_string(states.size())}];
+      for (std::int64_t repeat = 0; repeat < repeats; ++repeat) state.Add(judge, human);
+    }
+  };
+  add(table.both_success, true, true);
+  add(table.only_judge_success, true, false);
+  add(table.only_human_success, false, true);
+  add(table.both_failure, false, false);
+  return states;
+}
+
+TEST(ConfusionByState, OneItemAStateIsAsTheTableAlone) {
+  const Confusion table{25, 4, 3, 8};
+  const ConfusionStatistics alone = StatisticsOf(table), by_state = StatisticsByState(States(table, 1));
+  EXPECT_EQ(*by_state.kappa.value, *alone.kappa.value);
+  EXPECT_EQ(by_state.kappa.interval->low, alone.kappa.interval->low);
+  EXPECT_EQ(by_state.kappa.method, alone.kappa.method);
+}
+
+TEST(ConfusionByState, TheSameClipFiveTimesTellsNoMoreThanOnce) {
+  const Confusion table{25, 4, 3, 8};
+  const ConfusionStatistics once = StatisticsOf(table), often = StatisticsByState(States(table, 5));
+  EXPECT_EQ(often.n, 200);
+  EXPECT_NEAR(*often.kappa.value, *once.kappa.value, 1e-12);
+  EXPECT_NEAR(*often.kappa_se, std::sqrt(40.0 / 39) * *once.kappa_se, 1e-12) << "Fleiss, Cohen & Everitt, G / (G - 1)";
+  const double t_of_39 = 2.0226909;  // from a table
+  EXPECT_NEAR(often.kappa.interval->low, *often.kappa.value - t_of_39 * *often.kappa_se, 1e-6);
+}
+
+TEST(ConfusionByState, StatesThatDifferLessThanChanceClaimNoMoreThanIndependentItems) {
+  ConfusionByState states;
+  for (int i = 0; i < 12; ++i) states[{"lift", std::to_string(i)}] = {6, 1, 1, 4};
+  EXPECT_NEAR(*StatisticsByState(states).kappa_se, *StatisticsOf(SumOf(states)).kappa_se, 1e-12);
+}
+
+TEST(ConfusionByState, ItemsOfOneStateDoNotSayHowKappaSpreads) {
+  const ConfusionStatistics one = StatisticsByState({{{"lift", "0"}, {25, 4, 3, 8}}, {{"lift", "1"}, {}}});
+  EXPECT_EQ(*one.kappa.value, *StatisticsOf({25, 4, 3, 8}).kappa.value);
+  ASSERT_FALSE(one.kappa.interval);
+  EXPECT_EQ(one.kappa.interval.reason(), "all items are of one initial state");
+  EXPECT_FALSE(one.kappa_se);
+  EXPECT_FALSE(StatisticsByState({}).kappa.value);
+  EXPECT_THROW(StatisticsByState({{{"lift", "0"}, {4, 0, 0, -1}}, {{"lift", "1"}, {0, 0, 0, 9}}}), Error);
+}
+
 TEST(RoganGladen, APerfectJudgeIsBelievedAndAUselessOneIsNot) {
   EXPECT_NEAR(*RoganGladen({0.3, 100}, {1, 1, 20, 20}).rate, 0.3, 1e-12);
   EXPECT_FALSE(RoganGladen({0.3, 100}, {0.7, 0.3, 20, 20}).rate);

@@ -38,6 +38,7 @@ void PrintAll(const SimulationOptions& options) {
              options.replicates, options.replicates / 10, options.seed);
   Print("One rate", Rates(options));
   Print("Difference of two rates", Differences(options));
+  Print("Kappa of a judge, n initial states", Kappas(options));
   Print("The real rate from n real and 10 n further imagined trials", FewReal(options));
   Print("Pearson's r over 6 policies", Bootstrap({options.replicates / 10, options.seed}));
   Print(Peeking(options));
