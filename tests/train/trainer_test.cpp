@@ -288,7 +288,8 @@ TEST(Trainer, InterruptedBeforeItsMinutesArePlannedDoesNotSayThePagesSteps) {
   Regression regression;
   const TrainerSummary summary =
       Trainer(regression.Parameters(), options, folder.path())
-          .Run({.loss = [&](const StepPlace& place) { return regression.Loss(place); }, .interrupted = [] { return true; }});
+          .Run({.loss = [&](const StepPlace& place) { return regression.Loss(place); },
+                .interrupted = [asked = 0]() mutable { return ++asked > 1; }});
   EXPECT_EQ(summary.step, 1);
   EXPECT_EQ(summary.steps, 0);
 }
