@@ -9,12 +9,20 @@ function unfold(clip, verdict, others) {
     make('p', {}, 'Look again if you like; then decide.'),
     make('.verdicts', {role: 'group', 'aria-label': 'Decision'}, ['success', 'failure', 'cannot_tell'].map(label =>
       make(`button.decision.${label}${label === verdict.label ? '.kept' : ''}`, {type: 'button', 'data-decision': label, onclick: () => settle(clip, label, verdict.id)},
-        words[label] + (label === verdict.label ? ' (keep)' : '')))));
+        make('kbd', {}, {success: 'S', failure: 'F', cannot_tell: 'U'}[label]), words[label] + (label === verdict.label ? ' (keep)' : '')))));
   rating.answer.prepend(box);
   $('.final', rating.answer).hidden = true;
   rating.isBusy = true;
+  rating.unfoldedAt = Date.now();
   refresh();
   $('.kept', box).focus();
+}
+
+/** By key: the verdict, or where the others' are unfolded the decision. A key that is struck twice is no decision: nobody has read yet. */
+function word(label) {
+  const decision = $(`[data-decision="${label}"]`);
+  if (!decision) return decide(label);
+  if (!session.isOther && Date.now() - rating.unfoldedAt > 800) decision.click();
 }
 
 async function settle(clip, label, first) {

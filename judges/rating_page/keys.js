@@ -2,8 +2,9 @@
 const keyHelp = [  // [keys, meaning, the right hand's]
   ['Space', 'play, pause'], ['J  L', 'one second back, on'], [',  .', 'one frame back, on'], ['Home  End', 'first, last frame'],
   ['[  ]', 'slower, faster'], ['R', 'again from the start', 'O'], ['A', 'loop the last two seconds', 'P'],
-  ['S  F  U', 'success, failure, cannot tell', 'K  ;  U'], ['1 … 9', 'stage reached', '6 … 0  -'],
+  ['S  F  U', 'success, failure, cannot tell; an adjudicator’s decision too', 'K  ;  U'], ['1 … 9', 'stage reached', '6 … 0  -'],
   ['Shift+1 … 9  V', 'one view alone, all views', 'Shift+6 … 0  M'], ['X, then 1 … 6', 'flags', 'Y, then 6 … 0 and -'],
+  ['B, then 1 … 7', 'why it fails', 'B, then 6 … 0 and -'],
   ['C', 'how sure: sure, fairly, a guess', 'I'], ['N', 'note (Esc leaves it)'], ['Z', 'undo the last verdict', 'Backspace'], ['H', 'what you said'], ['?', 'this help, and the task'],
 ];
 /** What the left hand's keys are to the right hand: keys beside each other, none used twice. The others are there already. */
@@ -32,11 +33,13 @@ function openHelp() {
     clip ? rubricCard(clip.rubric) : null].filter(Boolean), [['Close', null, 'primary']]);
 }
 
-/** However they were opened, by key or by mouse: what is open is what digits mean. */
-function openFlags() {
-  const box = $('.flags');
+/** However they were opened, by key or by mouse: what is open is what digits mean. One of them is open at a time (column). */
+function openChips(name, of) {
+  const box = $('.' + name);
   box.open = !box.open;
-  speak(box.open ? `flags: ${digitKey(0)} to ${digitKey(session.me.flags.length - 1)}` : 'flags closed');
+  if (box.open) document.querySelectorAll('.flags, .causes').forEach(other => { other.open = other === box; });
+  const last = of.findLastIndex((one, k) => digitKey(k));
+  speak(box.open ? `${name}: ${digitKey(0)} to ${digitKey(last)}` : `${name} closed`);
 }
 
 function openNote() {
@@ -49,8 +52,8 @@ const acts = {
   ' ': player => player.toggle(), J: player => player.seek(player.time - 1), L: player => player.seek(player.time + 1),
   ',': player => player.step(-1), '.': player => player.step(1), Home: player => player.seek(0), End: player => player.seek(player.duration),
   '[': player => player.faster(-1), ']': player => player.faster(1), R: player => player.replay(), A: player => player.loopEnd(),
-  V: player => player.isolate(-1), X: openFlags, C: nextConfidence, N: openNote, H: openHistory,
-  S: () => decide('success'), F: () => decide('failure'), U: () => decide('cannot_tell'),
+  V: player => player.isolate(-1), X: () => openChips('flags', session.me.flags), B: () => openChips('causes', session.me.causes), C: nextConfidence, N: openNote, H: openHistory,
+  S: () => word('success'), F: () => word('failure'), U: () => word('cannot_tell'),
 };
 
 document.addEventListener('keydown', event => {
@@ -79,7 +82,7 @@ function onRateScreen(event) {
   if (isRightHanded() && rightHand[key]) key = rightHand[key];
   if (key === 'Z') return undo(), true;
   const act = acts[key];
-  if (!act || (event.repeat && 'SFUXCNHRA'.includes(key))) return false;
+  if (!act || (event.repeat && 'SFUXBCNHRA'.includes(key))) return false;
   if (session.isOther) return true;
   act(player);
   return true;
@@ -88,5 +91,6 @@ function onRateScreen(event) {
 function onDigit(k, isShifted, player) {
   if (isShifted) return k < player.clip.views.length ? player.isolate(k) : undefined;
   if ($('.flags').open) return session.me.flags[k] && toggleFlag(session.me.flags[k]);
+  if ($('.causes').open) return session.me.causes[k] && setCause(session.me.causes[k]);
   toggleStage(k);
 }

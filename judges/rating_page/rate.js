@@ -180,15 +180,16 @@ function column(clip) {
     title: stage.description || stage.name, onclick: () => toggleStage(k)}, digitCap(k), make('span', {}, stage.name, stage.description ? make('small', {}, stage.description) : null)));
   const flags = session.me.flags.map((flag, k) => make('button.flag', {type: 'button', 'aria-pressed': 'false', 'data-flag': flag,
     onclick: () => toggleFlag(flag)}, digitCap(k), named(flag)));
-  const causes = session.me.causes.map(cause => make('button.cause', {type: 'button', 'aria-pressed': 'false', 'data-cause': cause,
-    onclick: () => setCause(cause)}, named(cause)));
+  const causes = session.me.causes.map((cause, k) => make('button.cause', {type: 'button', 'aria-pressed': 'false', 'data-cause': cause,
+    onclick: () => setCause(cause)}, digitCap(k), named(cause)));
+  const closes = other => event => { if (event.target.open) $('.' + other).open = false; };
   return [
     make('h2.instruction', {}, clip.rubric.instruction),
     make('p.success', {}, make('b', {}, 'Success: '), clip.rubric.success || 'the task is done as the instruction says'),
     stages.length ? make('.group', {role: 'group', 'aria-label': 'Stages reached'}, make('h3', {}, 'Reached'), make('.stages', {}, stages)) : null,
-    make('details.more.flags', {}, make('summary', {}, make('kbd', {}, 'X'), 'Flags', make('span.chosen', {})),
+    make('details.more.flags', {ontoggle: closes('causes')}, make('summary', {}, make('kbd', {}, 'X'), 'Flags', make('span.chosen', {})),
       make('.chips', {role: 'group', 'aria-label': 'Flags'}, flags)),
-    make('details.more', {}, make('summary', {}, 'Cause, if it fails', make('span.chosen-cause', {})),
+    make('details.more.causes', {ontoggle: closes('flags')}, make('summary', {}, make('kbd', {}, 'B'), 'Cause, if it fails', make('span.chosen-cause', {})),
       make('.chips', {role: 'group', 'aria-label': 'Cause of the failure'}, causes)),
     make('.chips.sure', {role: 'group', 'aria-label': 'How sure you are'}, make('kbd', {}, 'C'), make('span.quiet', {}, 'How sure?'), sureness.map(([level, name]) =>
       make('button', {type: 'button', 'aria-pressed': 'false', 'data-sure': level, 'aria-keyshortcuts': 'C', onclick: () => setConfidence(level)}, name))),

@@ -5,26 +5,15 @@ Prints "ok: …" for what holds and "failed: …" for what does not; exit code 1
 """
 import json
 import pathlib
-import shutil
 import sys
 
-try:
-    import websocket  # noqa: F401
-except ImportError:
-    print("skipped: python3-websocket is not installed")
-    sys.exit(77)
-if shutil.which("chromium") is None:
-    print("skipped: chromium is not installed")
-    sys.exit(77)
-
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[1] / "system" / "browser"))
-from devtools import Browser  # noqa: E402
+from devtools import Browser, check, failures  # noqa: E402
 
 # Says what it is told to, when it is told to.
 NEWS = """window.EventSource = class {
   addEventListener(name, listener) { window.tell = runs => listener({data: JSON.stringify({runs})}); }
 }"""
-failures = []
 
 
 def button_after(browser, page, *news):
@@ -33,12 +22,6 @@ def button_after(browser, page, *news):
     for runs in news:
         browser.js(f"tell({json.dumps(runs)})")
     return browser.is_true("document.querySelector('.live button')")
-
-
-def check(holds, sentence):
-    print(f"{'ok' if holds else 'failed'}: {sentence}")
-    if not holds:
-        failures.append(sentence)
 
 
 def main():

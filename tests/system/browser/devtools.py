@@ -1,4 +1,7 @@
-"""Drives a real Chromium by its DevTools protocol: what a reader does with a page, and what the page did in return."""
+"""Drives a real Chromium by its DevTools protocol: what a reader does with a page, and what the page did in return.
+
+A program that imports this where there is no browser says so and ends with 77.
+"""
 import base64
 import json
 import os
@@ -6,17 +9,36 @@ import pathlib
 import shutil
 import signal
 import subprocess
+import sys
 import tempfile
 import time
 import urllib.request
 
-import websocket
+try:
+    import websocket
+except ImportError:
+    print("skipped: python3-websocket is not installed")
+    sys.exit(77)
+if shutil.which("chromium") is None:
+    print("skipped: chromium is not installed")
+    sys.exit(77)
 
 FLAGS = [
     "--headless", "--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run", "--disable-background-networking",
     "--disable-component-update", "--disable-sync", "--hide-scrollbars", "--autoplay-policy=no-user-gesture-required",
     "--remote-debugging-port=0", "--remote-allow-origins=*",
 ]
+
+
+failures = []
+
+
+def check(holds, sentence, found=""):
+    """Prints whether the sentence holds; those that do not are in `failures`."""
+    print(f"{'ok' if holds else 'failed'}: {sentence}{'' if holds else f' (found {found})'}", flush=True)
+    if not holds:
+        failures.append(sentence)
+        print(f"failed: {sentence} (found {found})", file=sys.stderr)
 
 
 class Refused(RuntimeError):

@@ -6,7 +6,6 @@ not play, somebody who leaves. Prints "ok: …" and "failed: …"; exit code 1 i
 """
 import json
 import pathlib
-import shutil
 import signal
 import subprocess
 import sys
@@ -14,28 +13,11 @@ import time
 import traceback
 from concurrent.futures import ThreadPoolExecutor
 
-try:
-    import websocket  # noqa: F401
-except ImportError:
-    print("skipped: python3-websocket is not installed")
-    sys.exit(77)
-if shutil.which("chromium") is None:
-    print("skipped: chromium is not installed")
-    sys.exit(77)
-
-from devtools import Browser
+from devtools import Browser, check, failures
 
 SIZES = [(360, 740), (1280, 800), (2560, 1440)]
 EVAC, STUDY = sys.argv[1], sys.argv[2]
 FOLDER = pathlib.Path(sys.argv[3]) if len(sys.argv) > 3 else None
-failures = []
-
-
-def check(holds, sentence, found=""):
-    print(f"{'ok' if holds else 'failed'}: {sentence}{'' if holds else f' (found {found})'}", flush=True)
-    if not holds:
-        failures.append(sentence)
-        print(f"failed: {sentence} (found {found})", file=sys.stderr)
 
 
 class Server:
@@ -263,8 +245,15 @@ def keys(ann):
     browser.press("4")
     browser.press("x")
     check(browser.js("rating.stages === 1 && rating.flags.has('blur_hides')"), "digits are stages, after X flags")
-    check(browser.js("[...document.querySelectorAll('.stage, .flag')].every((b, k) => b.querySelector('kbd').hidden === !b.querySelector('kbd').textContent)"),
+    check(browser.js("[...document.querySelectorAll('.stage, .flag, .cause')].every((b, k) => b.querySelector('kbd').hidden === !b.querySelector('kbd').textContent)"),
           "what has no key shows none")
+    browser.press("x")
+    browser.press("b")
+    browser.press("2")
+    check(browser.js("rating.cause === session.me.causes[1] && rating.stages === 1 && rating.flags.size === 1 && !document.querySelector('.flags').open"),
+          "after B they are causes, and the flags are closed")
+    browser.press("2")
+    browser.press("b")
     browser.press("c")
     browser.press("c")
     check(browser.js("rating.confidence === 2 && document.querySelector('[data-sure=\"2\"]').getAttribute('aria-pressed') === 'true'"),
@@ -483,7 +472,11 @@ def adjudicate(judge):
         if decided == 0:
             look(browser, "adjudicate")
             interrupted(judge, clip)
-        browser.press("Enter")
+        if decided == 1:
+            browser.press("s")
+            check(browser.js("Boolean(document.querySelector('.decision:not(:disabled)'))"), "a key struck twice is no decision")
+            time.sleep(1)
+        browser.press("s" if decided == 1 else "Enter")
         browser.wait(f"document.querySelector('.done') || (rating.clip?.presentation !== {clip!r} && document.querySelector('.rate') && !document.querySelector('.others'))")
         decided += 1
     check(decided > 0, "there was something to decide", decided)

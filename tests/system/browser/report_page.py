@@ -4,29 +4,12 @@
 Prints "ok: …" for what holds and "failed: …" for what does not; exit code 1 if anything failed, 77 without a browser.
 """
 import pathlib
-import shutil
 import sys
 import time
 
-try:
-    import websocket  # noqa: F401
-except ImportError:
-    print("skipped: python3-websocket is not installed")
-    sys.exit(77)
-if shutil.which("chromium") is None:
-    print("skipped: chromium is not installed")
-    sys.exit(77)
-
-from devtools import Browser
+from devtools import Browser, check, failures
 
 SIZES = [(320, 640), (390, 844), (1280, 800), (2200, 1200)]
-failures = []
-
-
-def check(holds, sentence, found=""):
-    print(f"{'ok' if holds else 'failed'}: {sentence}{'' if holds else f' (found {found})'}")
-    if not holds:
-        failures.append(sentence)
 
 
 def choose(browser, name, value):

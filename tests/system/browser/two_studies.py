@@ -8,7 +8,8 @@ import sys
 import time
 import traceback
 
-from rating_page import STUDY, Rater, Server, check, current, failures, links, reload
+from devtools import check, failures
+from rating_page import STUDY, Rater, Server, current, links, reload
 
 OTHER = sys.argv[3]
 
