@@ -127,7 +127,7 @@ function fill(verdict) {
 
 function headline(clip) {
   if (clip.kind === 'practice') return `Practice, ${plural(clip.progress.practice_left, 'clip')} to go`;
-  if (clip.kind === 'adjudication') return 'A clip on which raters differ';
+  if (clip.kind === 'adjudication') return 'A clip to decide on';
   return `Clip ${Math.min(clip.progress.total, rating.done + 1)} of ${clip.progress.total}`;
 }
 
