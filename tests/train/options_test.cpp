@@ -133,9 +133,8 @@ TEST(TrainWorld, PublishedMemoryNoiseIsOfAsManyStepsAsTheScheduleHas) {
 }
 
 TEST(TrainWorld, AScheduleOfOneStepThatEndsInPureNoiseIsRefused) {
-  const World world(1);
-  EXPECT_THAT([&] { world.Make(world.good); },
-              ThrowsMessage<TensorError>(HasSubstr("schedule.steps is 1, wanted at least 2")));
+  EXPECT_THAT([] { World(1); },  // its model
+              ThrowsMessage<TensorError>(HasSubstr("schedule.steps is 1, wanted 2 or more")));
 }
 
 }  // namespace
