@@ -175,6 +175,12 @@ function transport(player) {
     views);
 }
 
+/** Of these boxes one at most is open. `toggle` is told of late, when another clip may be shown already: they know each other, not the page. */
+function oneOpen(...boxes) {
+  for (const box of boxes) box.addEventListener('toggle', () => { if (box.open) boxes.forEach(other => { other.open = other === box; }); });
+  return boxes;
+}
+
 function column(clip) {
   const stages = clip.rubric.stages.map((stage, k) => make('button.stage', {type: 'button', 'aria-pressed': 'false', 'data-stage': k,
     title: stage.description || stage.name, onclick: () => toggleStage(k)}, digitCap(k), make('span', {}, stage.name, stage.description ? make('small', {}, stage.description) : null)));
@@ -182,15 +188,16 @@ function column(clip) {
     onclick: () => toggleFlag(flag)}, digitCap(k), named(flag)));
   const causes = session.me.causes.map((cause, k) => make('button.cause', {type: 'button', 'aria-pressed': 'false', 'data-cause': cause,
     onclick: () => setCause(cause)}, digitCap(k), named(cause)));
-  const closes = other => event => { if (event.target.open) $('.' + other).open = false; };
+  const [flagBox, causeBox] = oneOpen(
+    make('details.more.flags', {}, make('summary', {}, make('kbd', {}, 'X'), 'Flags', make('span.chosen', {})),
+      make('.chips', {role: 'group', 'aria-label': 'Flags'}, flags)),
+    make('details.more.causes', {}, make('summary', {}, make('kbd', {}, 'B'), 'Cause, if it fails', make('span.chosen-cause', {})),
+      make('.chips', {role: 'group', 'aria-label': 'Cause of the failure'}, causes)));
   return [
     make('h2.instruction', {}, clip.rubric.instruction),
     make('p.success', {}, make('b', {}, 'Success: '), clip.rubric.success || 'the task is done as the instruction says'),
     stages.length ? make('.group', {role: 'group', 'aria-label': 'Stages reached'}, make('h3', {}, 'Reached'), make('.stages', {}, stages)) : null,
-    make('details.more.flags', {ontoggle: closes('causes')}, make('summary', {}, make('kbd', {}, 'X'), 'Flags', make('span.chosen', {})),
-      make('.chips', {role: 'group', 'aria-label': 'Flags'}, flags)),
-    make('details.more.causes', {ontoggle: closes('flags')}, make('summary', {}, make('kbd', {}, 'B'), 'Cause, if it fails', make('span.chosen-cause', {})),
-      make('.chips', {role: 'group', 'aria-label': 'Cause of the failure'}, causes)),
+    flagBox, causeBox,
     make('.chips.sure', {role: 'group', 'aria-label': 'How sure you are'}, make('kbd', {}, 'C'), make('span.quiet', {}, 'How sure?'), sureness.map(([level, name]) =>
       make('button', {type: 'button', 'aria-pressed': 'false', 'data-sure': level, 'aria-keyshortcuts': 'C', onclick: () => setConfidence(level)}, name))),
     make('details.more.noted', {}, make('summary', {}, make('kbd', {}, 'N'), 'Note'),

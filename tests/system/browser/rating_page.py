@@ -171,6 +171,7 @@ def first_rater(server, ann):
     reload_in_a_clip(ann)
     keys(ann)
     pause_in_a_clip(ann)
+    a_box_opened_at_the_last_moment(ann)
     menu_after_a_verdict(ann)
     change(ann)
     second_tab(ann)
@@ -309,6 +310,19 @@ def pause_in_a_clip(ann):
     browser.press("1")
     check(browser.js("rating.stages === 1 && !document.querySelector('.flags').open"), "the next clip's flags are closed: digits are stages")
     browser.press("1")
+
+
+def a_box_opened_at_the_last_moment(ann):
+    """A browser tells of an opened box later, when the page that had it may be gone."""
+    browser = ann.browser
+    before = len(browser.complaints)
+    browser.js("""document.querySelector('.flags summary').click();
+        [...document.querySelectorAll('.bar button')].find(b => b.textContent === 'Pause').click()""")
+    browser.wait("!document.querySelector('.rate')")
+    browser.js("new Promise(done => setTimeout(done, 200))")  # what is told meanwhile is heard
+    check(browser.complaints[before:] == [], "a box opened when the page goes is nobody's any more", browser.complaints[before:])
+    browser.press("Enter")
+    browser.wait("document.querySelector('.rate')")
 
 
 def menu_after_a_verdict(ann):
