@@ -18,18 +18,23 @@ struct CalibrateArguments {
   bool as_json = false;
 };
 
-/// A number, or null with the reason beside it.
+/// A number, or null.
 json Json(const Number& number) { return number ? json(*number) : json(nullptr); }
+
+/// The value and the ends of its interval; null where there is none, and the reason beside it.
+json Json(const Estimate& estimate) {
+  json result = {{"value", Json(estimate.value)}, {"low", nullptr}, {"high", nullptr}};
+  if (estimate.value && estimate.interval) {
+    result["low"] = estimate.interval->low;
+    result["high"] = estimate.interval->high;
+  } else {
+    result["reason"] = estimate.value ? estimate.interval.reason() : estimate.value.reason();
+  }
+  return result;
+}
 
 json Json(const JudgeQualityRow& row) {
   const ConfusionStatistics& s = row.statistics;
-  json kappa = {{"value", Json(s.kappa.value)}, {"low", nullptr}, {"high", nullptr}};
-  if (s.kappa.value && s.kappa.interval) {
-    kappa["low"] = s.kappa.interval->low;
-    kappa["high"] = s.kappa.interval->high;
-  } else {
-    kappa["reason"] = s.kappa.value ? s.kappa.interval.reason() : s.kappa.value.reason();
-  }
   return {{"group", row.group},
           {"n", s.n},
           {"both_success", row.confusion.both_success},
@@ -39,7 +44,7 @@ json Json(const JudgeQualityRow& row) {
           {"cannot_tell", row.cannot_tell},
           {"errors", row.errors},
           {"accuracy", Json(s.accuracy)},
-          {"kappa", kappa},
+          {"kappa", Json(s.kappa)},
           {"ac1", Json(s.gwet_ac1)},
           {"sensitivity", Json(s.sensitivity)},
           {"specificity", Json(s.specificity)},

@@ -75,7 +75,7 @@ std::vector<std::string> Refusals(const std::vector<JudgedItem>& items, const Ju
   }
   for (const auto& [name, number] : {std::pair("sensitivity", &ConfusionStatistics::sensitivity),
                                      std::pair("specificity", &ConfusionStatistics::specificity)}) {
-    const double difference = DifferenceOf(real.statistics.*number, other.statistics.*number);
+    const double difference = DifferenceOf((real.statistics.*number).value, (other.statistics.*number).value);
     RefuseUnless(difference <= wanted.max_domain_difference,
                  fmt::format("its {} differs by {:.1f} points between real and other clips, wanted at most {}", name,
                              100 * difference, 100 * wanted.max_domain_difference),
@@ -128,9 +128,24 @@ std::string LineOf(const JudgeQualityRow& row) {
                std::to_string(row.confusion.only_judge_success), std::to_string(row.confusion.only_human_success),
                std::to_string(row.confusion.both_failure), Share(s.accuracy), Share(s.kappa.value),
                has_interval ? fmt::format("{:.2f} … {:.2f}", s.kappa.interval->low, s.kappa.interval->high) : "-",
-               Share(s.gwet_ac1), Share(s.sensitivity), Share(s.specificity), Share(s.bias),
-               Share(row.calibration.brier), Share(row.calibration.ece), std::to_string(row.cannot_tell),
+               Share(s.gwet_ac1), Share(s.sensitivity.value), Share(s.specificity.value), Share(s.bias),
+               Share(row.calibration.brier.value), Share(row.calibration.ece), std::to_string(row.cannot_tell),
                std::to_string(row.errors)});
+}
+
+/// What has no column of its own in the table: "sensitivity 0.970 (0.943 … 0.985)".
+std::string Intervals(const JudgeQualityRow& row) {
+  std::string text;
+  for (const auto& [name, estimate] : {std::pair("sensitivity", row.statistics.sensitivity),
+                                       {"specificity", row.statistics.specificity},
+                                       {"Brier", row.calibration.brier}}) {
+    if (!estimate.value) continue;
+    text += fmt::format("{}{} {:.3f} ({})", text.empty() ? "" : ", ", name, *estimate.value,
+                        estimate.interval
+                            ? fmt::format("{:.3f} … {:.3f}", estimate.interval->low, estimate.interval->high)
+                            : estimate.interval.reason());
+  }
+  return text.empty() ? text : fmt::format("{}, over other initial states (95 %): {}\n", row.group, text);
 }
 
 }  // namespace
@@ -157,22 +172,21 @@ std::vector<JudgedItem> JudgedItems(const Store& store, const std::string& judge
 JudgeQualityRow QualityOn(const std::vector<JudgedItem>& items, const std::string& group,
                           const std::function<bool(const JudgedItem&)>& is_in) {
   JudgeQualityRow row{.group = group};
-  std::vector<double> probabilities;
-  std::vector<int> outcomes;
+  StatedByState stated;
   ConfusionByState states;
   for (const JudgedItem& item : items) {
     if (!is_in(item) || !IsDecided(item.truth)) continue;
     row.errors += item.judge == Label::kInvalid;
     row.cannot_tell += item.judge == Label::kCannotTell;
     if (!IsDecided(item.judge)) continue;
-    states[{item.task, item.initial_state}].Add(item.judge == Label::kSuccess, item.truth == Label::kSuccess);
-    if (!item.probability) continue;
-    probabilities.push_back(*item.probability);
-    outcomes.push_back(item.truth == Label::kSuccess);
+    const StateKey state = {item.task, item.initial_state};
+    const bool is_success = item.truth == Label::kSuccess;
+    states[state].Add(item.judge == Label::kSuccess, is_success);
+    if (item.probability) stated[state].push_back({*item.probability, is_success});
   }
   row.confusion = SumOf(states);
   row.statistics = StatisticsByState(states);
-  row.calibration = CalibrationOf(probabilities, outcomes);
+  row.calibration = CalibrationByState(stated);
   return row;
 }
 
@@ -194,6 +208,9 @@ JudgeCalibrationReport CalibrateJudge(const Store& store, const std::string& jud
 std::string Text(const JudgeCalibrationReport& report) {
   std::string text = fmt::format("{} against {}\n", report.judge, report.truth) + Heading();
   for (const JudgeQualityRow& row : report.rows) text += LineOf(row);
+  for (const JudgeQualityRow& row : report.rows) {
+    if (row.group == "all" || row.group.starts_with("world ")) text += Intervals(row);
+  }
   for (const auto& [probe, count] : report.consistency) {
     const Estimate rate = WilsonInterval(count.successes, count.trials);
     text += fmt::format("{} probe: the same verdict for {} of {} ({:.0f} %, {:.0f} … {:.0f})\n", probe, count.successes,

@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "core/statistics/calibration.h"
 #include "core/statistics/confusion.h"
 #include "core/statistics/rates.h"
 #include "core/store.h"
@@ -18,7 +19,7 @@ struct JudgedItem {
   bool is_real = false;             ///< of a real world's clip; else of a simulated or imagined one
   Label judge = Label::kCannotTell, truth = Label::kCannotTell;
   std::optional<double> probability{};  ///< of success, as the judge gave it
-  std::string initial_state{};          ///< kappa's interval holds over others
+  std::string initial_state{};          ///< intervals hold over others
 };
 
 /// Every episode that has a current verdict of both.

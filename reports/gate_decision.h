@@ -36,8 +36,8 @@ struct RuleDecision {
   Estimate difference;    ///< candidate - baseline; its low end is what the margin is held against
   Number p = Undefined{"the rule has no test of failure"};           ///< of "it is not worse": small means fail
   Number p_adjusted = Undefined{"the rule has no test of failure"};  ///< after the correction over the rules
-  std::int64_t states = 0;        ///< initial states (with seeds; of a bet one each) that count; where the rule
-                                  ///< compares, in both
+  std::int64_t states = 0;        ///< initial states that count (with seeds, but of a bet and of kappa each once);
+                                  ///< where the rule compares, in both
   std::int64_t flips_worse = 0;   ///< baseline succeeded, candidate did not
   std::int64_t flips_better = 0;  ///< the other way round
   std::vector<CounterExample> counter_examples;

@@ -137,11 +137,12 @@ void HoldKappa(const GateRule& rule, const RunSummary& run, const GateSides& sid
   Hold(rule, {kappa(1 - 2 * rule.alpha), [=](double c) { return kappa(c).interval; }, *rule.at_least}, evidence);
   RuleDecision& decision = evidence.decision;
   decision.policy.clear();
-  decision.states = table.total();
+  decision.states = std::ssize(states);
   decision.statement = fmt::format(
-      "kappa of {} with {} in {}: {} ({:g} %) over {} that both judged, {} only {} and {} only {} a success",
+      "kappa of {} with {} in {}: {} ({:g} %) over {} of {} that both judged, {} only {} and {} only {} a "
+      "success",
       run.options.judge, rule.against, sides.world, NumberWithInterval(decision.value), 100 * (1 - 2 * rule.alpha),
-      Counted(table.total(), "episode"), table.only_judge_success, run.options.judge, table.only_human_success,
+      Counted(table.total(), "episode"), Counted(decision.states, "initial state"), table.only_judge_success, run.options.judge, table.only_human_success,
       rule.against);
 }
 

@@ -29,8 +29,7 @@ bool Decides(const Verdict& verdict) { return verdict.label == Label::kSuccess |
 /// What a judge and the truth said of the episodes of one world.
 struct Said {
   ConfusionByState states;
-  std::vector<double> probabilities;  ///< where the judge gave one, and
-  std::vector<int> outcomes;          ///< what truly happened
+  StatedByState stated;  ///< where the judge gave a probability
   std::int64_t apart = 0;
 
   void Add(const PairKey& pair, const Verdict& verdict, const Verdict& truth) {
@@ -39,10 +38,9 @@ struct Said {
       return;
     }
     const bool is = truth.label == Label::kSuccess;
-    states[{pair.task, pair.initial_state}].Add(verdict.label == Label::kSuccess, is);
-    if (!verdict.probability) return;
-    probabilities.push_back(*verdict.probability);
-    outcomes.push_back(is ? 1 : 0);
+    const StateKey state = {pair.task, pair.initial_state};
+    states[state].Add(verdict.label == Label::kSuccess, is);
+    if (verdict.probability) stated[state].push_back({*verdict.probability, is});
   }
 };
 
@@ -74,10 +72,9 @@ JudgeAgreement AgreementOf(const RunSummary& summary, const std::string& judge, 
   }
   agreement.apart = said.apart;
   agreement.confusion = SumOf(said.states);
-  agreement.with_probability = std::ssize(said.probabilities);
   agreement.statistics = StatisticsByState(said.states, summary.options.confidence);
   agreement.bias = BiasOf(said.states, summary.options.confidence);
-  if (!said.probabilities.empty()) agreement.calibration = CalibrationOf(said.probabilities, said.outcomes);
+  agreement.calibration = CalibrationByState(said.stated, summary.options.confidence);
   return agreement;
 }
 

@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include "core/statistics/calibration.h"
 #include "core/statistics/confusion.h"
 #include "core/statistics/estimate.h"
 #include "reports/summary.h"
@@ -21,7 +22,6 @@ struct JudgeAgreement {
   ConfusionStatistics statistics;
   Estimate bias;  ///< the judge's share of successes - the truth's, on the compared episodes, Tango's interval
   Calibration calibration;  ///< of its probabilities of success, where it gives any
-  std::int64_t with_probability = 0;
   bool IsCalibrated() const { return confusion.total() > 0; }
 };
 

@@ -8,9 +8,9 @@
 namespace evac {
 namespace {
 
-std::string NumberCell(const Number& number) {
-  return number ? fmt::format("<td class=\"num\">{}</td>", Plain(*number))
-                : fmt::format("<td class=\"num\" title=\"{}\">–</td>", Escaped(number.reason()));
+std::string EstimateCell(const Estimate& estimate) {
+  return estimate.value ? fmt::format("<td class=\"num\">{}</td>", Escaped(NumberWithInterval(estimate)))
+                        : fmt::format("<td class=\"num\" title=\"{}\">–</td>", Escaped(estimate.value.reason()));
 }
 
 std::string ConfusionCell(const Confusion& confusion) {
@@ -28,14 +28,14 @@ std::string JudgeRow(const JudgeAgreement& judge) {
                               Escaped(judge.against));
   }
   const std::string calibration =
-      judge.with_probability > 0 && judge.calibration.brier
-          ? fmt::format("Brier {}, ECE {} (n = {})", Plain(*judge.calibration.brier),
-                        judge.calibration.ece ? Plain(*judge.calibration.ece) : "–", judge.with_probability)
+      judge.calibration.ece
+          ? fmt::format("Brier {}, ECE {} (n = {})", Escaped(NumberWithInterval(judge.calibration.brier)),
+                        Plain(*judge.calibration.ece), judge.calibration.brier.n)
           : "gives none";
   return html + fmt::format("<td class=\"num\">{}</td>", judge.statistics.n) + ConfusionCell(judge.confusion) +
          fmt::format("<td class=\"num\">{}</td><td class=\"num\">{}</td><td class=\"num\">{}</td>", judge.apart,
                      Escaped(NumberWithInterval(judge.statistics.kappa)), Escaped(PointsWithInterval(judge.bias))) +
-         NumberCell(judge.statistics.sensitivity) + NumberCell(judge.statistics.specificity) + "<td>" + calibration +
+         EstimateCell(judge.statistics.sensitivity) + EstimateCell(judge.statistics.specificity) + "<td>" + calibration +
          "</td></tr>";
 }
 
@@ -94,11 +94,11 @@ std::string JudgesPart(const ReportData& report) {
   html += fmt::format(
       "<p class=\"quiet\">Each judge held against <b>{}</b>, world by world. Matrix: both success · only the judge · "
       "only "
-      "{} · both failure.</p><div class=\"wide\"><table class=\"points\"><thead><tr><th scope=\"col\">judge</th><th "
+      "{} · both failure. In brackets what is believed with {:.0f} %, over other initial states.</p><div class=\"wide\"><table class=\"points\"><thead><tr><th scope=\"col\">judge</th><th "
       "scope=\"col\">world</th><th scope=\"col\" class=\"num\">judged</th><th scope=\"col\" "
       "class=\"num\">compared</th><th "
       "scope=\"col\" class=\"num\">matrix</th><th scope=\"col\" class=\"num\" title=\"one of the two could not tell, "
-      "or gave no verdict that can be read\">neither</th><th scope=\"col\" class=\"num\">kappa [{:.0f} %]</th><th "
+      "or gave no verdict that can be read\">neither</th><th scope=\"col\" class=\"num\">kappa</th><th "
       "scope=\"col\" class=\"num\" title=\"share that the judge calls a success, less the truth’s\">kinder by</th><th "
       "scope=\"col\" "
       "class=\"num\">sensitivity</th><th scope=\"col\" class=\"num\">specificity</th><th "

@@ -5,6 +5,7 @@
 
 #include "apps/judge_with_progress.h"
 #include "core/file.h"
+#include "core/statistics/calibration.h"
 #include "core/statistics/confusion.h"
 #include "core/statistics/roc.h"
 #include "core/video.h"

@@ -7,6 +7,7 @@
 #include <limits>
 #include <map>
 
+#include "core/statistics/calibration.h"
 #include "core/statistics/confusion.h"
 #include "core/statistics/roc.h"
 #include "core/statistics/threshold.h"

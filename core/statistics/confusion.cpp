@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "core/error.h"
+#include "core/statistics/rates.h"
 #include "core/statistics/special.h"
 
 namespace evac {
@@ -93,6 +94,25 @@ std::int64_t StatesWithItems(const ConfusionByState& states) {
   return std::ranges::count_if(states, [](const auto& state) { return state.second.total() > 0; });
 }
 
+/// A share with its interval, or why there is none.
+Estimate ShareOf(const Estimate& share, const char* if_none) {
+  Estimate result = share;
+  if (share.value) return result;
+  result.value = Undefined{if_none};
+  result.interval = Undefined{if_none};
+  return result;
+}
+Estimate SensitivityOf(const Estimate& share) { return ShareOf(share, "the human saw no success"); }
+Estimate SpecificityOf(const Estimate& share) { return ShareOf(share, "the human saw no failure"); }
+
+Estimate ByState(const ConfusionByState& states, double confidence, Count (*of)(const Confusion&)) {
+  std::vector<Count> counts;
+  for (const auto& [state, confusion] : states) counts.push_back(of(confusion));
+  return ClusteredWilsonInterval(counts, confidence);
+}
+Count Sensed(const Confusion& c) { return {c.both_success, c.both_success + c.only_human_success}; }
+Count Specified(const Confusion& c) { return {c.both_failure, c.both_failure + c.only_judge_success}; }
+
 void RequireCounts(const Confusion& c) {
   if (std::min({c.both_success, c.only_judge_success, c.only_human_success, c.both_failure}) < 0)
     throw InvalidInput("statistics: a confusion table with a negative count");
@@ -100,21 +120,6 @@ void RequireCounts(const Confusion& c) {
 
 void RequireShare(double share, const char* name) {
   if (!(share >= 0 && share <= 1)) throw InvalidInput("statistics: {} is {}, wanted 0 <= {} <= 1", name, share, name);
-}
-
-void Check(std::span<const double> probabilities, std::span<const int> outcomes, const CalibrationOptions& options) {
-  if (probabilities.size() != outcomes.size()) {
-    throw InvalidInput("statistics: {} probabilities of {} outcomes, wanted the same number", probabilities.size(),
-                       outcomes.size());
-  }
-  if (options.bins < 1) throw InvalidInput("statistics: {} bins, wanted at least 1", options.bins);
-  if (!(options.epsilon >= 0 && options.epsilon < 0.5)) {
-    throw InvalidInput("statistics: epsilon is {}, wanted 0 <= epsilon < 0.5", options.epsilon);
-  }
-  for (const double p : probabilities) RequireShare(p, "probability");
-  for (const int outcome : outcomes) {
-    if (outcome != 0 && outcome != 1) throw InvalidInput("statistics: an outcome of {}, wanted 0 or 1", outcome);
-  }
 }
 
 }  // namespace
@@ -141,6 +146,8 @@ ConfusionStatistics StatisticsByState(const ConfusionByState& states, double con
   for (const auto& [state, confusion] : states) RequireCounts(confusion);
   const Confusion all = SumOf(states);
   ConfusionStatistics result = StatisticsOf(all, confidence);
+  result.sensitivity = SensitivityOf(ByState(states, confidence, Sensed));
+  result.specificity = SpecificityOf(ByState(states, confidence, Specified));
   if (!result.kappa.interval || !HasRepeats(states)) return result;
   result.kappa.method = "linearised by initial state";
   const Number by_state = StateSe(states, all, *result.chance);
@@ -167,6 +174,9 @@ ConfusionStatistics StatisticsOf(const Confusion& confusion, double confidence) 
   result.kappa.n = result.n;
   result.kappa.value = Undefined{"no items"};
   result.kappa.interval = Undefined{"no items"};
+  const Count sensed = Sensed(confusion), specified = Specified(confusion);
+  result.sensitivity = SensitivityOf(WilsonInterval(sensed.successes, sensed.trials, confidence));
+  result.specificity = SpecificityOf(WilsonInterval(specified.successes, specified.trials, confidence));
   if (result.n == 0) return result;
 
   const double n = static_cast<double>(result.n), dtp = static_cast<double>(tp), dfp = static_cast<double>(fp),
@@ -180,12 +190,9 @@ ConfusionStatistics StatisticsOf(const Confusion& confusion, double confidence) 
   result.matthews =
       Ratio(dtp * dtn - dfp * dfn, std::sqrt((dtp + dfp) * (dtp + dfn)) * std::sqrt((dtn + dfp) * (dtn + dfn)),
             "one of the two always gave the same answer");
-  result.sensitivity = Ratio(dtp, dtp + dfn, "the human saw no success");
-  result.specificity = Ratio(dtn, dtn + dfp, "the human saw no failure");
   result.balanced_accuracy = Undefined{"the human always gave the same answer"};
-  if (result.sensitivity && result.specificity) {
-    result.balanced_accuracy = (*result.sensitivity + *result.specificity) / 2;
-  }
+  if (result.sensitivity.value && result.specificity.value)
+    result.balanced_accuracy = (*result.sensitivity.value + *result.specificity.value) / 2;
   result.precision = Ratio(dtp, dtp + dfp, "the judge saw no success");
   result.f1 = Ratio(2 * dtp, 2 * dtp + dfp + dfn, "nobody saw a success");
   result.bias = (dfp - dfn) / n;
@@ -211,30 +218,6 @@ CorrectedRate RoganGladen(const JudgedRate& judged, const JudgeQuality& quality)
   result.se = std::sqrt(variance(judged.rate, judged.n) + raw * raw * variance(quality.sensitivity, quality.positives) +
                         (1 - raw) * (1 - raw) * variance(quality.specificity, quality.negatives)) /
               std::abs(youden);
-  return result;
-}
-
-Calibration CalibrationOf(std::span<const double> probabilities, std::span<const int> outcomes,
-                          const CalibrationOptions& options) {
-  Check(probabilities, outcomes, options);
-  Calibration result;
-  if (probabilities.empty()) return result;
-  const double n = static_cast<double>(probabilities.size());
-  std::vector<double> excess(static_cast<std::size_t>(options.bins), 0);  // of stated probability over outcomes, by bin
-  double brier = 0, log_loss = 0;
-  for (std::size_t i = 0; i < probabilities.size(); ++i) {
-    const double p = probabilities[i], outcome = outcomes[i];
-    const double clipped = std::clamp(p, options.epsilon, 1 - options.epsilon);
-    const int bin = std::min(static_cast<int>(std::floor(p * options.bins)), options.bins - 1);
-    excess[static_cast<std::size_t>(bin)] += p - outcome;
-    brier += (p - outcome) * (p - outcome) / n;
-    log_loss -= std::log(outcomes[i] == 1 ? clipped : 1 - clipped) / n;
-  }
-  double ece = 0;
-  for (const double difference : excess) ece += std::abs(difference) / n;
-  result.brier = brier;
-  result.ece = ece;
-  result.log_loss = Finite(log_loss);
   return result;
 }
 

@@ -2,7 +2,6 @@
 
 #include <cstdint>
 #include <map>
-#include <span>
 #include <string>
 #include <utility>
 
@@ -22,8 +21,9 @@ struct Confusion {
   Confusion& operator+=(const Confusion& other);
 };
 
-/// Items by task and initial state: clips of one state, by several policies or seeds, tell less than as many others.
-using ConfusionByState = std::map<std::pair<std::string, std::string>, Confusion>;
+/// Task and initial state: clips of one state, by several policies or seeds, tell less than as many others.
+using StateKey = std::pair<std::string, std::string>;
+using ConfusionByState = std::map<StateKey, Confusion>;
 Confusion SumOf(const ConfusionByState& states);
 
 /// Each undefined where its denominator is 0.
@@ -36,7 +36,7 @@ struct ConfusionStatistics {
   Number pabak = Undefined{"no items"};  ///< prevalence- and bias-adjusted: 2 accuracy - 1
   Number gwet_ac1 = Undefined{"no items"};  ///< chance 2 q (1 - q), q the mean share of successes
   Number matthews = Undefined{"no items"};  ///< Matthews' correlation
-  Number sensitivity = Undefined{"no items"}, specificity = Undefined{"no items"};
+  Estimate sensitivity, specificity;         ///< shares of the human's successes and failures, Wilson's interval
   Number balanced_accuracy = Undefined{"no items"};  ///< mean of the two
   Number precision = Undefined{"no items"}, f1 = Undefined{"no items"};
   Number bias = Undefined{"no items"};  ///< judge's success rate - human's: above 0 where the judge is too kind
@@ -44,8 +44,8 @@ struct ConfusionStatistics {
 };
 /// @throws InvalidInput if a count is negative or unless 0 < confidence < 1.
 ConfusionStatistics StatisticsOf(const Confusion& confusion, double confidence = 0.95);
-/// The same of the sum, but for kappa's SE and interval, which hold over other initial states of the kind: errors of the
-/// linearised kappa are summed within each of the G states that have items before they are squared (G / (G - 1) times),
+/// The same of the sum, but for intervals, which hold over other initial states of the kind. Sensitivity and specificity
+/// count by their design effect (ClusteredWilsonInterval). Of kappa the errors of the linearised kappa are summed within each of the G states that have items before they are squared (G / (G - 1) times),
 /// never below that of independent items, and the interval takes Student's t of G - 1 degrees. Undefined for one state of
 /// several items; with one item a state, as above.
 ConfusionStatistics StatisticsByState(const ConfusionByState& states, double confidence = 0.95);
@@ -66,20 +66,5 @@ struct CorrectedRate {
 };
 /// Undefined for a judge no better than chance. @throws InvalidInput for shares outside [0, 1].
 CorrectedRate RoganGladen(const JudgedRate& judged, const JudgeQuality& quality);
-
-/// How far stated probabilities of success can be believed.
-struct Calibration {
-  Number brier = Undefined{"no items"};  ///< mean (p - outcome)²
-  Number ece = Undefined{"no items"};  ///< expected calibration error over equal bins of p, [i / bins, (i + 1) / bins)
-  Number log_loss = Undefined{"no items"};  ///< with p clipped to [epsilon, 1 - epsilon]
-};
-struct CalibrationOptions {
-  int bins = 10;
-  double epsilon = 1e-6;
-};
-/// @param probabilities in [0, 1]. @param outcomes 1 success, 0 failure, of the same length.
-/// @throws InvalidInput for anything else.
-Calibration CalibrationOf(std::span<const double> probabilities, std::span<const int> outcomes,
-                          const CalibrationOptions& options = {});
 
 }  // namespace evac

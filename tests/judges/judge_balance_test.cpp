@@ -120,8 +120,8 @@ TEST(JudgeBalance, MovesTheThresholdByWhatTheJudgeIsTooKind) {
   EXPECT_NEAR(*kind.value, 0.7, 0.04);
   const ConfusionStatistics before = StatisticsOf(ConfusionAt(Clips(0.2, 100), 0.5)),
                             after = StatisticsOf(ConfusionAt(Clips(0.2, 100), *kind.value));
-  EXPECT_GT(1 - *before.specificity, 2 * (1 - *before.sensitivity));
-  EXPECT_NEAR(1 - *after.specificity, 1 - *after.sensitivity, 0.02);
+  EXPECT_GT(1 - *before.specificity.value, 2 * (1 - *before.sensitivity.value));
+  EXPECT_NEAR(1 - *after.specificity.value, 1 - *after.sensitivity.value, 0.02);
 }
 
 TEST(JudgeBalance, LiesWhereAJudgeThatIsTooSureNeedsIt) {

@@ -75,8 +75,8 @@ TEST(JudgeCalibration, CountsWhoSaidWhatAndLeavesOutWhatEitherDidNotDecide) {
   EXPECT_EQ(all.confusion.both_failure, 1);
   EXPECT_EQ(all.errors, 1);
   EXPECT_EQ(all.cannot_tell, 0);
-  EXPECT_NEAR(*all.statistics.sensitivity, 2.0 / 3, 1e-12);
-  EXPECT_NEAR(*all.calibration.brier, (2 * 0.01 + 0.64 + 0.81 + 0.04) / 5, 1e-12);
+  EXPECT_NEAR(*all.statistics.sensitivity.value, 2.0 / 3, 1e-12);
+  EXPECT_NEAR(*all.calibration.brier.value, (2 * 0.01 + 0.64 + 0.81 + 0.04) / 5, 1e-12);
   std::vector<std::string> groups;
   for (const JudgeQualityRow& row : report.rows) groups.push_back(row.group);
   EXPECT_EQ(groups, (std::vector<std::string>{"all", "task take", "world real", "policy policy@v1"}));

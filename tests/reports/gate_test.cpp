@@ -278,7 +278,24 @@ TEST(Gate, TheJudgeIsHeldAgainstAnother) {
   const GateDecision decision = decide("at_least: 0.8");
   EXPECT_THAT(decision.rules[0].statement, HasSubstr("kappa of oracle with human in sim: 1.00"))
       << "and it may be undecided: it has no spread";
+  EXPECT_THAT(decision.rules[0].statement, HasSubstr("over 40 episodes of 40 initial states that both judged"));
   EXPECT_THAT(MessageOf([&] { decide("at_least: 0.8, against: vlm"); }), HasSubstr("against: found 'vlm'"));
+}
+
+TEST(Gate, TheClipsOfAStateAreOneStateToAJudge) {
+  RunSummary run = RepeatedRun({{"t", "p", {}, Alike(2, Repeat(10, 's') + Repeat(10, 'f'))}});
+  run.judges.push_back("human");
+  for (auto& [episode, verdicts] : run.data.verdicts) verdicts["human"] = verdicts.at("oracle");
+  const auto decide = [&](const std::string& rule) {
+    return Decide(Rules("  - {name: r, test: judge_kappa, world: sim, at_least: 0.8" + rule + "}\n"), {run, "out", {}},
+                  nullptr)
+        .decision.rules[0];
+  };
+  EXPECT_THAT(decide("").statement, HasSubstr("over 40 episodes of 20 initial states that both judged"));
+  EXPECT_EQ(decide("").states, 20);
+  const RuleDecision few = decide(", min_states: 21");
+  EXPECT_EQ(few.outcome, GateOutcome::kInconclusive);
+  EXPECT_THAT(few.statement, HasSubstr("20 of at least 21 states"));
 }
 
 TEST(Gate, TheStoredDecisionIsTheDecision) {

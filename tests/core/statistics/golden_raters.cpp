@@ -1,5 +1,6 @@
 #include "core/error.h"
 #include "core/statistics/bradley_terry.h"
+#include "core/statistics/calibration.h"
 #include "core/statistics/confusion.h"
 #include "core/statistics/dawid_skene.h"
 #include "core/statistics/rater_agreement.h"
@@ -87,8 +88,8 @@ Json ConfusionStats(const Json& in) {
           {"pabak", ToJson(s.pabak)},
           {"gwet_ac1", ToJson(s.gwet_ac1)},
           {"mcc", ToJson(s.matthews)},
-          {"sensitivity", ToJson(s.sensitivity)},
-          {"specificity", ToJson(s.specificity)},
+          {"sensitivity", ToJson(s.sensitivity.value)},
+          {"specificity", ToJson(s.specificity.value)},
           {"balanced_accuracy", ToJson(s.balanced_accuracy)},
           {"precision", ToJson(s.precision)},
           {"f1", ToJson(s.f1)},
@@ -109,7 +110,7 @@ Json CalibrationStats(const Json& in) {
   const std::vector<int> labels = in.at("label");
   const Calibration calibration =
       CalibrationOf(probabilities, labels, {.bins = in.value("bins", 10), .epsilon = in.value("eps", 1e-6)});
-  return {{"brier", ToJson(calibration.brier)},
+  return {{"brier", ToJson(calibration.brier.value)},
           {"ece", ToJson(calibration.ece)},
           {"logloss", ToJson(calibration.log_loss)}};
 }

@@ -1,12 +1,16 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <cmath>
+
 #include "core/error.h"
 #include "core/seed.h"
 #include "core/statistics/bradley_terry.h"
+#include "core/statistics/calibration.h"
 #include "core/statistics/confusion.h"
 #include "core/statistics/dawid_skene.h"
 #include "core/statistics/rater_agreement.h"
+#include "core/statistics/rates.h"
 #include "core/statistics/votes.h"
 
 namespace evac {
@@ -72,7 +76,7 @@ TEST(ConfusionTable, AnEmptyOrConstantOneLeavesUndefinedWhatItMust) {
   EXPECT_FALSE(empty.kappa.value);
   const ConfusionStatistics all_failures = StatisticsOf({.both_failure = 12});
   EXPECT_FALSE(all_failures.kappa.value);
-  EXPECT_FALSE(all_failures.sensitivity);
+  EXPECT_FALSE(all_failures.sensitivity.value);
   EXPECT_FALSE(all_failures.f1);
   EXPECT_EQ(*all_failures.gwet_ac1, 1);
   EXPECT_THROW(StatisticsOf({.both_success = -1}), Error);
@@ -145,6 +149,24 @@ TEST(ConfusionByState, ItemsOfOneStateDoNotSayHowKappaSpreads) {
   EXPECT_THROW(StatisticsByState({{{"lift", "0"}, {4, 0, 0, -1}}, {{"lift", "1"}, {0, 0, 0, 9}}}), Error);
 }
 
+TEST(ConfusionByState, SensitivityAndSpecificityKnowNoMoreThanTheirStates) {
+  const Confusion table{25, 4, 3, 8};
+  const ConfusionStatistics once = StatisticsOf(table), often = StatisticsByState(States(table, 5));
+  const ConfusionStatistics spread = StatisticsOf({125, 20, 15, 40});
+  for (const auto share : {&ConfusionStatistics::sensitivity, &ConfusionStatistics::specificity}) {
+    EXPECT_NEAR(*(often.*share).value, *(once.*share).value, 1e-12);
+    EXPECT_NEAR((often.*share).interval->low, (once.*share).interval->low, 1e-12);
+    EXPECT_LT((often.*share).interval->low, (spread.*share).interval->low - 0.03) << "as if they were independent";
+  }
+  const Estimate wilson = WilsonInterval(25, 28);
+  EXPECT_EQ(once.sensitivity.interval->low, wilson.interval->low);
+  EXPECT_EQ(once.sensitivity.n, 28);
+  EXPECT_EQ(once.specificity.n, 12);
+  const ConfusionStatistics no_success = StatisticsByState({{{"lift", "0"}, {0, 1, 0, 2}}});
+  EXPECT_EQ(no_success.sensitivity.value.reason(), "the human saw no success");
+  EXPECT_FALSE(no_success.sensitivity.interval);
+}
+
 TEST(RoganGladen, APerfectJudgeIsBelievedAndAUselessOneIsNot) {
   EXPECT_NEAR(*RoganGladen({0.3, 100}, {1, 1, 20, 20}).rate, 0.3, 1e-12);
   EXPECT_FALSE(RoganGladen({0.3, 100}, {0.7, 0.3, 20, 20}).rate);
@@ -155,12 +177,58 @@ TEST(RoganGladen, APerfectJudgeIsBelievedAndAUselessOneIsNot) {
 TEST(Calibration, PerfectProbabilitiesCostNothingAndBadInputIsRefused) {
   const std::vector<double> p{1, 0, 1};
   const std::vector<int> outcomes{1, 0, 1};
-  EXPECT_NEAR(*CalibrationOf(p, outcomes).brier, 0, 1e-12);
+  EXPECT_NEAR(*CalibrationOf(p, outcomes).brier.value, 0, 1e-12);
   EXPECT_NEAR(*CalibrationOf(p, outcomes).ece, 0, 1e-12);
-  EXPECT_FALSE(CalibrationOf({}, {}).brier);
+  EXPECT_FALSE(CalibrationOf({}, {}).brier.value);
   EXPECT_THROW(CalibrationOf(p, std::vector{1, 0}), Error);
   EXPECT_THROW(CalibrationOf(p, std::vector{1, 0, 2}), Error);
   EXPECT_THROW(CalibrationOf(p, outcomes, {.bins = 0}), Error);
+}
+
+/// 40 items of losses .01, .04 or .81, one per state; each so many times in its state.
+StatedByState StatedIn(int repeats) {
+  StatedByState states;
+  for (int i = 0; i < 40; ++i) {
+    const StatedProbability stated = {i % 7 == 0 ? 0.9 : i % 2 ? 0.1 : 0.2, false};
+    states[{"lift", std::to_string(i)}].assign(static_cast<std::size_t>(repeats), stated);
+  }
+  return states;
+}
+
+TEST(Calibration, TheSameClipFiveTimesTellsNoMoreOfBrierThanOnce) {
+  const Calibration once = CalibrationByState(StatedIn(1)), often = CalibrationByState(StatedIn(5));
+  const double brier = (6 * 0.81 + 17 * 0.01 + 17 * 0.04) / 40;
+  EXPECT_NEAR(*once.brier.value, brier, 1e-12);
+  double squares = 0;
+  for (const auto& [state, stated] : StatedIn(1))
+    squares += std::pow(stated.front().probability * stated.front().probability - brier, 2);
+  const double t_of_39 = 2.0226909;  // from a table
+  EXPECT_NEAR(once.brier.interval->high, brier + t_of_39 * std::sqrt(squares / 39 / 40), 1e-6);
+  EXPECT_NEAR(often.brier.interval->high, once.brier.interval->high, 1e-9);
+  EXPECT_EQ(often.brier.n, 200);
+  EXPECT_NEAR(*often.ece, *once.ece, 1e-12);
+}
+
+TEST(Calibration, StatesThatDifferLessThanChanceClaimNoMoreThanIndependentItems) {
+  StatedByState alike, apart;
+  for (int i = 0; i < 24; ++i) {
+    alike[{"lift", std::to_string(i / 2)}].push_back({i % 2 ? 0.1 : 0.8, false});
+    apart[{"lift", std::to_string(i)}].push_back({i % 2 ? 0.1 : 0.8, false});
+  }
+  const auto width = [](const StatedByState& states) {
+    const Interval interval = *CalibrationByState(states).brier.interval;
+    return interval.high - interval.low;
+  };
+  EXPECT_GE(width(alike), width(apart));
+}
+
+TEST(Calibration, ItemsOfOneStateDoNotSayHowBrierSpreads) {
+  const Calibration one = CalibrationByState({{{"lift", "0"}, {{0.2, false}, {0.7, true}}}, {{"lift", "1"}, {}}});
+  EXPECT_NEAR(*one.brier.value, (0.04 + 0.09) / 2, 1e-12);
+  ASSERT_FALSE(one.brier.interval);
+  EXPECT_EQ(one.brier.interval.reason(), "all items are of one initial state");
+  EXPECT_FALSE(CalibrationByState({}).brier.value);
+  EXPECT_THROW(CalibrationByState({{{"lift", "0"}, {{1.2, false}}}}), Error);
 }
 
 TEST(Votes, UnsureAndMissingDecideNothing) {

@@ -14,7 +14,7 @@ namespace {
 
 double ImbalanceAt(const std::vector<double>& probabilities, const std::vector<int>& outcomes, double threshold) {
   const ConfusionStatistics s = StatisticsOf(ConfusionAt(probabilities, outcomes, threshold));
-  return std::abs(*s.specificity - *s.sensitivity);
+  return std::abs(*s.specificity.value - *s.sensitivity.value);
 }
 
 TEST(Threshold, ErrorsAreCountedOfEachOutcome) {
@@ -24,14 +24,14 @@ TEST(Threshold, ErrorsAreCountedOfEachOutcome) {
   EXPECT_EQ(c.both_success + c.only_human_success, 2);
   EXPECT_EQ(c.only_human_success, 1);
   const ConfusionStatistics s = StatisticsOf(c);
-  EXPECT_DOUBLE_EQ(*s.specificity, 1 - 2.0 / 3);
-  EXPECT_DOUBLE_EQ(*s.sensitivity, 1.0 / 2);
+  EXPECT_DOUBLE_EQ(*s.specificity.value, 1 - 2.0 / 3);
+  EXPECT_DOUBLE_EQ(*s.sensitivity.value, 1.0 / 2);
   EXPECT_DOUBLE_EQ(*s.accuracy, 2.0 / 5);
 }
 
 TEST(Threshold, NoShareOfNothing) {
   const ConfusionStatistics s = StatisticsOf(ConfusionAt(std::vector<double>{0.1}, std::vector<int>{0}, 0.5));
-  EXPECT_FALSE(s.sensitivity);
+  EXPECT_FALSE(s.sensitivity.value);
   EXPECT_DOUBLE_EQ(*s.accuracy, 1);
   EXPECT_FALSE(StatisticsOf(ConfusionAt({}, {}, 0.5)).accuracy);
 }
