@@ -7,6 +7,7 @@
 
 #include "apps/commands.h"
 #include "judges/judge_calibration.h"
+#include "reports/counted_judges.h"
 
 namespace evac {
 namespace {
@@ -79,8 +80,10 @@ void DemandTwoJudges(const CalibrateArguments& arguments, const Store& store) {
   }
 }
 
-ExitCode Calibrate(const CalibrateArguments& arguments) {
+ExitCode Calibrate(CalibrateArguments arguments) {
   const Store store = Store::Open(arguments.run, Store::Mode::kReadOnly);
+  arguments.judge = FullJudgeNames(arguments.judge, store.Judges());
+  arguments.against = FullJudgeNames(arguments.against, store.Judges());
   DemandTwoJudges(arguments, store);
   const JudgeCalibrationReport report = CalibrateJudge(store, arguments.judge, arguments.against);
   if (arguments.as_json)
@@ -97,7 +100,9 @@ void AddCalibrate(CLI::App& judge, ExitCode& exit_code) {
   auto arguments = std::make_shared<CalibrateArguments>();
   CLI::App* command = judge.add_subcommand("calibrate", "Say how far a judge may be trusted: it against the truth");
   command->add_option("run", arguments->run, "the run's folder")->required();
-  command->add_option("--judge", arguments->judge, "whose verdicts are looked at: the name that `evac ls --json` shows")
+  command
+      ->add_option("--judge", arguments->judge,
+                   "whose verdicts are looked at: the name that `evac ls --json` shows; classifier, where only one is")
       ->required();
   command->add_option("--against", arguments->against, "whose verdicts are the truth: oracle, or human")
       ->capture_default_str();

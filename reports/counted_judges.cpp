@@ -20,9 +20,11 @@ std::vector<std::string> Names(const std::string& text) {
 
 std::string FullName(const std::string& name, const std::vector<std::string>& there) {
   std::vector<std::string> meant;
-  for (const std::string& judge : there) {
+  for (const std::string& judge : there) {  // in the order of names: "vlm:x" before its probe "vlm:x:flip"
     if (judge == name) return name;
-    if (judge.starts_with(name + ":")) meant.push_back(judge);
+    if (!judge.starts_with(name + ":")) continue;
+    const bool is_probe = std::ranges::any_of(meant, [&](const auto& other) { return judge.starts_with(other + ":"); });
+    if (!is_probe) meant.push_back(judge);
   }
   if (meant.size() > 1)
     throw InvalidInput("judge '{}': stands for {}, wanted the name of one", name, fmt::join(meant, " and "));

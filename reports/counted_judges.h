@@ -11,7 +11,8 @@
 namespace evac {
 
 /// @param wanted  names, best first, with commas. "classifier" stands for the one judge "classifier:…" if there is one.
-/// @param there   judges that gave verdicts
+///                A judge's probes ("vlm:x:flip") are meant by their full names alone.
+/// @param there   judges that gave verdicts, in the order of their names
 /// @returns       the same with full names; a name that nobody bears stays as it is
 /// @throws InvalidInput if an empty name is among them, or one stands for several judges.
 std::string FullJudgeNames(const std::string& wanted, const std::vector<std::string>& there);

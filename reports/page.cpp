@@ -81,6 +81,15 @@ std::string HashOf(const std::string& script) {
 
 }  // namespace
 
+std::string StackedCell(const Estimate& estimate, std::string (*written)(double)) {
+  if (!estimate.value)
+    return "<td class=\"num\">undefined<small class=\"why\">" + Escaped(estimate.value.reason()) + "</small></td>";
+  const Defined<Interval>& interval = estimate.interval;
+  return fmt::format("<td class=\"num\">{}{}</td>", written(*estimate.value),
+                     interval ? fmt::format("<small>[{}, {}]</small>", written(interval->low), written(interval->high))
+                              : fmt::format("<small class=\"why\">{}</small>", Escaped(interval.reason())));
+}
+
 std::string OutcomeBadge(Outcome outcome) {
   static constexpr const char* kSigns[] = {"✓", "✗", "?", "⊘", "!", "–"};
   return fmt::format("<span class=\"outcome {}\"><span aria-hidden=\"true\">{}</span> {}</span>", Name(outcome),

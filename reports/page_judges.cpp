@@ -1,5 +1,7 @@
 #include <fmt/format.h>
 
+#include <cmath>
+
 #include "reports/counted_judges.h"
 #include "reports/html.h"
 #include "reports/page_parts.h"
@@ -8,9 +10,16 @@
 namespace evac {
 namespace {
 
-std::string EstimateCell(const Estimate& estimate) {
-  return estimate.value ? fmt::format("<td class=\"num\">{}</td>", Escaped(NumberWithInterval(estimate)))
-                        : fmt::format("<td class=\"num\" title=\"{}\">–</td>", Escaped(estimate.value.reason()));
+std::string Points(double share) {
+  const double points = std::round(100 * share);
+  return points == 0 ? "0" : fmt::format("{:+.0f}", points);
+}
+
+/// Brier's score and ECE, of the probabilities that it gives.
+std::string CalibrationCells(const Calibration& calibration) {
+  if (!calibration.ece) return "<td class=\"num\" colspan=\"2\">it gives none</td>";
+  return StackedCell(calibration.brier) + fmt::format("<td class=\"num\">{}<small>n = {}</small></td>",
+                                                      Plain(*calibration.ece), calibration.brier.n);
 }
 
 std::string ConfusionCell(const Confusion& confusion) {
@@ -24,19 +33,27 @@ std::string JudgeRow(const JudgeAgreement& judge) {
   std::string html = fmt::format("<tr><th scope=\"row\">{}</th><td>{}</td><td class=\"num\">{}</td>",
                                  Breakable(judge.judge), Breakable(judge.world), judge.judged);
   if (!judge.IsCalibrated()) {
-    return html + fmt::format("<td colspan=\"8\">{} no episode was judged by {} too</td></tr>", Tag("uncalibrated"),
+    return html + fmt::format("<td colspan=\"9\">{} no episode was judged by {} too</td></tr>", Tag("uncalibrated"),
                               Escaped(judge.against));
   }
-  const std::string calibration =
-      judge.calibration.ece
-          ? fmt::format("Brier {}, ECE {} (n = {})", Escaped(NumberWithInterval(judge.calibration.brier)),
-                        Plain(*judge.calibration.ece), judge.calibration.brier.n)
-          : "gives none";
   return html + fmt::format("<td class=\"num\">{}</td>", judge.statistics.n) + ConfusionCell(judge.confusion) +
-         fmt::format("<td class=\"num\">{}</td><td class=\"num\">{}</td><td class=\"num\">{}</td>", judge.apart,
-                     Escaped(NumberWithInterval(judge.statistics.kappa)), Escaped(PointsWithInterval(judge.bias))) +
-         EstimateCell(judge.statistics.sensitivity) + EstimateCell(judge.statistics.specificity) + "<td>" + calibration +
-         "</td></tr>";
+         fmt::format("<td class=\"num\">{}</td>", judge.apart) + StackedCell(judge.statistics.kappa) +
+         StackedCell(judge.bias, Points) + StackedCell(judge.statistics.sensitivity) +
+         StackedCell(judge.statistics.specificity) + CalibrationCells(judge.calibration) + "</tr>";
+}
+
+std::string Heading() {
+  const auto number = [](const std::string& name, const std::string& more = "") {
+    const std::string title = more.empty() ? "" : fmt::format(" title=\"{}\"", more);
+    return fmt::format("<th scope=\"col\" class=\"num\"{}>{}</th>", title, name);
+  };
+  return "<div class=\"wide\"><table class=\"points\"><thead><tr><th scope=\"col\">judge</th><th "
+         "scope=\"col\">world</th>" +
+         number("judged") + number("compared") + number("matrix") +
+         number("neither", "one of the two could not tell, or gave no verdict that can be read") + number("kappa") +
+         number("kinder by", "share that the judge calls a success, less the truth’s, in points") +
+         number("sensitivity") + number("specificity") + number("Brier", "of the probabilities of success") +
+         number("ECE", "expected calibration error, in ten bins") + "</tr></thead><tbody>";
 }
 
 std::string Raters(const JudgeReport& judges) {
@@ -92,18 +109,10 @@ std::string JudgesPart(const ReportData& report) {
            Raters(judges) + Calls(report.summary.data.judge_calls) + "</section>";
   }
   html += fmt::format(
-      "<p class=\"quiet\">Each judge held against <b>{}</b>, world by world. Matrix: both success · only the judge · "
-      "only "
-      "{} · both failure. In brackets what is believed with {:.0f} %, over other initial states.</p><div class=\"wide\"><table class=\"points\"><thead><tr><th scope=\"col\">judge</th><th "
-      "scope=\"col\">world</th><th scope=\"col\" class=\"num\">judged</th><th scope=\"col\" "
-      "class=\"num\">compared</th><th "
-      "scope=\"col\" class=\"num\">matrix</th><th scope=\"col\" class=\"num\" title=\"one of the two could not tell, "
-      "or gave no verdict that can be read\">neither</th><th scope=\"col\" class=\"num\">kappa</th><th "
-      "scope=\"col\" class=\"num\" title=\"share that the judge calls a success, less the truth’s\">kinder by</th><th "
-      "scope=\"col\" "
-      "class=\"num\">sensitivity</th><th scope=\"col\" class=\"num\">specificity</th><th "
-      "scope=\"col\">probabilities</th></tr></thead><tbody>",
+      "<p class=\"quiet\">Each judge held against <b>{}</b>, world by world. Matrix: both success · only the judge · only "
+      "{} · both failure. In brackets what is believed with {:.0f} %, over other initial states.</p>",
       Escaped(judges.truth), Escaped(judges.truth), 100 * report.summary.options.confidence);
+  html += Heading();
   for (const JudgeAgreement& judge : judges.judges) html += JudgeRow(judge);
   return html + "</tbody></table></div>" + Raters(judges) + Calls(report.summary.data.judge_calls) + "</section>";
 }

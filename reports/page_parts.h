@@ -2,8 +2,10 @@
 
 #include <string>
 
+#include "core/statistics/estimate.h"
 #include "reports/charts.h"
 #include "reports/page.h"
+#include "reports/wording.h"
 
 /// The parts of the page, one function each, in the order they are read. All return HTML; texts are escaped inside.
 namespace evac {
@@ -44,6 +46,9 @@ std::string PageHead(const std::string& title, PageScripts scripts, const std::s
 
 /// <body> of a run's page inside a dashboard, with what the script holds against the news (page/live.js).
 std::string LiveBody(const PageOptions& options);
+
+/// A table's cell: a value above its interval, or above the reason why it has none.
+std::string StackedCell(const Estimate& estimate, std::string (*written)(double) = Plain);
 
 /// "✓ success", with a class that colours it.
 std::string OutcomeBadge(Outcome outcome);

@@ -23,18 +23,6 @@ std::string StatisticRow(const std::string& name, const Estimate& estimate, cons
       estimate.n);
 }
 
-/// A value with its interval, or the reason why there is none, below it.
-std::string StackedCell(const Estimate& estimate) {
-  if (!estimate.value)
-    return "<td class=\"num\">undefined<small class=\"why\">" + Escaped(estimate.value.reason()) + "</small></td>";
-  if (!estimate.interval) {
-    return fmt::format("<td class=\"num\">{}<small class=\"why\">{}</small></td>", Plain(*estimate.value),
-                       Escaped(estimate.interval.reason()));
-  }
-  return fmt::format("<td class=\"num\">{}<small>[{}, {}]</small></td>", Plain(*estimate.value),
-                     Plain(estimate.interval->low), Plain(estimate.interval->high));
-}
-
 /// "90 % [70, 97]", its interval on a line of its own where there is little room.
 std::string RateCellOf(const Estimate& rate) {
   if (rate.value && !rate.interval) return "<td class=\"num\">" + Percent(*rate.value) + "</td>";

@@ -45,9 +45,10 @@ struct ConfusionStatistics {
 /// @throws InvalidInput if a count is negative or unless 0 < confidence < 1.
 ConfusionStatistics StatisticsOf(const Confusion& confusion, double confidence = 0.95);
 /// The same of the sum, but for intervals, which hold over other initial states of the kind. Sensitivity and specificity
-/// count by their design effect (ClusteredWilsonInterval). Of kappa the errors of the linearised kappa are summed within each of the G states that have items before they are squared (G / (G - 1) times),
-/// never below that of independent items, and the interval takes Student's t of G - 1 degrees. Undefined for one state of
-/// several items; with one item a state, as above.
+/// count by their design effect (ClusteredWilsonInterval). Of kappa the errors of the linearised kappa are summed within
+/// each of the G states that have items before they are squared (G / (G - 1) times), never below that of independent
+/// items, and the interval takes Student's t of G - 1 degrees. Undefined for one state of several items; with one item a
+/// state, as above.
 ConfusionStatistics StatisticsByState(const ConfusionByState& states, double confidence = 0.95);
 
 /// What a judge with known errors saw, corrected (Rogan & Gladen 1978).

@@ -93,7 +93,7 @@ TEST(Summary, OfSeveralJudgesTheFirstThatCanTellCountsEpisodeByEpisode) {
 }
 
 TEST(Summary, AJudgesShortNameStandsForOneOrIsRefused) {
-  const std::vector<std::string> there = {"classifier:abc", "classifier:def", "oracle", "vlm:x"};
+  const std::vector<std::string> there = {"classifier:abc", "classifier:def", "oracle", "vlm:x", "vlm:x:flip"};
   EXPECT_EQ(FullJudgeNames("vlm", there), "vlm:x");
   EXPECT_EQ(FullJudgeNames("classifier:def,oracle", there), "classifier:def,oracle");
   EXPECT_EQ(FullJudgeNames("nobody", there), "nobody");
