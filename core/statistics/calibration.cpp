@@ -98,6 +98,10 @@ Calibration CalibrationByState(const StatedByState& states, double confidence) {
     result.brier.interval = Undefined{"all items are of one initial state"};
     return result;
   }
+  if (spread.se < 1e-12) {
+    result.brier.interval = Undefined{"the estimated spread is 0"};
+    return result;
+  }
   const double half = TwoSidedT(confidence, spread.states - 1) * spread.se;
   result.brier.interval = Interval{std::max(0.0, brier - half), std::min(1.0, brier + half)};
   return result;

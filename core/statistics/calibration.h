@@ -31,7 +31,8 @@ struct StatedProbability {
   bool is_success = false;
 };
 using StatedByState = std::map<StateKey, std::vector<StatedProbability>>;
-/// The same of all, and Brier's interval over other initial states, made as kappa's is (StatisticsByState), within 0 … 1.
+/// The same of all, and Brier's interval over other initial states, made as kappa's is (StatisticsByState), within 0 … 1;
+/// none where all losses are equal, and short of what it promises where few are large (docs/statistics.md).
 /// ECE has none: of few items it is above 0 even where the probabilities are right, so no interval about it holds the true
 /// one.
 Calibration CalibrationByState(const StatedByState& states, double confidence = 0.95);

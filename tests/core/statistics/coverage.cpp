@@ -7,6 +7,7 @@
 
 #include "core/seed.h"
 #include "core/statistics/association.h"
+#include "core/statistics/calibration.h"
 #include "core/statistics/confusion.h"
 #include "core/statistics/paired_bootstrap.h"
 #include "core/statistics/ppi.h"
@@ -76,13 +77,21 @@ PairedOutcomes DrawPairs(SplitMix64& random, int n, const FlipSetting& setting) 
 }
 
 /// A share of the states is hard to judge; half of all clips are successes, those of one state mostly alike.
-struct KappaSetting {
+constexpr double kErrsElsewhere = 0.03;
+struct JudgeSetting {
   int clips;
   double hard, errs_there;
-};
-constexpr double kErrsElsewhere = 0.03;
 
-ConfusionByState DrawStates(SplitMix64& random, int n, const KappaSetting& setting) {
+  double Errs() const { return hard * errs_there + (1 - hard) * kErrsElsewhere; }
+  double Kappa() const { return 1 - 2 * Errs(); }
+  std::string Text(const std::string& truth) const {
+    return fmt::format("{} a state, true {}, errs in {} of the states {} of the time",
+                       clips == 1 ? "1 clip" : std::to_string(clips) + " clips", truth, hard, errs_there);
+  }
+};
+constexpr JudgeSetting kJudges[] = {{1, .2, .5}, {5, .2, .5}, {5, .1, .9}, {10, .1, .9}};
+
+ConfusionByState DrawStates(SplitMix64& random, int n, const JudgeSetting& setting) {
   ConfusionByState states;
   for (int i = 0; i < n; ++i) {
     const bool succeeds = Flip(random, 0.5), is_hard = Flip(random, setting.hard);
@@ -93,6 +102,20 @@ ConfusionByState DrawStates(SplitMix64& random, int n, const KappaSetting& setti
     }
   }
   return states;
+}
+
+/// The same judge, who is sure of each verdict to .9.
+constexpr double kSure = 0.9;
+StatedByState Stated(const ConfusionByState& states) {
+  StatedByState stated;
+  for (const auto& [state, c] : states) {
+    std::vector<StatedProbability>& items = stated[state];
+    items.insert(items.end(), static_cast<std::size_t>(c.both_success), {kSure, true});
+    items.insert(items.end(), static_cast<std::size_t>(c.only_judge_success), {kSure, false});
+    items.insert(items.end(), static_cast<std::size_t>(c.only_human_success), {1 - kSure, true});
+    items.insert(items.end(), static_cast<std::size_t>(c.both_failure), {1 - kSure, false});
+  }
+  return stated;
 }
 
 /// Real outcomes with rate p; the model says the same with probability `agreement`.
@@ -204,19 +227,34 @@ std::vector<Row> Differences(const SimulationOptions& options) {
 std::vector<Row> Kappas(const SimulationOptions& options) {
   std::vector<Row> rows;
   for (const int n : kSizes) {
-    for (const KappaSetting& setting : {KappaSetting{1, .2, .5}, {5, .2, .5}, {5, .1, .9}, {10, .1, .9}}) {
-      const double errs = setting.hard * setting.errs_there + (1 - setting.hard) * kErrsElsewhere, kappa = 1 - 2 * errs;
+    for (const JudgeSetting& setting : kJudges) {
+      const double kappa = setting.Kappa();
       const auto replicate = [&](SplitMix64& random, std::span<Tally> tallies) {
         const ConfusionByState states = DrawStates(random, n, setting);
         tallies[0].Add(StatisticsByState(states).kappa.interval, kappa);
         tallies[1].Add(StatisticsOf(SumOf(states)).kappa.interval, kappa);
       };
-      rows.push_back(Simulate({fmt::format("{} a state, true kappa {:.2f}, errs in {} of the states {} of the time",
-                                           setting.clips == 1 ? "1 clip" : std::to_string(setting.clips) + " clips",
-                                           kappa, setting.hard, setting.errs_there),
-                               n,
-                               {}},
+      rows.push_back(Simulate({setting.Text(fmt::format("kappa {:.2f}", kappa)), n, {}},
                               {"by state", "Fleiss-Cohen-Everitt"}, options, replicate));
+    }
+  }
+  return rows;
+}
+
+std::vector<Row> SensitivitiesAndBriers(const SimulationOptions& options) {
+  std::vector<Row> rows;
+  for (const int n : kSizes) {
+    for (const JudgeSetting& setting : kJudges) {
+      const double sensitivity = 1 - setting.Errs();
+      const double brier = (1 - kSure) * (1 - kSure) * (1 - setting.Errs()) + kSure * kSure * setting.Errs();
+      const auto replicate = [&](SplitMix64& random, std::span<Tally> tallies) {
+        const ConfusionByState states = DrawStates(random, n, setting);
+        tallies[0].Add(StatisticsByState(states).sensitivity.interval, sensitivity);
+        tallies[1].Add(StatisticsOf(SumOf(states)).sensitivity.interval, sensitivity);
+        tallies[2].Add(CalibrationByState(Stated(states)).brier.interval, brier);
+      };
+      rows.push_back(Simulate({setting.Text(fmt::format("{:.2f} and {:.2f}", sensitivity, brier)), n, {}},
+                              {"sensitivity by state", "sensitivity, Wilson", "Brier by state"}, options, replicate));
     }
   }
   return rows;

@@ -32,6 +32,8 @@ std::vector<Row> Rates(const SimulationOptions& options);
 std::vector<Row> Differences(const SimulationOptions& options);
 /// Kappa of a judge who errs alike in clips of one initial state: by state and as if all clips were independent; n states.
 std::vector<Row> Kappas(const SimulationOptions& options);
+/// Sensitivity of the same judge, by state and as if all clips were independent, and its Brier's score by state.
+std::vector<Row> SensitivitiesAndBriers(const SimulationOptions& options);
 /// The real rate from n real trials and 10 n further imagined ones: Wilson on the real ones alone, PPI++'s normal
 /// interval, MOVER, betting.
 std::vector<Row> FewReal(const SimulationOptions& options);

@@ -60,6 +60,21 @@ TEST(Coverage, KappaByStateHoldsWhereClipsRepeatStatesAndFleissCohenEverittDoesN
   }
 }
 
+TEST(Coverage, SensitivityByStateHoldsWhereClipsRepeatStatesAndWilsonDoesNot) {
+  for (const Row& row : SensitivitiesAndBriers(Options())) {
+    const bool repeats = row.setting.find("1 clip ") == std::string::npos;
+    if (row.n >= 40) {
+      EXPECT_GT(Of(row, "sensitivity by state").share, 0.91 - Noise(0.91)) << row.setting << ", n " << row.n;
+      EXPECT_GT(Of(row, "Brier by state").share, 0.88 - Noise(0.88)) << row.setting << ", n " << row.n;
+    }
+    if (repeats) {
+      EXPECT_LT(Of(row, "sensitivity, Wilson").share, 0.91) << row.setting << ", n " << row.n;
+    } else {
+      EXPECT_EQ(Of(row, "sensitivity by state").share, Of(row, "sensitivity, Wilson").share) << row.n;
+    }
+  }
+}
+
 TEST(Coverage, MoverAndBettingHoldTheirPromiseWherePpiPlusPlusDoesNot) {
   double worst_normal = 1;
   for (const Row& row : FewReal(Options())) {

@@ -228,6 +228,8 @@ TEST(Calibration, ItemsOfOneStateDoNotSayHowBrierSpreads) {
   ASSERT_FALSE(one.brier.interval);
   EXPECT_EQ(one.brier.interval.reason(), "all items are of one initial state");
   EXPECT_FALSE(CalibrationByState({}).brier.value);
+  const Calibration alike = CalibrationByState({{{"lift", "0"}, {{0.9, true}}}, {{"lift", "1"}, {{0.9, true}}}});
+  EXPECT_EQ(alike.brier.interval.reason(), "the estimated spread is 0") << "no error seen is not none there";
   EXPECT_THROW(CalibrationByState({{{"lift", "0"}, {{1.2, false}}}}), Error);
 }
 

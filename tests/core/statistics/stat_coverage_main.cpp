@@ -39,6 +39,7 @@ void PrintAll(const SimulationOptions& options) {
   Print("One rate", Rates(options));
   Print("Difference of two rates", Differences(options));
   Print("Kappa of a judge, n initial states", Kappas(options));
+  Print("Sensitivity and Brier's score of a judge, n initial states", SensitivitiesAndBriers(options));
   Print("The real rate from n real and 10 n further imagined trials", FewReal(options));
   Print("Pearson's r over 6 policies", Bootstrap({options.replicates / 10, options.seed}));
   Print(Peeking(options));
