@@ -57,8 +57,8 @@ json Json(const JudgeQualityRow& row) {
 json Json(const JudgeCalibrationReport& report) {
   json rows = json::array(), probes = json::object();
   for (const JudgeQualityRow& row : report.rows) rows.push_back(Json(row));
-  for (const auto& [probe, count] : report.consistency)
-    probes[probe] = {{"same", count.successes}, {"of", count.trials}};
+  for (const auto& [probe, said] : report.probes)
+    probes[probe] = {{"same", said.same.successes}, {"of", said.same.trials}, {"share", Json(said.share)}};
   return {{"judge", report.judge},
           {"truth", report.truth},
           {"rows", rows},

@@ -88,7 +88,10 @@ Recording RecordingOf(const Suite& suite) {
 
 void FillInRecordedTask(Suite& suite) {
   if (!suite.recording || !suite.tasks.empty()) return;
-  suite.tasks = {TaskFromRecording(RecordingOf(suite))};
+  Task task = TaskFromRecording(RecordingOf(suite));
+  task.max_chunks = (task.max_chunks + suite.chunk_size - 1) / suite.chunk_size;  // it counts steps there
+  if (suite.recorded_still) task.still = *suite.recorded_still;
+  suite.tasks = {std::move(task)};
 }
 
 void CheckRubrics(const Suite& suite) {

@@ -254,6 +254,10 @@ Suite Build(const Config& page) {
   for (const Config& world : page.List("worlds")) suite.worlds.push_back(ReadWorld(world));
   for (const Config& policy : page.List("policies")) suite.policies.push_back(ReadPolicy(policy));
   if (page.Has("recording")) suite.recording = page.Path("recording");
+  if (suite.recording) {
+    page.Require(!page.Has("image"), "image", "none beside a `recording`: its pictures are of its videos' size");
+    if (page.Has("still")) suite.recorded_still = ReadStillRule(page.Section("still"), StillRule{});
+  }
   suite.tasks = ReadTasks(page);
   suite.seeds = page.Get<std::vector<std::uint64_t>>("seeds", {1});
   if (suite.recording) {

@@ -64,6 +64,7 @@ struct Suite {
   PolicyLatency latency;
   StartProbe start_probe = StartProbe::kRefuse;
   std::optional<std::filesystem::path> recording;
+  std::optional<StillRule> recorded_still;  ///< of the recording's task; none: only the end of the actions or the limit ends it
 };
 
 /// The initial states that a world tries.

@@ -90,19 +90,29 @@ std::vector<std::string> Refusals(const std::vector<JudgedItem>& items, const Ju
 }
 
 /// A probe says the same where its label is the judge's; where either decided nothing, it is not counted.
-std::map<std::string, Count> Consistency(const std::map<std::string, Verdicts>& current, const std::string& judge) {
-  std::map<std::string, Count> counts;
-  for (const auto& [episode, verdicts] : current) {
-    const auto own = verdicts.find(judge);
-    if (own == verdicts.end() || !IsDecided(own->second.label)) continue;
+std::map<std::string, ProbeAgreement> ProbesOf(const Store& store, const std::string& judge) {
+  const std::map<std::string, Verdicts> current = store.CurrentVerdicts();
+  std::map<std::string, std::map<StateKey, Count>> counts;  // by probe
+  for (const Episode& episode : store.Episodes()) {
+    const auto verdicts = current.find(episode.key.Id());
+    if (verdicts == current.end()) continue;
+    const auto own = verdicts->second.find(judge);
+    if (own == verdicts->second.end() || !IsDecided(own->second.label)) continue;
     for (const char* probe : {"flip", "retest"}) {
-      const auto other = verdicts.find(judge + ":" + probe);
-      if (other == verdicts.end() || !IsDecided(other->second.label)) continue;
-      ++counts[probe].trials;
-      counts[probe].successes += other->second.label == own->second.label;
+      const auto other = verdicts->second.find(judge + ":" + probe);
+      if (other == verdicts->second.end() || !IsDecided(other->second.label)) continue;
+      Count& count = counts[probe][{episode.key.pair.task, episode.key.pair.initial_state}];
+      ++count.trials;
+      count.successes += other->second.label == own->second.label;
     }
   }
-  return counts;
+  std::map<std::string, ProbeAgreement> probes;
+  for (const auto& [probe, by_state] : counts) {
+    std::vector<Count> states;
+    for (const auto& [state, count] : by_state) states.push_back(count);
+    probes[probe] = {SumOf(states), ClusteredWilsonInterval(states)};
+  }
+  return probes;
 }
 
 std::string Share(const Number& number) { return number ? fmt::format("{:.3f}", *number) : "-"; }
@@ -201,7 +211,7 @@ JudgeCalibrationReport CalibrateJudge(const Store& store, const std::string& jud
   }
   report.missing = Missing(items, wanted);
   report.refusals = Refusals(items, wanted);
-  report.consistency = Consistency(store.CurrentVerdicts(), judge);
+  report.probes = ProbesOf(store, judge);
   return report;
 }
 
@@ -211,10 +221,11 @@ std::string Text(const JudgeCalibrationReport& report) {
   for (const JudgeQualityRow& row : report.rows) {
     if (row.group == "all" || row.group.starts_with("world ")) text += Intervals(row);
   }
-  for (const auto& [probe, count] : report.consistency) {
-    const Estimate rate = WilsonInterval(count.successes, count.trials);
-    text += fmt::format("{} probe: the same verdict for {} of {} ({:.0f} %, {:.0f} … {:.0f})\n", probe, count.successes,
-                        count.trials, 100 * *rate.value, 100 * rate.interval->low, 100 * rate.interval->high);
+  for (const auto& [probe, said] : report.probes) {
+    const Interval& interval = *said.share.interval;
+    text += fmt::format("{} probe: the same verdict for {} of {} ({:.0f} %, over other initial states {:.0f} … {:.0f})\n", probe,
+                        said.same.successes, said.same.trials, 100 * *said.share.value, 100 * interval.low,
+                        100 * interval.high);
   }
   for (const std::string& sentence : report.missing) text += "too few: " + sentence + "\n";
   for (const std::string& sentence : report.refusals) text += "not good enough: " + sentence + "\n";

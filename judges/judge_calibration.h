@@ -45,13 +45,18 @@ struct JudgeAcceptance {
   double max_errors = 0.02;             ///< share
 };
 
+/// How often a probe of the judge said the same as it.
+struct ProbeAgreement {
+  Count same;
+  Estimate share{};  ///< its interval holds over other initial states
+};
+
 struct JudgeCalibrationReport {
   std::string judge, truth;
   std::vector<JudgeQualityRow> rows{};  ///< all, per task, per world, per policy
   std::vector<std::string> refusals{};  ///< why a gate may not count it
   std::vector<std::string> missing{};   ///< why nothing can be said yet: too few items
-  /// How often a probe of the judge ("flip", "retest") said the same as it; none where it never ran.
-  std::map<std::string, Count> consistency{};
+  std::map<std::string, ProbeAgreement> probes{};  ///< of its probes ("flip", "retest"); none where they never ran
 };
 JudgeCalibrationReport CalibrateJudge(const Store& store, const std::string& judge, const std::string& truth,
                                       const JudgeAcceptance& wanted = {});

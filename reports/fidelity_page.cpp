@@ -191,14 +191,18 @@ std::string Failed(const Fidelity& fidelity) {
 }
 
 std::string RecordedHeadline(const Fidelity& fidelity) {
-  const std::string usable = fidelity.usable_horizon_chunks && *fidelity.usable_horizon_chunks > 0
-                                 ? Counted(*fidelity.usable_horizon_chunks, "chunk")
-                                 : "not a single chunk";
-  return fmt::format("<p>{} replayed, their actions given to the model from the first picture on. What moves is at least 2 dB "
-                     "better than a picture that stands still for {}. {} s per chunk.</p><p class=\"quiet\">Nobody says how "
-                     "recordings end: pictures are compared, not outcomes.</p>",
-                     Counted(static_cast<std::int64_t>(fidelity.input.rows.size()), "recording"), usable,
-                     Decimal(fidelity.input.seconds_per_chunk, 2));
+  const std::vector<FidelityRow>& rows = fidelity.input.rows;
+  const auto replayed =
+      std::ranges::count_if(rows, [](const FidelityRow& row) { return !row.real_video.empty() && !row.model_video.empty(); });
+  std::string usable = "Nothing could be compared.";
+  if (fidelity.usable_horizon_chunks) {
+    usable = fmt::format("What moves is at least 2 dB better than a picture that stands still for {}.",
+                         *fidelity.usable_horizon_chunks > 0 ? Counted(*fidelity.usable_horizon_chunks, "chunk")
+                                                             : "not a single chunk");
+  }
+  return fmt::format("<p>{} of {} replayed, their actions given to the model from the first picture on. {} {} s per chunk.</p>"
+                     "<p class=\"quiet\">Nobody says how recordings end: pictures are compared, not outcomes.</p>",
+                     replayed, Counted(std::ssize(rows), "recording"), usable, Decimal(fidelity.input.seconds_per_chunk, 2));
 }
 
 }  // namespace

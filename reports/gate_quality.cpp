@@ -87,9 +87,20 @@ const Defined<BootstrapOf>& Resampled(const PairedBootstrap& bootstrap, const st
   return metric == "pearson" ? bootstrap.pearson : metric == "spearman" ? bootstrap.spearman : bootstrap.mmrv;
 }
 
+/// What a rule's correlation is over: all tasks, or the one that it names.
+struct PointsOfRule {
+  const CorrelationGroup& group;
+  std::vector<TaskOutcomes> by_state;  ///< what it is resampled from
+};
+PointsOfRule PointsOf(const GateRule& rule, const WorldComparison& comparison) {
+  const auto task = std::ranges::find(comparison.by_task, rule.task, &CorrelationGroup::group);
+  if (task == comparison.by_task.end()) return {comparison.correlation, comparison.by_state};  // of the run's only one
+  return {*task, {comparison.by_state.at(static_cast<std::size_t>(task - comparison.by_task.begin()))}};
+}
+
 void HoldCorrelation(const GateRule& rule, const RunSummary& run, const GateSides& sides, Evidence& evidence) {
   const WorldComparison& comparison = ComparisonWith(run, sides.world, rule.name);
-  const CorrelationGroup& group = comparison.correlation;
+  const auto [group, by_state] = PointsOf(rule, comparison);
   Held held{rule.metric == "pearson"    ? group.pearson
             : rule.metric == "spearman" ? group.spearman
                                         : group.mmrv,
@@ -98,7 +109,7 @@ void HoldCorrelation(const GateRule& rule, const RunSummary& run, const GateSide
             "(task, policy) points or initial states"};
   PairedBootstrap bootstrap;
   if (held.value.value) {  // the same draws as the report's, at the confidence that is asked
-    bootstrap = PairedStateBootstrap(comparison.by_state, group.options.convention, group.options.bootstrap);
+    bootstrap = PairedStateBootstrap(by_state, group.options.convention, group.options.bootstrap);
     if (const auto& resampled = Resampled(bootstrap, rule.metric)) {
       held.interval = [&resampled](double c) { return IntervalsOf(resampled->resampled, c).percentile; };
     } else {
@@ -108,12 +119,13 @@ void HoldCorrelation(const GateRule& rule, const RunSummary& run, const GateSide
   held.value.confidence = 1 - 2 * rule.alpha;
   held.value.interval = held.interval(held.value.confidence);
   RuleDecision& decision = evidence.decision;
-  for (const PairTable& table : comparison.tables) decision.states += table.Counted();
-  decision.policy.clear();  // it is about all of them
+  for (const PairTable& table : comparison.tables) {
+    if (rule.task.empty() || table.task == rule.task) decision.states += table.Counted();
+  }
   Hold(rule, held, evidence);
   evidence.more = held.value.value ? evidence.more : "";
-  decision.statement = fmt::format("{} of {} against {}: {} ({:g} %) over {}, {}", rule.metric, sides.world,
-                                   run.reference, NumberWithInterval(held.value), 100 * held.value.confidence,
+  decision.statement = fmt::format("{} of {} against {}{}: {} ({:g} %) over {}, {}", rule.metric, sides.world,
+                                   run.reference, rule.task.empty() ? "" : " on " + rule.task, NumberWithInterval(held.value), 100 * held.value.confidence,
                                    Counted(held.value.n, "point"), Counted(decision.states, "pair"));
 }
 
@@ -125,6 +137,7 @@ void HoldKappa(const GateRule& rule, const RunSummary& run, const GateSides& sid
   for (const JudgedEpisode& judged : run.episodes) {
     const EpisodeKey& key = judged.episode.key;
     if (key.world != sides.world || (!rule.task.empty() && key.pair.task != rule.task) || !judged.Counts()) continue;
+    if (!rule.policy.empty() && PolicyLabel(key.pair.policy, key.pair.checkpoint) != rule.policy) continue;
     const auto verdicts = run.data.verdicts.find(key.Id());
     const auto other = verdicts->second.find(rule.against);
     if (other == verdicts->second.end()) continue;
@@ -136,12 +149,12 @@ void HoldKappa(const GateRule& rule, const RunSummary& run, const GateSides& sid
   const auto kappa = [&](double confidence) { return StatisticsByState(states, confidence).kappa; };
   Hold(rule, {kappa(1 - 2 * rule.alpha), [=](double c) { return kappa(c).interval; }, *rule.at_least}, evidence);
   RuleDecision& decision = evidence.decision;
-  decision.policy.clear();
   decision.states = std::ssize(states);
   decision.statement = fmt::format(
-      "kappa of {} with {} in {}: {} ({:g} %) over {} of {} that both judged, {} only {} and {} only {} a "
+      "kappa of {} with {} in {}{}: {} ({:g} %) over {} of {} that both judged, {} only {} and {} only {} a "
       "success",
-      run.options.judge, rule.against, sides.world, NumberWithInterval(decision.value), 100 * (1 - 2 * rule.alpha),
+      run.options.judge, rule.against, sides.world, rule.policy.empty() ? "" : " on the clips of " + rule.policy,
+      NumberWithInterval(decision.value), 100 * (1 - 2 * rule.alpha),
       Counted(table.total(), "episode"), Counted(decision.states, "initial state"), table.only_judge_success, run.options.judge, table.only_human_success,
       rule.against);
 }

@@ -83,6 +83,11 @@ GateRule RuleOf(const Config& page, const Defaults& defaults) {
                                    {"policy", &GateRule::policy},
                                    {"baseline_policy", &GateRule::baseline_policy}})
     rule.*field = page.Get<std::string>(key, "");
+  page.Require(rule.policy.empty() || rule.test != GateTest::kCorrelation, "policy",
+               "none: a correlation is over all policies");
+  page.Require(rule.baseline_policy.empty() || rule.Compares(), "baseline_policy", "none: this test has no use for it");
+  page.Require(!page.Has("against") || rule.test == GateTest::kJudgeKappa, "against",
+               "none: only judge_kappa has another judge");
   rule.against = page.Get<std::string>("against", rule.against);
   rule.is_paired = page.Get<bool>("paired", rule.test != GateTest::kBoschloo);
   page.Require(!page.Has("paired") || rule.test == GateTest::kNonInferiority, "paired",

@@ -31,7 +31,8 @@ struct GateRule {
   std::string metric;           ///< success_rate, pearson, spearman, mmrv, kappa, error_share
   std::string task;             ///< empty: all tasks together
   std::string world;            ///< empty: the run's only one
-  std::string policy;           ///< "name@checkpoint"; empty: the run's only one, for the last three tests all of them
+  std::string policy;           ///< "name@checkpoint"; empty: the run's only one, for the last three tests all of them;
+                                ///< always empty for correlation
   std::string baseline_policy;  ///< empty: the same name if the baseline has it, else its only one
   std::string against = "human";  ///< judge_kappa: the other judge
   bool is_paired = true;          ///< noninferiority; the other tests say it themselves

@@ -106,6 +106,7 @@ JudgeReport JudgesOf(const RunSummary& summary) {
   report.truth = TruthOf(summary);
   for (const std::string& judge : summary.judges) {
     if (judge == report.truth) continue;
+    if (report.truth == "human" && judge.starts_with("human:")) continue;  // their own votes are in it: alpha is theirs
     for (const WorldInfo& world : summary.data.worlds) {
       JudgeAgreement agreement = AgreementOf(summary, judge, report.truth, world.name);
       if (agreement.judged > 0) report.judges.push_back(std::move(agreement));

@@ -27,7 +27,8 @@ struct JudgeAgreement {
 
 struct JudgeReport {
   std::string truth;                   ///< "human" where people judged, else "oracle", else the judge that is counted
-  std::vector<JudgeAgreement> judges;  ///< every judge but the truth, by judge and world; those that spoke there
+  std::vector<JudgeAgreement> judges;  ///< every judge but the truth, and raters where people are it, by judge and world;
+                                       ///< those that spoke there
   std::vector<std::string> raters;     ///< "human:anna", …
   Number alpha = Undefined{"fewer than two human raters"};  ///< Krippendorff's, nominal, over the raters
   std::int64_t rated_twice = 0;                             ///< episodes that two or more raters judged

@@ -33,8 +33,10 @@ std::string JudgeRow(const JudgeAgreement& judge) {
   std::string html = fmt::format("<tr><th scope=\"row\">{}</th><td>{}</td><td class=\"num\">{}</td>",
                                  Breakable(judge.judge), Breakable(judge.world), judge.judged);
   if (!judge.IsCalibrated()) {
-    return html + fmt::format("<td colspan=\"9\">{} no episode was judged by {} too</td></tr>", Tag("uncalibrated"),
-                              Escaped(judge.against));
+    const std::string why =
+        judge.apart > 0 ? fmt::format("of {} that both judged one of the two could tell nothing", Counted(judge.apart, "episode"))
+                        : "no episode was judged by " + judge.against + " too";
+    return html + fmt::format("<td colspan=\"9\">{} {}</td></tr>", Tag("uncalibrated"), Escaped(why));
   }
   return html + fmt::format("<td class=\"num\">{}</td>", judge.statistics.n) + ConfusionCell(judge.confusion) +
          fmt::format("<td class=\"num\">{}</td>", judge.apart) + StackedCell(judge.statistics.kappa) +

@@ -15,10 +15,10 @@
 namespace evac {
 namespace {
 
-using StateKey = std::pair<std::string, std::string>;  // policy, state
+using PolicyState = std::pair<std::string, std::string>;  // policy, state
 
 /// One task's outcomes of one world, by policy and state, in order of seed.
-using ByState = std::map<StateKey, std::vector<TrialOutcome>>;
+using ByState = std::map<PolicyState, std::vector<TrialOutcome>>;
 
 std::map<std::string, ByState> ByTask(const std::vector<TrialOutcome>& outcomes) {
   std::map<std::string, ByState> tasks;
@@ -29,13 +29,13 @@ std::map<std::string, ByState> ByTask(const std::vector<TrialOutcome>& outcomes)
   return tasks;
 }
 
-using PairsByState = std::map<StateKey, std::vector<BothOutcomes>>;
+using PairsByState = std::map<PolicyState, std::vector<BothOutcomes>>;
 
 /// One task's pairs by policy and state, and the outcomes that have no partner.
 struct Paired {
   PairsByState pairs;
   std::map<std::string, std::int64_t> real_alone;               ///< by policy
-  std::map<std::string, std::map<std::string, Count>> further;  ///< by policy and state
+  std::map<std::string, std::map<std::string, std::vector<bool>>> further;  ///< by policy and state
 };
 
 std::vector<BothOutcomes> PairsOf(const std::vector<TrialOutcome>& real, const std::vector<TrialOutcome>& model,
@@ -64,11 +64,7 @@ Paired PairUp(const ByState& real, const ByState& model, bool seeds_agree) {
   }
   for (const auto& [key, trials] : model) {
     if (real.contains(key)) continue;  // its further repeats are not independent of the pair's
-    for (const TrialOutcome& trial : trials) {
-      Count& count = paired.further[key.first][key.second];
-      ++count.trials;
-      count.successes += trial.success;
-    }
+    for (const TrialOutcome& trial : trials) paired.further[key.first][key.second].push_back(trial.success);
   }
   return paired;
 }
@@ -84,13 +80,6 @@ std::vector<Count> CountsOf(const ByState& states, const std::string& policy) {
     }
   }
   return counts;
-}
-
-/// Repeats of one state count by the design effect, so that H's spread is not understated.
-Count EffectiveOf(const std::map<std::string, Count>& states) {
-  std::vector<Count> clusters;
-  for (const auto& [state, count] : states) clusters.push_back(count);
-  return EffectiveCount(clusters);
 }
 
 /// By initial state: policies that share one, and its repeats, are not independent.
@@ -124,41 +113,25 @@ PairedOutcomes EffectiveOf(const std::map<std::string, BothWorlds>& tables) {
   return EffectivePairs(clusters);
 }
 
-/// The table that as many independent pairs would have had: the flips are theirs, the rest keeps its proportion.
-BothWorlds Shrunk(const BothWorlds& table, const PairedOutcomes& effective) {
-  BothWorlds shrunk;
-  shrunk.only_model = effective.flips.only_first;
-  shrunk.only_real = effective.flips.only_second;
-  const std::int64_t alike = table.both + table.neither, left = effective.pairs - shrunk.discordant();
-  if (alike == 0) return shrunk;
-  shrunk.both =
-      std::llround(static_cast<double>(left) * static_cast<double>(table.both) / static_cast<double>(alike));
-  shrunk.neither = left - shrunk.both;
-  return shrunk;
-}
-
 std::vector<bool> Flags(const Count& count) {
   std::vector<bool> flags(static_cast<std::size_t>(count.trials), false);
   std::fill_n(flags.begin(), count.successes, true);
   return flags;
 }
 
-/// The real rate from both worlds: values of all pairs, intervals of what they tell as much as.
-/// @param first_of_state  a pair of each initial state: bets are on pairs, not on counts of them.
-void Foretell(const BothWorlds& effective, const std::vector<BothOutcomes>& first_of_state, const TrustOptions& options,
-              PredictedRate& rate) {
+/// The real rate from both worlds.
+/// @param first_of_state  a pair of each initial state: bets are on pairs, not on counts of them
+/// @param first_further   likewise, of states without a real trial
+void Foretell(const PpiStates& states, const std::vector<BothOutcomes>& first_of_state, const Count& first_further,
+              const TrustOptions& options, PredictedRate& rate) {
   const double confidence = options.confidence;
-  rate.predicted = PpiMover(effective, rate.further, confidence);
-  rate.predicted.value = PpiMover(rate.pairs, rate.further, confidence).value;
-  rate.predicted.n = rate.pairs.n();
-  rate.predicted.method = OnPairs(rate.predicted.method, {rate.pairs.n(), effective.n()});
-  rate.tuned = PpiMean(rate.pairs, rate.further, PpiWeight::kTuned, confidence);
-  const PpiEstimate rests_on = PpiMean(effective, rate.further, PpiWeight::kTuned, confidence);
-  rate.tuned.se = rests_on.se;
-  rate.tuned.normal = rests_on.normal;
-  rate.tuned.allowed = rests_on.allowed;
-  rate.betting = PpiBetting(first_of_state, Flags(rate.further),
-                            {.confidence = confidence, .seed = options.bootstrap.seed});
+  std::vector<PairedOutcomes> clusters;
+  for (const BothWorlds& table : states.paired) clusters.push_back({{table.only_model, table.only_real}, table.n()});
+  rate.predicted = PpiMoverByState(states, confidence);
+  rate.predicted.method = OnPairs(rate.predicted.method, {rate.pairs.n(), EffectivePairs(clusters).pairs});
+  rate.tuned = PpiMeanByState(states, PpiWeight::kTuned, confidence);
+  rate.betting =
+      PpiBetting(first_of_state, Flags(first_further), {.confidence = confidence, .seed = options.bootstrap.seed});
   rate.betting.value = rate.tuned.value;
   if (rate.betting.n < rate.pairs.n()) rate.betting.method += ", one pair of each state";
 }
@@ -166,20 +139,26 @@ void Foretell(const BothWorlds& effective, const std::vector<BothOutcomes>& firs
 PredictedRate Predict(const std::string& policy, const Paired& paired, const TrustOptions& options) {
   PredictedRate rate;
   rate.policy = policy;
-  PairsByState own = paired.pairs;
-  std::erase_if(own, [&](const auto& entry) { return entry.first.first != policy; });
-  std::vector<BothOutcomes> all, first_of_state;
-  for (const auto& [key, of_state] : own) {
-    all.insert(all.end(), of_state.begin(), of_state.end());
+  PpiStates states;
+  std::vector<BothOutcomes> first_of_state;
+  for (const auto& [key, of_state] : paired.pairs) {
+    if (key.first != policy) continue;
+    states.paired.push_back(TableOf(of_state));
     first_of_state.push_back(of_state.front());
   }
-  rate.pairs = TableOf(all);
+  Count first_further;
   if (const auto further = paired.further.find(policy); further != paired.further.end()) {
-    rate.further = EffectiveOf(further->second);
+    for (const auto& [state, outcomes] : further->second) {
+      states.more.push_back({std::ranges::count(outcomes, true), std::ssize(outcomes)});
+      ++first_further.trials;
+      first_further.successes += outcomes.front();
+    }
   }
+  rate.pairs = states.Paired();
+  rate.further = states.More();
   if (const auto alone = paired.real_alone.find(policy); alone != paired.real_alone.end())
     rate.real_alone = alone->second;
-  Foretell(Shrunk(rate.pairs, EffectiveOf(TablesOf(own))), first_of_state, options, rate);
+  Foretell(states, first_of_state, first_further, options, rate);
   return rate;
 }
 

@@ -48,13 +48,13 @@ inline constexpr std::int64_t kMostPairsAskedFor = 10000;
 struct PredictedRate {
   std::string policy;
   BothWorlds pairs;
-  Count further;  ///< imagined outcomes on states without a real trial; of repeats, their effective number
+  Count further;                ///< imagined outcomes on states without a real trial
   std::int64_t real_alone = 0;  ///< real trials without an imagined partner
   Estimate real;                ///< from all real trials, clustered by state
   Estimate model;               ///< from all imagined trials, clustered by state
   Estimate predicted;           ///< real rate from both: MOVER on the effective pairs, the interval of record
   Estimate betting;             ///< the same by betting on one pair of each state, the first
-  PpiEstimate tuned;            ///< the same by PPI++: an estimate; its intervals on the effective pairs
+  PpiEstimate tuned;            ///< the same by PPI++: an estimate; its intervals are over initial states
 };
 
 struct TaskTrust {

@@ -4,6 +4,7 @@
 #include <functional>
 #include <memory>
 #include <set>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -71,16 +72,18 @@ struct ReplayRun {
   std::function<std::unique_ptr<World>(const SuiteWorld& world)> make = {};
 };
 /// Runs what is missing, and again what failed in an earlier call. @returns the store, judged by the oracle where there is physics.
-/// @throws InternalError if it was interrupted.
+/// @throws InternalError if it was interrupted, InvalidInput if the folder's episodes played other actions.
 Store RunReplays(const ReplayRun& run, std::vector<Replay> replays);
 /// @throws InvalidInput if the run's folder holds replays of the same actions that ended by another rule: says which.
 void RequireSameReplays(const ReplayRun& run);
 
 /// Seconds that a world model takes per chunk of K frames and scene, of as many scenes at once as the suite has lanes,
 /// its cache unused. @param scenes  whose first frames it starts from
-/// @returns undefined if no replay is a chunk long
+/// @returns undefined if no replay is a chunk long, or if the model fails on one of them
 Number SecondsPerChunk(const SuiteWorld& model, const Suite& suite, const Store& scenes, std::vector<Replay> replays,
                        int chunk);
+/// The same of a world that was made, on all of these. @param replays  not empty, each a chunk long
+Number SecondsPerChunk(World& world, std::span<const Replay> replays, int chunk);
 
 /// How many episodes a part has, and how many of them failed.
 PartEpisodes EpisodesOf(const std::string& part, const Store& store);

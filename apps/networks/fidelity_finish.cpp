@@ -8,6 +8,36 @@
 #include "core/file.h"
 
 namespace evac {
+namespace {
+
+/// Why the first of them failed; empty: none did.
+std::string FailureAmong(const std::vector<Advanced>& answers) {
+  for (const Advanced& answer : answers) {
+    if (const auto* failure = std::get_if<Failure>(&answer)) return failure->message;
+  }
+  return "";
+}
+
+}  // namespace
+
+Number SecondsPerChunk(World& world, std::span<const Replay> replays, int chunk) try {
+  std::vector<ActionChunk> chunks;
+  for (const Replay& replay : replays) chunks.push_back({{replay.actions.begin(), replay.actions.begin() + chunk}, false, 0});
+  std::vector<SceneChunk> batch;
+  for (std::size_t i = 0; i < chunks.size(); ++i) {
+    batch.push_back({static_cast<SceneId>(i), &chunks[i]});
+    world.Reset(batch[i].scene, *replays[i].task, replays[i].initial, 0);
+  }
+  std::string failure = FailureAmong(world.Advance(batch));  // pages are touched, kernels compiled
+  const auto begin = std::chrono::steady_clock::now();
+  const std::vector<Advanced> answers = world.Advance(batch);
+  const std::chrono::duration<double> spent = std::chrono::steady_clock::now() - begin;
+  if (failure.empty()) failure = FailureAmong(answers);
+  if (!failure.empty()) return Undefined{"the world model failed: " + failure};
+  return spent.count() / static_cast<double>(batch.size());
+} catch (const Error& error) {
+  return Undefined{fmt::format("the world model failed: {}", error.what())};
+}
 
 Number SecondsPerChunk(const SuiteWorld& model, const Suite& suite, const Store& scenes, std::vector<Replay> replays,
                        int chunk) {
@@ -17,18 +47,7 @@ Number SecondsPerChunk(const SuiteWorld& model, const Suite& suite, const Store&
   SuiteWorld uncached = model;
   uncached.evac->cache_folder.reset();
   const std::unique_ptr<World> world = MakeWorld(uncached, suite, &scenes);
-  std::vector<ActionChunk> chunks;
-  for (std::size_t i = 0; i < replays.size(); ++i) {
-    world->Reset(static_cast<SceneId>(i), *replays[i].task, replays[i].initial, 0);
-    chunks.push_back({{replays[i].actions.begin(), replays[i].actions.begin() + chunk}, false, 0});
-  }
-  std::vector<SceneChunk> batch;
-  for (std::size_t i = 0; i < chunks.size(); ++i) batch.push_back({static_cast<SceneId>(i), &chunks[i]});
-  world->Advance(batch);  // pages are touched, kernels compiled
-  const auto begin = std::chrono::steady_clock::now();
-  world->Advance(batch);
-  const std::chrono::duration<double> spent = std::chrono::steady_clock::now() - begin;
-  return spent.count() / static_cast<double>(batch.size());
+  return SecondsPerChunk(*world, replays, chunk);
 }
 
 PartEpisodes EpisodesOf(const std::string& part, const Store& store) {

@@ -16,6 +16,7 @@ constexpr int kMovedGreyLevels = 24;      ///< a pixel moves where a channel dif
 constexpr double kMinObject_px = 4;       ///< area
 constexpr int kPatch_px = 7, kSearch_px = 8;  ///< half sides: of the gripper's patch, of where it is looked for
 constexpr double kMinCorrelation = 0.4;
+constexpr double kPlain = 0.5;  ///< standard deviation in grey levels, of every channel
 
 cv::Mat AtPictureSize(const cv::Mat& frame, int scale) {
   if (scale == 1) return frame;
@@ -35,6 +36,17 @@ double SquaredError(const cv::Mat& a, const cv::Mat& b, const cv::Mat& mask) {
   return distance * distance;
 }
 
+/// Where each camera's picture is: views lie side by side, and below lower ones it is black (core/video.h).
+std::vector<cv::Rect> ViewsOf(const Task& task) {
+  std::vector<cv::Rect> views;
+  int x = 0;
+  for (const Camera& camera : task.cameras) {
+    views.emplace_back(x, 0, camera.width_px, camera.height_px);
+    x += camera.width_px;
+  }
+  return views;
+}
+
 /// 255 where a channel differs from the first frame.
 cv::Mat Moved(const cv::Mat& frame, const cv::Mat& first) {
   cv::Mat difference;
@@ -44,8 +56,15 @@ cv::Mat Moved(const cv::Mat& frame, const cv::Mat& first) {
   return cv::max(channels[0], cv::max(channels[1], channels[2])) > kMovedGreyLevels;
 }
 
-/// Where the gripper is in the head camera's picture; nothing if it is out of sight.
-std::optional<cv::Rect> GripperPatch(const ClipPair& clips, const Arms& arms) {
+/// Black or blown out all over: it correlates with anything.
+bool IsPlain(const cv::Mat& patch) {
+  cv::Scalar mean, deviation;
+  cv::meanStdDev(patch, mean, deviation);
+  return std::max({deviation[0], deviation[1], deviation[2]}) < kPlain;
+}
+
+/// Where the gripper is in the head camera's real picture; nothing if it is out of sight, or too plain to be found.
+std::optional<cv::Rect> GripperPatch(const ClipPair& clips, const Arms& arms, const cv::Mat& real) {
   const Camera& camera = clips.task->cameras.front();
   const Eigen::Vector3d tool = arms.back().base_from_gripper * Eigen::Vector3d(0, 0, clips.tool_length_m);
   const auto at = Project(camera, BaseFromCamera(camera, arms).inverse() * tool);
@@ -53,11 +72,10 @@ std::optional<cv::Rect> GripperPatch(const ClipPair& clips, const Arms& arms) {
   const cv::Point centre(static_cast<int>(std::floor(at->x())), static_cast<int>(std::floor(at->y())));
   const cv::Rect patch(centre.x - kPatch_px, centre.y - kPatch_px, 2 * kPatch_px + 1, 2 * kPatch_px + 1);
   const cv::Rect all(0, 0, camera.width_px, camera.height_px);
-  return (patch & all) == patch ? std::optional(patch) : std::nullopt;
+  return (patch & all) == patch && !IsPlain(real(patch)) ? std::optional(patch) : std::nullopt;
 }
 
-/// How far that patch of the real picture lies from there in the imagined one; nothing if it is too plain to be found, or
-/// not there.
+/// How far that patch of the real picture lies from there in the imagined one; nothing if it is not there.
 std::optional<double> GripperError(const cv::Rect& patch, const cv::Mat& real, const cv::Mat& model) {
   const cv::Rect around = cv::Rect(patch.x - kSearch_px, patch.y - kSearch_px, patch.width + 2 * kSearch_px,
                                    patch.height + 2 * kSearch_px) & cv::Rect({}, model.size());
@@ -91,19 +109,22 @@ void DriftMeter::Add(const ClipPair& clips) {
   const std::size_t frames = std::min(real.size(), model.size());
   const Camera& head = clips.task->cameras.front();
   const cv::Rect head_px(0, 0, head.width_px, head.height_px);
+  const std::vector<cv::Rect> views = ViewsOf(*clips.task);
   const std::size_t chunks = (frames > 0 ? frames - 1 : 0) / static_cast<std::size_t>(chunk_);
   if (sums_.size() < chunks) sums_.resize(chunks);
   for (std::size_t t = 1; t <= chunks * static_cast<std::size_t>(chunk_); ++t) {
     Sums& sums = sums_[(t - 1) / static_cast<std::size_t>(chunk_)];
     const cv::Mat moved = Moved(real[t], real[0]);
     sums.clips += (t - 1) % static_cast<std::size_t>(chunk_) == 0;
-    sums.error += SquaredError(real[t], model[t], {});
-    sums.values += static_cast<double>(real[t].total() * 3);
+    for (const cv::Rect& view : views) {
+      sums.error += SquaredError(real[t](view), model[t](view), {});
+      sums.values += 3.0 * view.area();
+    }
     sums.moving_error += SquaredError(real[t], model[t], moved);
     sums.copy_error += SquaredError(real[t], real[0], moved);
     sums.moving_values += 3.0 * cv::countNonZero(moved);
     if (t - 1 >= clips.commands.size()) continue;
-    const auto patch = GripperPatch(clips, clips.commands[t - 1]);
+    const auto patch = GripperPatch(clips, clips.commands[t - 1], real[t](head_px));
     if (!patch) continue;
     ++sums.grippers_in_sight;
     if (const auto px = GripperError(*patch, real[t](head_px), model[t](head_px))) {

@@ -24,7 +24,7 @@ struct Counterfactual {
 /// `shifted`: 6 cm beside, in a direction that task and state decide; `never_closes`: the hand stays open; `object_away`:
 /// nothing is there. What becomes of them in reality is found out, not assumed.
 /// @param successes  replays of real episodes that succeeded
-/// @param per_task   of them at most so many, drawn evenly over policies
+/// @param per_task   of them at most so many, drawn at random whoever's they are
 std::vector<Counterfactual> Counterfactuals(std::vector<Replay> successes, const std::vector<Task>& tasks, int per_task);
 
 struct LongRollout {

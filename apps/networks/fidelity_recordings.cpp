@@ -141,9 +141,11 @@ ExitCode RunRecordedFidelity(const FidelityArguments& arguments, const Suite& gi
   }
   input.open_loop = {drift.object_px(), drift.Chunks()};
   input.horizon = drift.Chunks();
+  std::erase_if(replays, [&](const Replay& replay) { return found.Clip({replay.pair, model.name}).empty(); });
   input.seconds_per_chunk = SecondsPerChunk(model, suite, store, replays, static_cast<int>(config.chunk));
+  const bool is_compared = !input.horizon.empty();
   FinishFidelity(out, std::move(input));
-  return ExitCode::kOk;
+  return is_compared ? ExitCode::kOk : ExitCode::kInconclusive;
 }
 
 }  // namespace evac

@@ -87,12 +87,57 @@ std::vector<Job> JobsIn(const SuiteWorld& world, const std::vector<Replay>& repl
   return jobs;
 }
 
-std::set<EpisodeKey> SimulatedKeys(const ReplayRun& run, const std::vector<Replay>& replays) {
-  std::set<EpisodeKey> keys;
-  for (const SuiteWorld& world : run.worlds) {
-    if (world.evac) continue;
-    for (const Replay& replay : replays) keys.insert({replay.pair, world.name});
+bool IsSame(const Arms& one, const Arms& other) {
+  return std::ranges::equal(one, other, [](const ArmState& a, const ArmState& b) {
+    return a.base_from_gripper.matrix() == b.base_from_gripper.matrix() && a.closure == b.closure;
+  });
+}
+
+/// Whether an episode played a replay's actions, or the first of them where a rule ended it.
+bool Played(const Store& store, Episode episode, const Replay& replay) {
+  store.LoadSteps(episode);
+  return episode.commands.size() <= replay.actions.size() &&
+         std::equal(episode.commands.begin(), episode.commands.end(), replay.actions.begin(), IsSame);
+}
+
+std::map<PairKey, const Replay*> ByPair(const std::vector<Replay>& replays) {
+  std::map<PairKey, const Replay*> by_pair;
+  for (const Replay& replay : replays) by_pair[replay.pair] = &replay;
+  return by_pair;
+}
+
+/// What was replayed before the closed loop was made anew is not compared with what it is now.
+void RequireSameActions(const ReplayRun& run, const std::vector<Replay>& replays, const Store& store) {
+  const auto by_pair = ByPair(replays);
+  for (const Episode& episode : store.Episodes()) {
+    const auto replay = by_pair.find(episode.key.pair);
+    if (replay == by_pair.end() || Played(store, episode, *replay->second)) continue;
+    throw InvalidInput("{}: {} played other actions than its episode has now: remove that folder, and the same command makes "
+                       "its replays anew", run.folder.string(), episode.key.Id());
   }
+}
+
+/// Of an earlier run's simulated episodes those that played the same actions.
+std::set<EpisodeKey> ToTake(const ReplayRun& run, const std::vector<Replay>& replays) {
+  std::set<std::string> simulated;
+  for (const SuiteWorld& world : run.worlds) {
+    if (!world.evac) simulated.insert(world.name);
+  }
+  const auto by_pair = ByPair(replays);
+  const Store earlier = Store::Open(run.reality, Store::Mode::kReadOnly);
+  std::set<EpisodeKey> keys;
+  int others = 0;
+  for (const Episode& episode : earlier.Episodes()) {
+    const auto replay = by_pair.find(episode.key.pair);
+    if (IsFailure(episode.stop) || replay == by_pair.end() || !simulated.contains(episode.key.world)) continue;
+    if (Played(earlier, episode, *replay->second))
+      keys.insert(episode.key);
+    else
+      ++others;
+  }
+  if (others > 0)
+    fmt::print(stderr, "evac: warning: {}: {} of its episodes played other actions than these: not taken over\n",
+               run.reality.string(), others);
   return keys;
 }
 
@@ -117,7 +162,7 @@ std::size_t FramesOf(const Store& replays) {
 /// @param suite_hash  of the closed loop that they are of
 std::optional<std::string> WhatDiffers(const ReplayRun& run, const Store& there, const std::string& suite_hash) {
   const std::string found = there.run().suite_hash;
-  if (found == HashOf(run.name, suite_hash, run.rule)) return std::nullopt;
+  if (found == HashOf(run.name, suite_hash, run.rule) || there.Episodes().empty()) return std::nullopt;
   const std::size_t frames = run.frames > 0 ? FramesOf(there) : 0, k = run.frames_per_chunk;
   if (frames > 0 && frames != run.frames)
     return fmt::format("--horizon-chunks: found {} ({} frames), wanted {} ({} frames)", frames / k, frames, run.frames / k, run.frames);
@@ -194,8 +239,9 @@ Store RunReplays(const ReplayRun& run, std::vector<Replay> replays) {
   Store store = Store::CreateOrContinue(run.folder, InfoOf(run));
   RemoveFailed(store);
   store.RemoveOrphans();
+  RequireSameActions(run, replays, store);
   DeclareReplays(run, replays, store);
-  if (IsOfSameReplays(run)) TakeReality(run.reality, SimulatedKeys(run, replays), store);
+  if (IsOfSameReplays(run)) TakeReality(run.reality, ToTake(run, replays), store);
   std::optional<Store> scenes;
   if (!run.scenes.empty()) scenes = Store::Open(run.scenes, Store::Mode::kReadOnly);
   int total = 0, missing = 0;

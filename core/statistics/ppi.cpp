@@ -44,6 +44,14 @@ Number TunedLambda(const Moments& m) {
   return m.covariance / ((1 + m.n / m.extra) * m.PooledVariance());
 }
 
+/// Y - lambda G of each kind of pair, less the mean, summed over the pairs of one state.
+double RectifiedSum(const BothWorlds& state, const Moments& m, double lambda) {
+  const double mean = m.real - lambda * m.model;
+  const auto term = [&](std::int64_t count, double value) { return static_cast<double>(count) * (value - mean); };
+  return term(state.both, 1 - lambda) + term(state.only_real, 1) + term(state.only_model, -lambda) +
+         term(state.neither, 0);
+}
+
 /// The variance of Y - lambda G over the four kinds of pairs, without cancellation.
 double RectifiedVariance(const BothWorlds& paired, const Moments& m, double lambda) {
   const double mean = m.real - lambda * m.model;
@@ -54,11 +62,16 @@ double RectifiedVariance(const BothWorlds& paired, const Moments& m, double lamb
          term(paired.neither, 0);
 }
 
-Defined<Interval> Allowed(const BothWorlds& paired, const Interval& normal) {
-  if (paired.n() < kLeastReal) return Undefined{fmt::format("fewer than {} real trials", kLeastReal)};
-  if (paired.discordant() < kLeastDiscordant) {
-    return Undefined{fmt::format("fewer than {} pairs in which the worlds differ", kLeastDiscordant)};
-  }
+/// What the normal interval rests on: pairs, or initial states where they repeat.
+struct Basis {
+  std::int64_t real = 0, discordant = 0;
+  const char *trials = "real trials", *pairs = "pairs";
+};
+
+Defined<Interval> Allowed(const Basis& basis, const Interval& normal) {
+  if (basis.real < kLeastReal) return Undefined{fmt::format("fewer than {} {}", kLeastReal, basis.trials)};
+  if (basis.discordant < kLeastDiscordant)
+    return Undefined{fmt::format("fewer than {} {} in which the worlds differ", kLeastDiscordant, basis.pairs)};
   return Interval{std::clamp(normal.low, 0.0, 1.0), std::clamp(normal.high, 0.0, 1.0)};
 }
 
@@ -106,6 +119,43 @@ std::vector<Outcome> Shuffled(const std::vector<Outcome>& outcomes, std::uint64_
   return shuffled;
 }
 
+bool HasRepeats(const PpiStates& states) {
+  return std::ranges::any_of(states.paired, [](const BothWorlds& state) { return state.n() > 1; }) ||
+         std::ranges::any_of(states.more, [](const Count& state) { return state.trials > 1; });
+}
+
+/// Of the mean of Y - lambda G, from the states' sums; undefined where they cannot show it.
+Number RectifierVariance(const PpiStates& states, const Moments& m, double lambda) {
+  double squares = 0, groups = 0;
+  for (const BothWorlds& state : states.paired) {
+    if (state.n() == 0) continue;
+    squares += std::pow(RectifiedSum(state, m, lambda), 2);
+    ++groups;
+  }
+  if (groups < 2) return Undefined{"all pairs are of one initial state"};
+  return std::max(groups / (groups - 1) * squares / (m.n * m.n),
+                  RectifiedVariance(states.Paired(), m, lambda) / m.n);
+}
+
+/// Of the mean of H.
+Number FurtherVariance(const PpiStates& states, const Moments& m) {
+  const double independent = m.model_more * (1 - m.model_more) / m.extra;
+  const ClusterStatistics clusters = StatisticsOfClusters(states.more);
+  if (clusters.clusters == clusters.trials) return independent;
+  if (!clusters.cluster_se) return Undefined{"all further outcomes are of one initial state"};
+  return std::max(independent, *clusters.cluster_se * *clusters.cluster_se);
+}
+
+/// Over initial states; undefined where they are too few to show it.
+Number SeByState(const PpiStates& states, const Moments& m, double lambda) {
+  const Number rectifier = RectifierVariance(states, m, lambda);
+  if (!rectifier) return rectifier;
+  if (lambda == 0) return std::sqrt(*rectifier);
+  const Number further = FurtherVariance(states, m);
+  if (!further) return further;
+  return std::sqrt(*rectifier + lambda * lambda * *further);
+}
+
 Estimate NothingKnown(const BothWorlds& paired, double confidence) {
   TwoSidedZ(confidence);  // complains
   Estimate estimate;
@@ -142,8 +192,51 @@ PpiEstimate PpiMean(const BothWorlds& paired, const Count& more, PpiWeight weigh
   result.value = value;
   result.se = se;
   result.normal = normal;
-  result.allowed = Allowed(paired, normal);
+  result.allowed = Allowed({paired.n(), paired.discordant()}, normal);
   return result;
+}
+
+PpiEstimate PpiMeanByState(const PpiStates& states, PpiWeight weight, double confidence) {
+  const BothWorlds paired = states.Paired();
+  PpiEstimate result = PpiMean(paired, states.More(), weight, confidence);
+  if (!result.se || !HasRepeats(states)) return result;
+  result.se = SeByState(states, Moments(paired, states.More()), result.lambda);
+  if (!result.se) {
+    result.normal = result.allowed = Undefined{result.se.reason()};
+    return result;
+  }
+  const double half = TwoSidedZ(confidence) * *result.se;
+  const Interval normal{*result.value - half, *result.value + half};
+  const auto count = [&](auto counts) { return std::ranges::count_if(states.paired, counts); };
+  result.normal = normal;
+  result.allowed = Allowed({count([](const BothWorlds& state) { return state.n() > 0; }),
+                            count([](const BothWorlds& state) { return state.discordant() > 0; }),
+                            "initial states tried for real", "initial states"},
+                           normal);
+  return result;
+}
+
+Estimate PpiMoverByState(const PpiStates& states, double confidence) {
+  const BothWorlds paired = states.Paired();
+  Estimate rate = PpiMover(paired, states.More(), confidence);
+  if (!rate.value || !HasRepeats(states)) return rate;
+  std::vector<PairedOutcomes> clusters;
+  for (const BothWorlds& state : states.paired) clusters.push_back({{state.only_real, state.only_model}, state.n()});
+  const Estimate rectifier = TangoOfClusters(SumOf(clusters), EffectivePairs(clusters), confidence);
+  const Interval sum = MoverSum(ClusteredWilsonInterval(states.more, confidence), rectifier);
+  rate.interval = Interval{std::clamp(sum.low, 0.0, 1.0), std::clamp(sum.high, 0.0, 1.0)};
+  return rate;
+}
+
+BothWorlds PpiStates::Paired() const {
+  BothWorlds all;
+  for (const BothWorlds& state : paired) {
+    all.both += state.both;
+    all.only_real += state.only_real;
+    all.only_model += state.only_model;
+    all.neither += state.neither;
+  }
+  return all;
 }
 
 Estimate PpiMover(const BothWorlds& paired, const Count& more, double confidence) {

@@ -44,6 +44,20 @@ PpiEstimate PpiMean(const BothWorlds& paired, const Count& more, PpiWeight weigh
 /// is not. @throws as PpiMean.
 Estimate PpiMover(const BothWorlds& paired, const Count& more, double confidence = 0.95);
 
+/// Outcomes that repeat initial states: the pairs of each, and the further ones of each that was not tried for real.
+struct PpiStates {
+  std::vector<BothWorlds> paired;
+  std::vector<Count> more;
+  BothWorlds Paired() const;  ///< of all states together
+  Count More() const { return SumOf(more); }
+};
+/// As PpiMean of all together, but for what they tell: se and intervals are over initial states (errors of Y - lambda G
+/// and of H summed within each before they are squared, G / (G - 1) times, never below those of independent outcomes), and
+/// `allowed` asks for 40 states tried for real and 5 in which the worlds differ. One outcome a state: as PpiMean.
+PpiEstimate PpiMeanByState(const PpiStates& states, PpiWeight weight, double confidence = 0.95);
+/// As PpiMover, with Wilson's and Tango's intervals on effective numbers; the value is of all.
+Estimate PpiMoverByState(const PpiStates& states, double confidence = 0.95);
+
 /// One real trial and the world model's answer in the same state.
 struct BothOutcomes {
   bool real = false, model = false;

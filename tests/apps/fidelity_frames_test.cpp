@@ -116,6 +116,34 @@ TEST_F(Drift, AGripperThatIsFoundElsewhereIsOffAndOneThatIsGoneIsNotFound) {
   EXPECT_DOUBLE_EQ(*chunks[1].gripper_found, 0.25);
 }
 
+TEST_F(Drift, AGripperThatIsTooPlainToBeFoundIsNotFoundAnywhere) {
+  const auto plain = [](int time) { return Seen{InReality(time).thing, std::nullopt}; };
+  DriftMeter drift(kChunk);
+  ArmState arm;
+  arm.base_from_gripper.translation() = Eigen::Vector3d((kGripper.x + 0.5 - 48) / 100, (kGripper.y + 0.5 - 32) / 100, 1);
+  drift.Add({&task_, Write("real.mp4", plain), Write("model.mp4", InReality), std::vector<Arms>(kFrames - 1, Arms{arm}), 1, 0});
+  for (const ChunkDrift& chunk : drift.Chunks()) {
+    EXPECT_FALSE(chunk.gripper_px);
+    EXPECT_FALSE(chunk.gripper_found) << "where it is plain nobody could find it";
+  }
+}
+
+/// Below a lower view the picture is black in both: nobody imagined that.
+TEST_F(Drift, PicturesAreComparedWhereThereIsAView) {
+  Task with_hand = task_;
+  with_hand.cameras.push_back({.name = "hand_right", .width_px = 32, .height_px = 16});
+  const auto write = [&](const std::string& name, int grey) {
+    VideoWriter writer(folder_ / name, {.crf = 0});
+    for (int time = 0; time < kFrames; ++time)
+      writer.Append(SideBySide({Drawn(InReality(time)), cv::Mat(16, 32, CV_8UC3, cv::Scalar::all(grey))}));
+    return writer.Finish().path;
+  };
+  DriftMeter drift(kChunk);
+  drift.Add({&with_hand, write("real.mp4", 100), write("model.mp4", 160), {}, 1, 0});
+  const double head = kWidth_px * kHeight_px, hand = 32 * 16, error = 60 * 60 * hand / (head + hand);
+  EXPECT_NEAR(*drift.Chunks().at(0).psnr, 10 * std::log10(255 * 255 / error), 0.2);
+}
+
 TEST(FindObject, FindsTheMiddleOfTheTasksThingByItsColour) {
   const auto found = FindObject(TakeBottle(), Drawn({cv::Point(30, 12), std::nullopt}));
   ASSERT_TRUE(found);

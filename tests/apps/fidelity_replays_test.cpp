@@ -167,6 +167,59 @@ TEST_F(Replays, OfAnotherRuleAreNotTakenOverFromAnEarlierReality) {
                     testing::Not(HasSubstr("episodes taken over"))));
 }
 
+/// A policy whose latency is measured acts otherwise in every run.
+TEST_F(Replays, OfOtherActionsAreNeitherGoneOnWithNorTakenOver) {
+  RunReplays(Run("run", kToTheLastAction), Of(MovesThenRests(4, 0)));
+  EXPECT_THAT([&] { RunReplays(Run("run", kToTheLastAction), Of(MovesThenRests(5, 0))); }, testing::Not(testing::Throws<Error>()))
+      << "a rule may have ended the first";
+  EXPECT_THAT([&] { RunReplays(Run("run", kToTheLastAction), Of(MovesThenRests(3, 1))); },
+              ThrowsMessage<Error>(AllOf(HasSubstr("played other actions than its episode has now"), HasSubstr("remove that folder"))));
+
+  Store::CreateOrContinue(folder_ / "earlier/closed", {.suite_text = "", .suite_hash = suite_.hash, .suite_path = "", .evac_version = ""});
+  RunReplays(Run("earlier/horizon", kToTheLastAction), Of(MovesThenRests(4, 0)));
+  ReplayRun run = Run("other", kToTheLastAction);
+  run.reality = folder_ / "earlier/horizon";
+  testing::internal::CaptureStderr();
+  const auto ends = Ends(RunReplays(run, Of(MovesThenRests(2, 3))));
+  EXPECT_THAT(testing::internal::GetCapturedStderr(),
+              AllOf(HasSubstr("2 of its episodes played other actions than these: not taken over"), testing::Not(HasSubstr("episodes taken"))));
+  EXPECT_THAT(ends, Each(std::pair<std::size_t, StopReason>(5, StopReason::kRecordingEnd)));
+}
+
+TEST_F(Replays, ThatWereBegunAndNeverCameToAnEpisodeAreBegunAnew) {
+  RunReplays(Run("run", "after 8 frames"), {});
+  EXPECT_NO_THROW(RequireSameReplays(Run("run", kToTheLastAction)));
+  EXPECT_EQ(RunReplays(Run("run", kToTheLastAction), Of(MovesThenRests(4, 0))).Episodes().size(), 2u);
+}
+
+/// Fails at the chunk that it is told to.
+class FailingWorld final : public ObedientWorld {
+ public:
+  explicit FailingWorld(int fails_at) : ObedientWorld("model", true), fails_at_(fails_at) {}
+  std::vector<Advanced> Advance(std::span<const SceneChunk> batch) override {
+    std::vector<Advanced> answers = ObedientWorld::Advance(batch);
+    if (++calls_ == fails_at_) answers.back() = Failure{StopReason::kDiverged, "a latent is no number"};
+    return answers;
+  }
+
+ private:
+  int fails_at_, calls_ = 0;
+};
+
+TEST_F(Replays, OfAWorldModelThatFailsHaveNoSpeed) {
+  const std::vector<Replay> replays = Of(MovesThenRests(4, 0));
+  for (const int fails_at : {1, 2}) {
+    FailingWorld failing(fails_at);
+    const Number seconds = SecondsPerChunk(failing, replays, kChunk);
+    ASSERT_FALSE(seconds);
+    EXPECT_THAT(seconds.reason(), HasSubstr("a latent is no number"));
+  }
+  ClosedWorld closed("model", true);
+  EXPECT_THAT(SecondsPerChunk(closed, replays, kChunk).reason(), HasSubstr("nobody has seen it"));
+  ObedientWorld obedient("model", true);
+  EXPECT_GE(*SecondsPerChunk(obedient, replays, kChunk), 0);
+}
+
 TEST_F(Replays, ThatFailedAreSaidAndCountedAndTriedAgainByTheNextCall) {
   ReplayRun run = Run("run", kToTheLastAction);
   const auto obedient = run.make;

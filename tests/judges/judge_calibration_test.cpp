@@ -132,10 +132,22 @@ TEST(JudgeCalibration, ProbesAreComparedWithTheJudgeItself) {
   Judged run("real", "ssff", "ssff");
   for (int i = 0; i < 4; ++i)
     run.Say("vlm:x:flip", {{"take", std::to_string(i), "policy", "v1", 1}, "real"}, "ss?s"[i]);
-  const auto consistency = CalibrateJudge(run.store(), "vlm:x", "oracle").consistency;
-  EXPECT_EQ(consistency.size(), 1u);
-  EXPECT_EQ(consistency.at("flip").successes, 2);
-  EXPECT_EQ(consistency.at("flip").trials, 3);
+  const auto probes = CalibrateJudge(run.store(), "vlm:x", "oracle").probes;
+  EXPECT_EQ(probes.size(), 1u);
+  EXPECT_EQ(probes.at("flip").same.successes, 2);
+  EXPECT_EQ(probes.at("flip").same.trials, 3);
+}
+
+TEST(JudgeCalibration, ProbesOfManyClipsOfFewStatesKnowFewStates) {
+  Judged run("real", Times(40, "s"), Times(40, "s"), 4);
+  for (const Episode& episode : run.store().Episodes()) {
+    const bool is_odd_scene = episode.key.pair.initial_state == "0";
+    run.Say("vlm:x:retest", episode.key, is_odd_scene ? 'f' : 's');
+  }
+  const ProbeAgreement retest = CalibrateJudge(run.store(), "vlm:x", "oracle").probes.at("retest");
+  EXPECT_EQ(retest.same.trials, 40);
+  EXPECT_NEAR(*retest.share.value, 0.75, 1e-12);
+  EXPECT_LT(retest.share.interval->low, WilsonInterval(3, 4).interval->low + 0.05) << "four scenes, one of them odd";
 }
 
 }  // namespace

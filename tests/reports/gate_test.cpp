@@ -260,6 +260,51 @@ TEST(Gate, ACorrelationIsHeldAgainstItsFloorAndMmrvAgainstItsCeiling) {
               HasSubstr("at_least: found '0.5', wanted none"));
 }
 
+TEST(Gate, ACorrelationIsOfTheTaskThatIsNamed) {
+  const auto cell = [](const std::string& task, int policy, int real, int sim) {
+    const auto outcomes = [](int successes) { return Repeat(successes, 's') + Repeat(20 - successes, 'f'); };
+    return RepeatedCell{task, "p" + std::to_string(policy), {outcomes(real)}, {outcomes(sim)}};
+  };
+  std::vector<RepeatedCell> cells;
+  for (int policy = 1; policy <= 4; ++policy) {
+    cells.push_back(cell("easy", policy, 4 * policy, 4 * policy));
+    cells.push_back(cell("hard", policy, 4 * policy, 20 - 4 * policy));
+  }
+  const RunSummary run = RepeatedRun(cells);
+  const auto decide = [&](const std::string& rule) {
+    return Decide(Rules("  - {name: r, test: correlation, world: sim, at_least: 0.5" + rule + "}\n"), {run, "out", {}},
+                  nullptr)
+        .decision.rules[0];
+  };
+  const RuleDecision easy = decide(", task: easy"), hard = decide(", task: hard"), all = decide("");
+  EXPECT_NEAR(*easy.value.value, 1, 1e-9);
+  EXPECT_NEAR(*hard.value.value, -1, 1e-9);
+  EXPECT_NEAR(*all.value.value, 0, 1e-9);
+  EXPECT_EQ(easy.states, 80);
+  EXPECT_EQ(all.states, 160);
+  EXPECT_THAT(hard.statement, HasSubstr("pearson of sim against real on hard: -1.00"));
+  EXPECT_THAT(MessageOf([&] { decide(", policy: p1@c"); }), HasSubstr("policy: found 'p1@c', wanted none"));
+}
+
+TEST(Gate, KappaIsOfThePolicyThatIsNamed) {
+  RunSummary run = RepeatedRun({{"t", "good", {}, {Repeat(10, 's') + Repeat(10, 'f')}},
+                                {"t", "odd", {}, {Repeat(10, 's') + Repeat(10, 'f')}}});
+  run.judges.push_back("human");
+  for (const Episode& episode : run.data.episodes) {
+    auto& verdicts = run.data.verdicts[episode.key.Id()];
+    Verdict other = verdicts.at("oracle");
+    if (episode.key.pair.policy == "odd") other.label = other.label == Label::kSuccess ? Label::kFailure : Label::kSuccess;
+    verdicts["human"] = other;
+  }
+  const auto kappa_of = [&](const std::string& policy) {
+    const std::string rule = "  - {name: r, test: judge_kappa, world: sim, at_least: 0.8, policy: " + policy + "}\n";
+    return Decide(Rules(rule), {run, "out", {}}, nullptr).decision.rules[0];
+  };
+  EXPECT_EQ(*kappa_of("good@c").value.value, 1);
+  EXPECT_EQ(*kappa_of("odd@c").value.value, -1);
+  EXPECT_EQ(kappa_of("odd@c").policy, "odd@c");
+}
+
 TEST(Gate, TheJudgeIsHeldAgainstAnother) {
   SampleRun run = RunOf(Repeat(20, 's') + Repeat(20, 'f'));
   int turn = 0;

@@ -72,11 +72,13 @@ TEST(Judges, AJudgeIsHeldAgainstPeopleInEachWorldApart) {
     human.judge = "human";
     human.label = episode.key.pair.initial_state == "41-0003" ? Label::kSuccess : Label::kFailure;
     verdicts.push_back(human);
+    human.judge = "human:ann";
+    verdicts.push_back(human);
   }
   run.store().AddVerdicts(verdicts);
   const JudgeReport judges = JudgesOf(run.Summary());
   EXPECT_EQ(judges.truth, "human");
-  ASSERT_EQ(judges.judges.size(), 2u);
+  ASSERT_EQ(judges.judges.size(), 2u) << "a rater is not held against what her own vote made";
   EXPECT_EQ(judges.judges[0].world, "real");
   EXPECT_EQ(judges.judges[0].confusion.only_judge_success, 2);
   EXPECT_EQ(judges.judges[0].confusion.only_human_success, 1);

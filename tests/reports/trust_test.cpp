@@ -127,7 +127,7 @@ TEST(TrustIn, RepeatsOfOneStateDoNotMakeTheRealRateSurer) {
   const TaskTrust once = TrustOf(WithSeeds(real, model, 1))[0], often = TrustOf(WithSeeds(real, model, 10))[0];
   const PredictedRate &one = once.policies[0], &ten = often.policies[0];
   EXPECT_EQ(ten.pairs.n(), 120);
-  EXPECT_EQ(ten.further.trials, 300);
+  EXPECT_EQ(ten.further.trials, 3000) << "what was imagined, all of it";
   EXPECT_NEAR(*ten.predicted.value, *one.predicted.value, 1e-12);
   EXPECT_NEAR(Width(ten.predicted), Width(one.predicted), 0.05);
   EXPECT_THAT(ten.predicted.method, HasSubstr("on 11 effective pairs"));

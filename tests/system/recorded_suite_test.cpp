@@ -78,7 +78,7 @@ TEST_F(RecordedSuite, ItsRecordingIsSeenAsTheNetworkWasTrainedAndByAllItsWorldsA
   const Suite suite = Filled(std::string(kEcho) + kEvac);
   const Task& task = suite.tasks.front();
   EXPECT_EQ(task.period_s, 0.1);
-  EXPECT_EQ(task.max_chunks, 8);
+  EXPECT_EQ(task.max_chunks, 1) << "as long as the recording: 8 steps";
   EXPECT_EQ(Cameras(suite), (std::vector<std::string>{"head", "hand_right"}));
   for (const SuiteWorld& world : suite.worlds) {
     const std::unique_ptr<World> made = MakeWorld(world, suite, nullptr);
@@ -103,8 +103,20 @@ TEST_F(RecordedSuite, TheDocumentedReplayTakesTheSameSteps) {
 TEST_F(RecordedSuite, WithoutANetworkItsRecordingIsReadWhole) {
   const Suite suite = Filled(kEcho);
   EXPECT_NEAR(suite.tasks.front().period_s, 1.0 / 30, 1e-12);
-  EXPECT_EQ(suite.tasks.front().max_chunks, 24);
+  EXPECT_EQ(suite.tasks.front().max_chunks, 3) << "24 steps";
   EXPECT_EQ(Cameras(suite), (std::vector<std::string>{"head", "hand_left", "hand_right"}));
+}
+
+TEST_F(RecordedSuite, ComesToRestByTheRuleThatThePageSaysAndByNoneOfItsOwn) {
+  EXPECT_FALSE(Filled(kEcho).tasks.front().still.enabled);
+  const StillRule still = Filled(kEcho, {"still.translation_m=0.002"}).tasks.front().still;
+  EXPECT_TRUE(still.enabled);
+  EXPECT_EQ(still.translation_m, 0.002);
+  EXPECT_EQ(still.dwell_chunks, StillRule{}.dwell_chunks);
+  EXPECT_TRUE(Filled(kEcho, {"still={}"}).tasks.front().still.enabled) << "as docs/your_robot.md writes it";
+  EXPECT_THAT([&] { Filled(kEcho, {"still.speed=1"}); }, testing::ThrowsMessage<Error>(testing::HasSubstr("speed")));
+  EXPECT_THAT([&] { Filled(kEcho, {"image.height_px=64", "image.width_px=96"}); },
+              testing::ThrowsMessage<Error>(testing::HasSubstr("none beside a `recording`")));
 }
 
 TEST_F(RecordedSuite, OfWeightsThatDoNotSayTheirCamerasAsManyAreSeenAsThereAreViews) {

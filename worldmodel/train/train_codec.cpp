@@ -29,7 +29,7 @@ void WriteCodec(const std::filesystem::path& path, const std::vector<NamedTensor
   WriteTensorFile(path, views,
                   {{"format", "pt"},
                    {"psnr", Decibel(quality.psnr)},
-                   {"psnr_object", Decibel(quality.psnr_object)},
+                   {"psnr_object", quality.psnr_object == 0 ? "unknown" : Decibel(quality.psnr_object)},
                    {"psnr_maps", Decibel(quality.psnr_maps)}});
 }
 
@@ -87,7 +87,8 @@ TrainerSummary TrainCodec(const JobPlace& place, const CodecOptions& given, cons
   const auto say = [&](const char* when, const CodecQuality& quality) {
     if (place.say)
       place.say(std::string(when) + ": hold-out " + Decibel(quality.psnr) + " dB, around the object " +
-                Decibel(quality.psnr_object) + " dB, maps " + Decibel(quality.psnr_maps) + " dB");
+                (quality.psnr_object == 0 ? "unknown" : Decibel(quality.psnr_object) + " dB") + ", maps " +
+                Decibel(quality.psnr_maps) + " dB");
   };
   TrainerSummary summary = trainer.Run({.loss = [&](const StepPlace& at) { return workers.front().Loss(at); },
                                         .holdout =

@@ -26,7 +26,8 @@ std::string IdentityOf(const JobPlace& place, const JobOptions& options);
 void CheckHoldoutSize(const JobOptions& options);
 
 /// Trains the codec and writes OUT/codec.safetensors: its parameters alone, latents normalised, what they are worth in
-/// the metadata (psnr, psnr_object, psnr_maps: dB, hold-out). An interrupted training writes none.
+/// the metadata (psnr, psnr_object, psnr_maps: dB, hold-out; psnr_object is "unknown" where no shard knows its place). An
+/// interrupted training writes none.
 /// @param init  a file that holds a codec, alone or in a whole model, to go on from; empty: from nothing. A training
 ///              that OUT holds already goes on from there instead
 /// @throws TensorError naming a key that is missing in `init` or of another shape

@@ -44,6 +44,62 @@ TEST(Ppi, TheNormalIntervalMayOnlyBeShownWhereItCovers) {
   EXPECT_FALSE(PpiMean({25, 2, 2, 11}, more, PpiWeight::kTuned).allowed) << "4 pairs differ";
 }
 
+/// One outcome of each kind in a state of its own.
+PpiStates OneEach(const BothWorlds& table, const Count& more) {
+  PpiStates states;
+  states.paired.insert(states.paired.end(), static_cast<std::size_t>(table.both), {1, 0, 0, 0});
+  states.paired.insert(states.paired.end(), static_cast<std::size_t>(table.only_real), {0, 1, 0, 0});
+  states.paired.insert(states.paired.end(), static_cast<std::size_t>(table.only_model), {0, 0, 1, 0});
+  states.paired.insert(states.paired.end(), static_cast<std::size_t>(table.neither), {0, 0, 0, 1});
+  for (std::int64_t i = 0; i < more.trials; ++i) states.more.push_back({i < more.successes ? 1 : 0, 1});
+  return states;
+}
+
+TEST(PpiByState, OneOutcomeAStateIsAsTheTableAlone) {
+  const BothWorlds table{22, 3, 4, 11};
+  const Count more{129, 200};
+  const PpiStates states = OneEach(table, more);
+  const PpiEstimate alone = PpiMean(table, more, PpiWeight::kTuned), by_state = PpiMeanByState(states, PpiWeight::kTuned);
+  EXPECT_EQ(*by_state.se, *alone.se);
+  EXPECT_EQ(by_state.allowed->low, alone.allowed->low);
+  EXPECT_EQ(PpiMoverByState(states).interval->low, PpiMover(table, more).interval->low);
+}
+
+/// What the robot does is the state's; the model errs here and there: Y - G shows no likeness within a state, Y is all alike.
+TEST(PpiByState, RealTrialsThatRepeatTheirStateAreNotAsManyStates) {
+  PpiStates states;
+  for (int i = 0; i < 40; ++i) {
+    const bool errs = i % 2 == 0;  // in one of five
+    states.paired.push_back(i < 20 ? BothWorlds{errs ? 4 : 5, errs ? 1 : 0, 0, 0} : BothWorlds{0, 0, errs ? 1 : 0, errs ? 4 : 5});
+  }
+  for (int i = 0; i < 10; ++i) states.more.push_back({i % 2, 1});
+  const PpiEstimate tuned = PpiMeanByState(states, PpiWeight::kTuned);
+  EXPECT_LT(tuned.lambda, 0.1) << "ten further outcomes say little";
+  EXPECT_NEAR(*tuned.se, std::sqrt(0.25 / 40), 0.008) << "forty states of which half succeed";
+  EXPECT_LT(*PpiMean(states.Paired(), states.More(), PpiWeight::kTuned).se, 0.04) << "as two hundred trials";
+  EXPECT_TRUE(tuned.allowed);
+}
+
+TEST(PpiByState, FurtherOutcomesThatRepeatTheirStateAreNotAsManyStates) {
+  PpiStates once = OneEach({20, 3, 3, 20}, {100, 200}), often = once;
+  for (Count& state : often.more) state = {state.successes * 10, state.trials * 10};
+  const PpiEstimate one = PpiMeanByState(once, PpiWeight::kFull), ten = PpiMeanByState(often, PpiWeight::kFull);
+  EXPECT_NEAR(*ten.value, *one.value, 1e-12);
+  EXPECT_NEAR(*ten.se, *one.se, 0.001);
+  EXPECT_NEAR(PpiMoverByState(often).interval->low, PpiMoverByState(once).interval->low, 0.002);
+  often.more = {{5, 10}};
+  EXPECT_EQ(PpiMeanByState(often, PpiWeight::kFull).se.reason(), "all further outcomes are of one initial state");
+  EXPECT_NEAR(*PpiMoverByState(often).value, 0.5, 1e-12) << "ten outcomes of one state: half of them, not all";
+}
+
+TEST(PpiByState, FewStatesAreFewHoweverOftenTheyAreTried) {
+  PpiStates states;
+  for (int i = 0; i < 12; ++i) states.paired.push_back({4, 1, 0, 5});
+  states.more = {{1, 1}, {0, 1}};
+  EXPECT_EQ(PpiMeanByState(states, PpiWeight::kTuned).allowed.reason(), "fewer than 40 initial states tried for real");
+  EXPECT_FALSE(PpiMeanByState({{{4, 1, 0, 5}}, {{1, 1}, {0, 1}}}, PpiWeight::kTuned).se);
+}
+
 TEST(Ppi, WithoutFurtherOutcomesTheRealTrialsStandAlone) {
   const PpiEstimate tuned = PpiMean({5, 1, 2, 2}, {0, 0}, PpiWeight::kTuned);
   EXPECT_EQ(tuned.lambda, 0);
