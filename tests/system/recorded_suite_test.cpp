@@ -108,14 +108,15 @@ TEST_F(RecordedSuite, WithoutANetworkItsRecordingIsReadWhole) {
 }
 
 TEST_F(RecordedSuite, ComesToRestByTheRuleThatThePageSaysAndByNoneOfItsOwn) {
+  const auto with = [&](const std::string& line) { return Filled(std::string(kEcho) + line + "\n"); };
   EXPECT_FALSE(Filled(kEcho).tasks.front().still.enabled);
-  const StillRule still = Filled(kEcho, {"still.translation_m=0.002"}).tasks.front().still;
+  const StillRule still = with("still: {translation_m: 0.002}").tasks.front().still;
   EXPECT_TRUE(still.enabled);
   EXPECT_EQ(still.translation_m, 0.002);
   EXPECT_EQ(still.dwell_chunks, StillRule{}.dwell_chunks);
-  EXPECT_TRUE(Filled(kEcho, {"still={}"}).tasks.front().still.enabled) << "as docs/your_robot.md writes it";
-  EXPECT_THAT([&] { Filled(kEcho, {"still.speed=1"}); }, testing::ThrowsMessage<Error>(testing::HasSubstr("speed")));
-  EXPECT_THAT([&] { Filled(kEcho, {"image.height_px=64", "image.width_px=96"}); },
+  EXPECT_TRUE(with("still: {}").tasks.front().still.enabled) << "as docs/your_robot.md writes it";
+  EXPECT_THAT([&] { with("still: {speed: 1}"); }, testing::ThrowsMessage<Error>(testing::HasSubstr("speed")));
+  EXPECT_THAT([&] { with("image: {height_px: 64, width_px: 96}"); },
               testing::ThrowsMessage<Error>(testing::HasSubstr("none beside a `recording`")));
 }
 
