@@ -261,6 +261,26 @@ TEST(Fidelity, WhereTwoMmrvsAreShownEachSaysOverWhat) {
   EXPECT_THAT(FidelityPage(fidelity), HasSubstr("It ranks all points as one list; within each task: below."));
 }
 
+TEST(Fidelity, RecordingsThatFailedAreNotCountedAsReplayed) {
+  FidelityInput input;
+  for (const char* model_video : {"open/model.mp4", ""}) {
+    FidelityRow& row = input.rows.emplace_back();
+    row.kind = "open_loop";
+    row.real_video = "open/real.mp4";
+    row.model_video = model_video;
+  }
+  input.horizon = {ChunkDrift{.clips = 1, .psnr = 30.0, .psnr_moving = 20.0, .psnr_moving_copy = 15.0}};
+  const std::string some = FidelityPage(FidelityOf(input));
+  EXPECT_THAT(some, HasSubstr("1 of 2 recordings replayed"));
+  EXPECT_THAT(some, HasSubstr("better than a picture that stands still for 1 chunk."));
+  input.rows[0].model_video.clear();
+  input.horizon.clear();
+  const std::string none = FidelityPage(FidelityOf(input));
+  EXPECT_THAT(none, HasSubstr("0 of 2 recordings replayed"));
+  EXPECT_THAT(none, HasSubstr("Nothing could be compared."));
+  EXPECT_THAT(none, Not(HasSubstr("not a single chunk")));
+}
+
 TEST(Fidelity, ThePageEscapesWhatASuiteCalledItsPolicies) {
   FidelityInput input = Sample();
   for (FidelityRow& row : input.rows) row.pair.policy = "<script>alert(1)</script>";
