@@ -101,8 +101,8 @@ void AddTellers(const RunData& run, const std::string& world, std::set<std::stri
 
 /// Whom to ask where the judge who was asked told no outcome.
 std::vector<std::string> OtherJudges(const JudgedRun& first, const JudgedRun& second, const ComparedWorld& compared) {
-  const ComparisonRow& all = compared.comparison.all;
-  if (all.first_episodes + all.second_episodes > 0) return {};
+  const auto tells = [](const ComparisonRow& row) { return row.first_episodes + row.second_episodes > 0; };
+  if (std::ranges::any_of(compared.comparison.tasks, tells)) return {};
   std::set<std::string> judges;
   for (const JudgedRun* run : {&first, &second}) AddTellers(run->summary.data, compared.world, judges);
   return {judges.begin(), judges.end()};

@@ -6,6 +6,7 @@
 
 #include "core/statistics/many_comparisons.h"
 #include "core/statistics/planning.h"
+#include "core/statistics/sequential_planning.h"
 #include "reports/gate_evidence.h"
 #include "reports/wording.h"
 
@@ -14,6 +15,7 @@ namespace {
 
 constexpr double kSupposedFlips = 0.2;  // share of states, where nothing is known yet
 constexpr double kSupposedRate = 0.7;
+constexpr double kPower = 0.8;  // of the sizes
 
 /// Adjusts the p-values of all rules that test something and may be decided.
 void Correct(GateCorrection correction, std::vector<Evidence>& evidences) {
@@ -88,24 +90,31 @@ double BaselineRate(const GateRule& rule, const PinnedResult* baseline) {
 
 std::string Text(const SampleSize& size) { return size.exact ? fmt::to_string(size.n) : size.exact.reason(); }
 
+/// "124 pairs if 20 % of the states flip (260 episodes of each unpaired at 70 %)".
+std::string SizeOf(const GateRule& rule, double rate) {
+  const Promise promise{rule.alpha, kPower};
+  const std::string flips = fmt::format("pairs if {} of the states flip", Percent(kSupposedFlips));
+  if (rule.test == GateTest::kSavi) {
+    const FlipRates rates{kSupposedFlips / 2, kSupposedFlips / 2};
+    const SampleSize size = PairsForSequentialNonInferiority(rates, rule.margin, promise);
+    return fmt::format("{} {} (less where an earlier look shows it)", Text(size), flips);
+  }
+  const std::string pairs = Text(PairsForNonInferiority(kSupposedFlips, rule.margin, promise)) + " " + flips,
+                    trials = Text(TrialsForNonInferiority(rate, rule.margin, promise)) + " episodes of each";
+  return rule.is_paired ? fmt::format("{} ({} unpaired at {})", pairs, trials, Percent(rate))
+                        : fmt::format("{} at {} ({})", trials, Percent(rate), pairs);
+}
+
 }  // namespace
 
 std::vector<std::string> SizesOf(const GateRules& rules, const PinnedResult* baseline) {
   std::vector<std::string> sizes;
   for (const GateRule& rule : rules.rules) {
     if (!rule.Compares()) continue;
-    const Promise promise{rule.alpha, 0.8};
-    const double rate = BaselineRate(rule, baseline);
-    const SampleSize pairs = PairsForNonInferiority(kSupposedFlips, rule.margin, promise);
-    const SampleSize trials = TrialsForNonInferiority(rate, rule.margin, promise);
     sizes.push_back(fmt::format(
-        "{}: to show with 80 % power that an equal candidate is not worse by {:g} points (alpha {:g}, one-sided) takes "
-        "{}",
-        rule.name, 100 * rule.margin, rule.alpha,
-        rule.is_paired ? fmt::format("{} pairs if {} of the states flip ({} episodes of each unpaired at {})", Text(pairs),
-                                     Percent(kSupposedFlips), Text(trials), Percent(rate))
-                       : fmt::format("{} episodes of each at {} ({} pairs if {} of the states flip)", Text(trials),
-                                     Percent(rate), Text(pairs), Percent(kSupposedFlips))));
+        "{}: to show with {} power that an equal candidate is not worse by {:g} points (alpha {:g}, {}) takes {}",
+        rule.name, Percent(kPower), 100 * rule.margin, rule.alpha,
+        rule.test == GateTest::kSavi ? "whenever one looks" : "one-sided", SizeOf(rule, BaselineRate(rule, baseline))));
   }
   return sizes;
 }

@@ -8,6 +8,7 @@
 #include "core/error.h"
 #include "core/statistics/planning.h"
 #include "core/statistics/sequential.h"
+#include "core/statistics/sequential_planning.h"
 #include "core/statistics/special.h"
 #include "core/statistics/two_by_two.h"
 #include "reports/gate_quality.h"
@@ -24,24 +25,37 @@ std::string Margin(const GateRule& rule) { return fmt::format("{:g} points", 100
 
 double PassConfidence(const GateRule& rule) { return 1 - 2 * rule.alpha; }
 
+/// Of a test that looks once, by the normal approximation: until it is shown on which side of -margin the difference is,
+/// `side` 1 above it and -1 below.
+Number PairsToShow(int side, const GateRule& rule, const FlipRates& rates) {
+  const double d = rates.only_first - rates.only_second, room = side * (rule.margin + d);
+  if (room <= 0.005) return Undefined{"the flips lean the other way"};
+  const double z = NormalQuantile(1 - rule.alpha) + NormalQuantile(kPower);
+  return z * z * (rates.only_first + rates.only_second - d * d) / (room * room);
+}
+
 /// Pairs of which the lower end of the difference would clear -margin, and those that would show it worse, both if the
 /// flips stay as seen and further pairs repeat states as these do.
 std::string MorePairs(const GateRule& rule, const PairedOutcomes& seen, std::int64_t effective) {
   const Repeated have{seen.pairs, effective};
   const double each = seen.pairs > 0 ? static_cast<double>(effective) / static_cast<double>(seen.pairs) : 1;
-  const double n = static_cast<double>(effective) + 1,
-               better = static_cast<double>(seen.flips.only_first) * each + 0.5,
-               worse = static_cast<double>(seen.flips.only_second) * each + 0.5, d = (better - worse) / n;
+  const double n = static_cast<double>(effective) + 1;
+  const FlipRates rates{(static_cast<double>(seen.flips.only_first) * each + 0.5) / n,
+                        (static_cast<double>(seen.flips.only_second) * each + 0.5) / n};
   std::vector<std::string> parts;
-  const auto add = [&](double wanted, const std::string& what) {
-    parts.push_back(fmt::format("about {} more pairs to show it {}", FurtherWanted(wanted, have), what));
+  const auto add = [&](const Number& wanted, const std::string& what) {
+    if (wanted)
+      parts.push_back(fmt::format("about {} more pairs to show it {}", FurtherWanted(*wanted, have), what));
   };
-  if (const double room = rule.margin + d; room > 0.005) {
-    const double z = NormalQuantile(1 - rule.alpha) + NormalQuantile(kPower);
-    add(z * z * ((better + worse) / n - d * d) / (room * room), "not worse by " + Margin(rule));
+  const bool is_bet = rule.test == GateTest::kSavi, is_worse = rates.only_second > rates.only_first;
+  const Promise promise{rule.alpha, kPower};
+  add(is_bet ? PairsForSequentialNonInferiority(rates, rule.margin, promise).exact : PairsToShow(1, rule, rates),
+      "not worse by " + Margin(rule));
+  if (rule.test == GateTest::kNonInferiority) {
+    add(PairsToShow(-1, rule, rates), "worse by more than " + Margin(rule));
+  } else if (is_worse) {
+    add((is_bet ? PairsForFlipsBet(rates, promise) : PairsForMcNemar(rates, promise)).exact, "worse");
   }
-  const SampleSize size = PairsForMcNemar({better / n, worse / n}, {rule.alpha, kPower});
-  if (worse > better && size.exact) add(static_cast<double>(size.n), "worse");
   if (parts.empty()) return "";
   return "If the flips stay as seen: " + parts.front() + (parts.size() > 1 ? ", " + parts.back() : "") + ".";
 }
@@ -91,17 +105,9 @@ Estimate DifferenceOf(const GatePairs& pairs, double confidence) {
 /// Everything of an anytime-valid test but the looks before: both kinds of flips within their confidence sequences. One
 /// pair of each state: no design effect is known ahead, and what is bet must be.
 Estimate SequentialDifference(const GatePairs& pairs, double alpha) {
-  const PairedOutcomes& bet = pairs.one_each;
-  const double confidence = 1 - alpha / 2;  // two sequences share alpha
-  const auto sequence = [&](std::int64_t flips) { return ConfidenceSequence({flips, bet.pairs}, confidence); };
-  Estimate difference = DifferenceOf(pairs, 1 - alpha);
-  difference.n = bet.pairs;
-  difference.method = "two Beta-binomial confidence sequences";
-  const Estimate better = sequence(bet.flips.only_first), worse = sequence(bet.flips.only_second);
-  difference.interval = Undefined{"no pairs"};
-  if (better.value && worse.value)
-    difference.interval =
-        Interval{better.interval->low - worse.interval->high, better.interval->high - worse.interval->low};
+  Estimate difference = SequentialPairedDifference(pairs.one_each, 1 - alpha);
+  difference.value = DifferenceOf(pairs, 1 - alpha).value;  // of all pairs
+  if (!difference.value) difference.interval = Undefined{"no pairs"};
   return difference;
 }
 

@@ -39,7 +39,9 @@ HeadlineItem CandidateItem(const Candidate& candidate) {
   const ComparisonRow& all = candidate.comparison.all;
   std::string text = candidate.comparison.first;
   if (all.first.value && all.second.value && candidate.p_holm) {
-    const std::string n = all.is_paired ? Counted(all.shared, "pair") : Counted(all.first_episodes, "episode");
+    const std::string n = all.is_paired
+                              ? Counted(all.shared, "pair")
+                              : fmt::format("{} and {}", all.first_episodes, Counted(all.second_episodes, "episode"));
     text += fmt::format(": {} against {}, {} ({}, {})", Percent(*all.first.value), Percent(*all.second.value),
                         PointsWithInterval(all.difference), n, PValue(*candidate.p_holm));
   } else {
@@ -197,10 +199,10 @@ void AddMorePairs(const ReportData& report, std::vector<HeadlineItem>& items) {
   for (const TrustReport& trust : report.trust) AddTrustToDecide(trust, items);
   for (const Candidate& candidate : report.candidates) {
     const ComparisonRow& all = candidate.comparison.all;
-    if (IsDecided(candidate.p_holm) || !all.more) continue;
+    if (IsDecided(candidate.p_holm) || !candidate.more) continue;
     items.push_back({"",
                      fmt::format("About {} would decide on {}",
-                                 Counted(*all.more, all.is_paired ? "more pair" : "more episode per policy",
+                                 Counted(*candidate.more, all.is_paired ? "more pair" : "more episode per policy",
                                          all.is_paired ? "" : "more episodes per policy"),
                                  candidate.comparison.first),
                      "#rates"});

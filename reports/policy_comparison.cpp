@@ -8,8 +8,8 @@
 
 #include "core/error.h"
 #include "core/statistics/many_comparisons.h"
-#include "core/statistics/planning.h"
 #include "core/statistics/rate_difference.h"
+#include "core/statistics/special.h"
 #include "core/statistics/stratified.h"
 #include "core/statistics/two_by_two.h"
 #include "reports/comparison.h"
@@ -52,7 +52,7 @@ Estimate RateOfSide(const Side& side, double confidence) {
 }
 
 /// By initial state, so that repeats of one do not count as if they were new.
-Count EffectiveCountOf(const Side& side) {
+std::vector<Count> StatesOf(const Side& side) {
   std::map<std::string, Count> states;
   for (const auto& [where, judged] : side.counted) {
     Count& state = states[where.first];
@@ -61,7 +61,7 @@ Count EffectiveCountOf(const Side& side) {
   }
   std::vector<Count> clusters;
   for (const auto& [state, count] : states) clusters.push_back(count);
-  return EffectiveCount(clusters);
+  return clusters;
 }
 
 Side SharedPart(const Side& side, const Side& other) {
@@ -115,7 +115,19 @@ Defined<std::int64_t> MorePairs(const ComparisonRow& row, const Promise& promise
   return FurtherWanted(static_cast<double>(size.n), row.pairs);
 }
 
+/// Every stratum grows alike, so that the difference's variance falls as episodes are added.
+Defined<std::int64_t> MoreOfEachTask(const ComparisonRow& row, const Promise& promise) {
+  if (*row.difference.value == 0) return Undefined{"the two rates are equal"};
+  const double z = TwoSidedZ(1 - promise.alpha) + NormalQuantile(promise.power);
+  const double times = std::pow(z * *row.stratified_se / *row.difference.value, 2);
+  const auto further = [times](const Repeated& have) {
+    return FurtherWanted(times * static_cast<double>(have.effective), have);
+  };
+  return std::max(further(row.first_trials), further(row.second_trials));
+}
+
 Defined<std::int64_t> MoreEpisodes(const ComparisonRow& row, const Promise& promise) {
+  if (row.stratified_se) return MoreOfEachTask(row, promise);
   if (!row.first.value || !row.second.value) return Undefined{"one of the two has no episode that counts"};
   const SampleSize size = TrialsPerPolicy(*row.first.value, *row.second.value, promise);
   if (!size.exact) return Undefined{size.exact.reason()};
@@ -129,7 +141,7 @@ void Decide(const ComparisonOptions& options, std::size_t family, ComparisonRow&
   row.winner = WinnerOf(row, row.p_holm, options.alpha);
   if (row.winner != Winner::kNotDecided) return;
   const Promise promise{options.alpha / static_cast<double>(std::max<std::size_t>(1, family)), options.power};
-  row.more = row.is_paired ? MorePairs(row, promise) : MoreEpisodes(row, promise);
+  row.more = MoreToDecide(row, promise);
 }
 
 void ComparePaired(const Side& first, const Side& second, const ComparisonOptions& options, ComparisonRow& row) {
@@ -144,7 +156,7 @@ void ComparePaired(const Side& first, const Side& second, const ComparisonOption
 }
 
 void CompareUnpaired(const Side& first, const Side& second, const ComparisonOptions& options, ComparisonRow& row) {
-  const Count one = EffectiveCountOf(first), two = EffectiveCountOf(second);
+  const Count one = EffectiveCount(StatesOf(first)), two = EffectiveCount(StatesOf(second));
   row.first = RateOfSide(first, options.confidence());
   row.second = RateOfSide(second, options.confidence());
   row.first_trials = {row.first_episodes, one.trials};
@@ -188,31 +200,46 @@ void AdjustForTasks(const ComparisonOptions& options, std::vector<ComparisonRow>
 Side AllTasks(const std::map<std::string, Side>& sides) {
   Side all;
   for (const auto& [task, side] : sides) {
-    all.apart += side.apart;
     for (const auto& [where, judged] : side.counted) all.counted[{task + "\n" + where.first, where.second}] = judged;
   }
   return all;
 }
 
-/// A task is a stratum. The difference is that of the effective counts, as its interval is: one weighting makes both.
+/// A task is a stratum, of its effective trials: one weighting makes the difference and its interval.
 void Stratify(const std::map<std::string, Side>& first, const std::map<std::string, Side>& second,
               const ComparisonOptions& options, ComparisonRow& row) {
   std::vector<Stratum> strata;
-  row.first_trials.effective = row.second_trials.effective = 0;
+  double one = 0, two = 0;
   for (const auto& [task, side] : first) {
-    const Stratum& stratum = strata.emplace_back(Stratum{EffectiveCountOf(side), EffectiveCountOf(second.at(task))});
-    row.first_trials.effective += stratum.first.trials;
-    row.second_trials.effective += stratum.second.trials;
+    strata.push_back({EffectiveTrials(StatesOf(side)), EffectiveTrials(StatesOf(second.at(task)))});
+    one += strata.back().first.trials;
+    two += strata.back().second.trials;
   }
+  row.first_trials.effective = std::llround(one);
+  row.second_trials.effective = std::llround(two);
   const StratifiedTest test = MantelHaenszel(strata, options.confidence());
   row.difference = test.risk_difference;
   row.difference.method = OnEpisodes(row.difference.method, row.first_trials, row.second_trials);
   row.test = OnEpisodes("Cochran-Mantel-Haenszel", row.first_trials, row.second_trials);
+  row.stratified_se = test.difference_se;
   row.p = test.p;
 }
 
+/// Takes the tasks out in which one of the two has nothing that counts. Both maps have every task.
+std::vector<std::string> LeaveOut(std::map<std::string, Side>& first, std::map<std::string, Side>& second) {
+  std::vector<std::string> left_out;
+  for (const auto& [task, side] : first) {
+    if (side.counted.empty() || second.at(task).counted.empty()) left_out.push_back(task);
+  }
+  for (const std::string& task : left_out) {
+    first.erase(task);
+    second.erase(task);
+  }
+  return left_out;
+}
+
 /// Paired: each pair is a stratum of its own, so that the pooled flips are the stratified test already.
-/// @param first, second  each with a side for every task, empty where there is none.
+/// @param first, second  of the same tasks, each with episodes that count.
 ComparisonRow CompareAll(const std::map<std::string, Side>& first, const std::map<std::string, Side>& second,
                          const ComparisonOptions& options) {
   ComparisonRow row = CompareTask("", AllTasks(first), AllTasks(second), options);
@@ -223,6 +250,10 @@ ComparisonRow CompareAll(const std::map<std::string, Side>& first, const std::ma
 }
 
 }  // namespace
+
+Defined<std::int64_t> MoreToDecide(const ComparisonRow& row, const Promise& promise) {
+  return row.is_paired ? MorePairs(row, promise) : MoreEpisodes(row, promise);
+}
 
 PolicyComparison ComparePolicies(const ComparedPolicy& first, const ComparedPolicy& second,
                                  const ComparisonOptions& options) {
@@ -235,10 +266,15 @@ PolicyComparison ComparePolicies(const ComparedPolicy& first, const ComparedPoli
   for (const auto& [task, side] : one) tasks.insert(task);
   for (const auto& [task, side] : two) tasks.insert(task);
   if (tasks.empty()) throw InvalidInput("compare: neither {} nor {} has an episode here", first.name, second.name);
-  PolicyComparison comparison{first.name, second.name, options, {}, {}};
+  PolicyComparison comparison{first.name, second.name, options, {}, {}, {}};
   for (const std::string& task : tasks) comparison.tasks.push_back(CompareTask(task, one[task], two[task], options));
   AdjustForTasks(options, comparison.tasks);
+  comparison.left_out = LeaveOut(one, two);
   comparison.all = CompareAll(one, two, options);
+  for (const ComparisonRow& row : comparison.tasks) {
+    comparison.all.first_apart += row.first_apart;
+    comparison.all.second_apart += row.second_apart;
+  }
   return comparison;
 }
 

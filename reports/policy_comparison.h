@@ -7,6 +7,7 @@
 
 #include "core/statistics/estimate.h"
 #include "core/statistics/mcnemar.h"
+#include "core/statistics/planning.h"
 #include "core/statistics/rates.h"
 #include "reports/outcome.h"
 
@@ -40,6 +41,7 @@ struct ComparisonRow {
   bool is_paired = false;
   Flips flips;          ///< of the shared pairs
   Estimate difference;  ///< first - second
+  Number stratified_se = Undefined{"not stratified"};  ///< of the difference, where tasks are strata
   std::string test;     ///< "exact McNemar", "Boschloo on 4 and 6 effective episodes", "Cochran-Mantel-Haenszel"
   Number p = Undefined{"no episodes to compare"};
   Number p_holm = Undefined{"no episodes to compare"};  ///< over the tasks shown; of all tasks: p itself
@@ -49,11 +51,17 @@ struct ComparisonRow {
                                                       ///< several tasks at its share of alpha
 };
 
+/// How many further pairs, or episodes of each policy, would show the difference at two-sided `alpha` with this power, if
+/// the rates are those seen and further ones repeat states as these do. Of a stratified difference: each task's episodes
+/// grow alike. For whoever adjusts p over several comparisons: at its share of alpha.
+Defined<std::int64_t> MoreToDecide(const ComparisonRow& row, const Promise& promise);
+
 struct PolicyComparison {
   std::string first, second;
   ComparisonOptions options;
-  std::vector<ComparisonRow> tasks;  ///< in the order of their names
-  ComparisonRow all;                 ///< over all tasks; equal to the task where there is one
+  std::vector<ComparisonRow> tasks;   ///< in the order of their names
+  ComparisonRow all;                  ///< over the tasks with episodes of both; equal to the task where there is one
+  std::vector<std::string> left_out;  ///< tasks that are not in `all`: one of the two has no episode there that counts
 };
 
 /// @throws InvalidInput if alpha or power is not in (0, 1), or neither policy has an episode.

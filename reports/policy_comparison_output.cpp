@@ -65,6 +65,12 @@ std::string Apart(const PolicyComparison& comparison) {
                      comparison.first, all.second_apart, comparison.second);
 }
 
+std::string LeftOut(const PolicyComparison& comparison) {
+  if (comparison.left_out.empty()) return "";
+  return fmt::format("Not in all tasks, for want of episodes of both that count: {}.\n",
+                     fmt::join(comparison.left_out, ", "));
+}
+
 std::string AskAnother(const ComparedWorld& compared) {
   if (compared.other_judges.empty()) return "";
   return fmt::format("Judge {} told no outcome in {}; --judge {} did.\n", compared.judge, compared.world,
@@ -121,6 +127,9 @@ std::string BetsText(const ComparedWorld& compared) {
 
 std::string DecisionOf(const PolicyComparison& comparison) {
   const ComparisonRow& all = comparison.all;
+  if (all.first_episodes + all.second_episodes == 0)
+    return fmt::format("Nothing to compare {} and {} by: no task has episodes of both that count.", comparison.first,
+                       comparison.second);
   const auto rate = [](const Estimate& estimate) {
     return estimate.value ? Percent(*estimate.value) : "undefined: " + estimate.value.reason();
   };
@@ -151,8 +160,9 @@ std::string ComparisonText(const ComparedWorld& compared) {
       {"TASK", "N", comparison.first, comparison.second, "DIFFERENCE", "FLIPS", "TEST", "P", "HOLM", ""}};
   for (const ComparisonRow& row : comparison.tasks) rows.push_back(Cells(row, comparison));
   if (comparison.tasks.size() > 1) rows.push_back(Cells(comparison.all, comparison));
-  return fmt::format("World {}, judge {}. {}\n\n{}{}{}{}", compared.world, compared.judge, DecisionOf(comparison),
-                     TextTable(rows), Apart(comparison), AskAnother(compared), BetsText(compared));
+  return fmt::format("World {}, judge {}. {}\n\n{}{}{}{}{}", compared.world, compared.judge, DecisionOf(comparison),
+                     TextTable(rows), LeftOut(comparison), Apart(comparison), AskAnother(compared),
+                     BetsText(compared));
 }
 
 nlohmann::ordered_json ComparisonJson(const ComparedWorld& compared) {
@@ -169,6 +179,7 @@ nlohmann::ordered_json ComparisonJson(const ComparedWorld& compared) {
   json["tasks"] = Json::array();
   for (const ComparisonRow& row : comparison.tasks) json["tasks"].push_back(RowJson(row));
   json["all_tasks"] = RowJson(comparison.all);
+  json["all_tasks"]["left_out"] = comparison.left_out;
   json["sequential"] = Json::array();
   for (const BetState& bet : compared.bets) {
     json["sequential"].push_back({{"task", bet.task.empty() ? Json(nullptr) : Json(bet.task)},

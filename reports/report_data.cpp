@@ -6,6 +6,7 @@
 
 #include "core/error.h"
 #include "core/statistics/many_comparisons.h"
+#include "reports/findings.h"
 #include "reports/gate_data.h"
 
 namespace evac {
@@ -31,7 +32,8 @@ std::map<std::string, ComparedPolicy> EpisodesByPolicy(const RunSummary& summary
   return policies;
 }
 
-void AdjustForCandidates(std::vector<Candidate>& candidates) {
+/// Each is planned for the strictest of Holm's steps.
+void AdjustForCandidates(double alpha, std::vector<Candidate>& candidates) {
   std::vector<double> p_values;
   for (const Candidate& candidate : candidates) {
     if (candidate.comparison.all.p) p_values.push_back(*candidate.comparison.all.p);
@@ -39,7 +41,11 @@ void AdjustForCandidates(std::vector<Candidate>& candidates) {
   const std::vector<double> adjusted = HolmAdjusted(p_values);
   auto next = adjusted.begin();
   for (Candidate& candidate : candidates) {
-    if (candidate.comparison.all.p) candidate.p_holm = *next++;
+    const PolicyComparison& comparison = candidate.comparison;
+    if (!comparison.all.p) continue;
+    candidate.p_holm = *next++;
+    const Promise promise{alpha / static_cast<double>(p_values.size()), comparison.options.power};
+    candidate.more = MoreToDecide(comparison.all, promise);
   }
 }
 
@@ -52,7 +58,7 @@ std::vector<Candidate> CandidatesOf(const RunSummary& summary, const std::string
     candidates.push_back(
         {ComparePolicies(policies[policy], policies[baseline], {.alpha = 1 - summary.options.confidence})});
   }
-  AdjustForCandidates(candidates);
+  AdjustForCandidates(kAlpha, candidates);
   return candidates;
 }
 

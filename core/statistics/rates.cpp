@@ -191,11 +191,19 @@ Estimate ClusteredWilsonInterval(std::span<const Count> clusters, double confide
   return rate;
 }
 
-Count EffectiveCount(std::span<const Count> clusters) {
+Weighted EffectiveTrials(std::span<const Count> clusters) {
   const ClusterStatistics statistics = StatisticsOfClusters(clusters);
-  if (!statistics.effective_trials) return SumOf(clusters);
-  const double trials = std::max(1.0, std::floor(*statistics.effective_trials + kRounding));
-  return {std::llround(*statistics.rate * trials), static_cast<std::int64_t>(trials)};
+  const Count all = SumOf(clusters);
+  if (!statistics.effective_trials) return {static_cast<double>(all.successes), static_cast<double>(all.trials)};
+  const double trials = std::max(1.0, *statistics.effective_trials);
+  return {*statistics.rate * trials, trials};
+}
+
+Count EffectiveCount(std::span<const Count> clusters) {
+  if (!StatisticsOfClusters(clusters).effective_trials) return SumOf(clusters);
+  const auto [successes, trials] = EffectiveTrials(clusters);
+  const double whole = std::floor(trials + kRounding);
+  return {std::llround(successes / trials * whole), static_cast<std::int64_t>(whole)};
 }
 
 }  // namespace evac

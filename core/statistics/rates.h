@@ -49,6 +49,13 @@ ClusterStatistics StatisticsOfClusters(std::span<const Count> clusters);
 /// Wilson on the effective number of trials; plain Wilson where that is undefined (one trial per cluster).
 Estimate ClusteredWilsonInterval(std::span<const Count> clusters, double confidence = 0.95);
 
+/// Successes and trials that need not be whole numbers.
+struct Weighted {
+  double successes = 0, trials = 0;
+};
+/// The effective trials, at least 1, with the clusters' rate. As they are where no cluster has more than one trial.
+Weighted EffectiveTrials(std::span<const Count> clusters);
+
 /// The effective trials as a count, for tests of whole numbers: rounded down, at least 1, with the clusters' rate. As
 /// they are where no cluster has more than one trial.
 Count EffectiveCount(std::span<const Count> clusters);

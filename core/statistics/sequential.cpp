@@ -107,4 +107,21 @@ Estimate ConfidenceSequence(const Count& count, double confidence, const Mixture
   return rate;
 }
 
+Estimate SequentialPairedDifference(const PairedOutcomes& outcomes, double confidence) {
+  const auto sequence = [&](std::int64_t flips) {
+    return ConfidenceSequence({flips, outcomes.pairs}, 1 - (1 - confidence) / 2);
+  };
+  const Estimate first = sequence(outcomes.flips.only_first), second = sequence(outcomes.flips.only_second);
+  Estimate difference;
+  difference.method = "two Beta-binomial confidence sequences";
+  difference.confidence = confidence;
+  difference.n = outcomes.pairs;
+  difference.value = Undefined{"no pairs"};
+  difference.interval = Interval{-1, 1};
+  if (!first.value || !second.value) return difference;
+  difference.value = *first.value - *second.value;
+  difference.interval = Interval{first.interval->low - second.interval->high, first.interval->high - second.interval->low};
+  return difference;
+}
+
 }  // namespace evac

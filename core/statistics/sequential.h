@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "core/statistics/estimate.h"
+#include "core/statistics/rate_difference.h"
 #include "core/statistics/rates.h"
 
 /// Tests and intervals that stay valid however often one looks (statistics.md 3.8). An e-value is the money of a bet
@@ -66,5 +67,9 @@ struct MixturePrior {
 };
 /// @throws InvalidInput for impossible counts, a prior not above 0, or unless 0 < confidence < 1.
 Estimate ConfidenceSequence(const Count& count, double confidence = 0.95, const MixturePrior& prior = {});
+
+/// first - second on the same initial states, one pair of each: both kinds of flips within sequences that share what
+/// `confidence` leaves. Covers at every n at once.
+Estimate SequentialPairedDifference(const PairedOutcomes& outcomes, double confidence = 0.95);
 
 }  // namespace evac

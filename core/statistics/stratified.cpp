@@ -9,55 +9,63 @@
 namespace evac {
 namespace {
 
+void Check(const Weighted& side) {
+  if (side.successes >= 0 && side.successes <= side.trials && std::isfinite(side.trials)) return;
+  throw InvalidInput("statistics: {:g} successes of {:g} trials, wanted 0 <= successes <= trials", side.successes,
+                     side.trials);
+}
+
 /// The sums over strata that all Mantel-Haenszel statistics are made of.
 struct Sums {
   double excess = 0, variance = 0;        ///< of the first group's successes over their expectation
   double concordant = 0, discordant = 0;  ///< sum x1 (n2 - x2) / N, sum x2 (n1 - x1) / N
   double difference = 0, weight = 0;      ///< sum (x1 n2 - x2 n1) / N, sum n1 n2 / N
   double sato_p = 0, sato_q = 0;          ///< of Sato's variance
-  std::int64_t trials = 0;
+  double trials = 0;
 };
 
 Sums SumsOf(std::span<const Stratum> strata) {
   Sums sums;
   for (const Stratum& stratum : strata) {
-    CheckCount(stratum.first);
-    CheckCount(stratum.second);
-    const double n1 = static_cast<double>(stratum.first.trials), n2 = static_cast<double>(stratum.second.trials);
+    Check(stratum.first);
+    Check(stratum.second);
+    const auto [x1, n1] = stratum.first;
+    const auto [x2, n2] = stratum.second;
     if (n1 == 0 || n2 == 0) continue;
-    const double x1 = static_cast<double>(stratum.first.successes), x2 = static_cast<double>(stratum.second.successes);
     const double n = n1 + n2, s = x1 + x2;
     sums.excess += x1 - n1 * s / n;
-    sums.variance += n1 * n2 * s * (n - s) / (n * n * (n - 1));
+    if (n > 1) sums.variance += n1 * n2 * s * (n - s) / (n * n * (n - 1));
     sums.concordant += x1 * (n2 - x2) / n;
     sums.discordant += x2 * (n1 - x1) / n;
     sums.difference += (x1 * n2 - x2 * n1) / n;
     sums.weight += n1 * n2 / n;
     sums.sato_p += (n1 * n1 * x2 - n2 * n2 * x1 + n1 * n2 * (n2 - n1) / 2) / (n * n);
     sums.sato_q += (x1 * (n2 - x2) + x2 * (n1 - x1)) / (2 * n);
-    sums.trials += stratum.first.trials + stratum.second.trials;
+    sums.trials += n;
   }
   return sums;
 }
 
-Estimate RiskDifference(const Sums& sums, double confidence) {
+/// Mantel-Haenszel's difference and its standard error.
+void AddDifference(const Sums& sums, double confidence, StratifiedTest& test) {
   const double z = TwoSidedZ(confidence);
-  Estimate difference;
+  Estimate& difference = test.risk_difference;
   difference.method = "Mantel-Haenszel, Sato";
   difference.confidence = confidence;
-  difference.n = sums.trials;
+  difference.n = std::llround(sums.trials);
   difference.value = Undefined{"no trials"};
   difference.interval = Interval{-1, 1};
-  if (sums.weight == 0) return difference;
+  if (sums.weight == 0) return;
   const double value = sums.difference / sums.weight;
   const double variance = (value * sums.sato_p + sums.sato_q) / (sums.weight * sums.weight);
   difference.value = value;
-  difference.interval = Undefined{"no outcome varies within a stratum"};
-  if (variance > 0) {
-    const double half_width = z * std::sqrt(variance);
-    difference.interval = Interval{std::max(-1.0, value - half_width), std::min(1.0, value + half_width)};
-  }
-  return difference;
+  const Undefined none{"no outcome varies within a stratum"};
+  difference.interval = none;
+  test.difference_se = none;
+  if (variance <= 0) return;
+  const double se = std::sqrt(variance);
+  difference.interval = Interval{std::max(-1.0, value - z * se), std::min(1.0, value + z * se)};
+  test.difference_se = se;
 }
 
 }  // namespace
@@ -65,7 +73,7 @@ Estimate RiskDifference(const Sums& sums, double confidence) {
 StratifiedTest MantelHaenszel(std::span<const Stratum> strata, double confidence) {
   const Sums sums = SumsOf(strata);
   StratifiedTest test;
-  test.risk_difference = RiskDifference(sums, confidence);
+  AddDifference(sums, confidence, test);
   if (sums.variance > 0) {
     const double chi2 = sums.excess * sums.excess / sums.variance;
     test.chi2 = chi2;

@@ -12,7 +12,7 @@ namespace evac {
 
 /// One task: the two rates compared in it.
 struct Stratum {
-  Count first, second;
+  Weighted first, second;
 };
 
 /// Cochran-Mantel-Haenszel without continuity correction: are the two rates equal within every stratum? Different
@@ -22,8 +22,9 @@ struct StratifiedTest {
   Number p = Undefined{"no stratum can tell"};
   Number odds_ratio = Undefined{"no stratum can tell"};  ///< Mantel-Haenszel
   Estimate risk_difference;  ///< Mantel-Haenszel's mean of first - second; interval with Sato's variance (1989)
+  Number difference_se = Undefined{"no trials"};  ///< the root of that variance; undefined with the interval
 };
-/// @throws InvalidInput for impossible counts and unless 0 < confidence < 1.
+/// @throws InvalidInput for impossible numbers and unless 0 < confidence < 1.
 StratifiedTest MantelHaenszel(std::span<const Stratum> strata, double confidence = 0.95);
 
 /// Cochran's Q: do k policies succeed equally often on the same initial states? k = 2 is McNemar's chi-square.

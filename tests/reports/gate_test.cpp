@@ -7,6 +7,7 @@
 #include "core/error.h"
 #include "core/statistics/planning.h"
 #include "core/statistics/sequential.h"
+#include "core/statistics/sequential_planning.h"
 #include "reports/gate_evidence.h"
 #include "reports/gate_output.h"
 #include "tests/reports/repeated_run.h"
@@ -17,6 +18,7 @@ namespace {
 
 using testing::AllOf;
 using testing::HasSubstr;
+using testing::Not;
 
 GateRules Rules(const std::string& gates, const std::string& top = "") {
   return ReadGateRules(Config::FromText(top + "gates:\n" + gates, "gate.yaml"));
@@ -356,6 +358,28 @@ TEST(Gate, SizesAreKnownBeforeTheRun) {
   ASSERT_EQ(sizes.size(), 1u);
   EXPECT_THAT(sizes[0], AllOf(HasSubstr("124 pairs if 20 % of the states flip"), HasSubstr("260 episodes of each")))
       << sizes[0];
+}
+
+TEST(Gate, ASequentialRuleTakesMoreThanOneThatLooksOnceAndSaysSo) {
+  const std::vector<std::string> sizes = SizesOf(Rules("  - {name: r, test: savi, world: sim}\n"), nullptr);
+  const SampleSize size = PairsForSequentialNonInferiority({0.1, 0.1}, 0.1);
+  EXPECT_THAT(sizes.at(0), HasSubstr(fmt::format("takes {} pairs if 20 % of the states flip", size.n)));
+  EXPECT_GT(size.n, 300);
+  const RuleDecision rule = DecidedOnRepeats("test: savi", {"sssf", "sffs"}, {"ssss", "ssss"}).decision.rules.at(0);
+  EXPECT_THAT(rule.more, HasSubstr(fmt::format("about {} more pairs to show it worse",
+                                               PairsForFlipsBet({0.5 / 5, 1.5 / 5}).n - rule.states)))
+      << rule.more;
+}
+
+TEST(Gate, ARuleAgainstAMarginIsPlannedAgainstIt) {
+  const auto more = [](const std::string& now) {
+    return DecidedOnRepeats("test: noninferiority, margin: 0.1", {now}, {Repeat(static_cast<int>(now.size()), 's')})
+        .decision.rules.at(0)
+        .more;
+  };
+  EXPECT_THAT(more(Repeat(16, 's') + Repeat(4, 'f')), HasSubstr("more pairs to show it worse by more than 10 points"));
+  EXPECT_THAT(more(Repeat(20, 's')), HasSubstr("more pairs to show it not worse by 10 points"));
+  EXPECT_THAT(more(Repeat(20, 's')), Not(HasSubstr("to show it worse")));
 }
 
 TEST(Gate, ASizeThatNobodyCanCountIsNotZero) {

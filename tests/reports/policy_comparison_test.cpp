@@ -152,6 +152,67 @@ TEST(ComparePolicies, RepeatsOfOneStateDoNotFillStrata) {
   EXPECT_EQ(row.first.n, 60);
 }
 
+TEST(ComparePolicies, TheDifferenceOfAllTasksIsOfAllTrialsAlsoWhereFewOfThemTell) {
+  // Three repeats of one state a task, all alike but for one: one effective trial each, which is not 2 of 3 rounded.
+  ComparedPolicy one{"a", {}}, two{"b", {}};
+  const auto add = [](const std::string& task, const std::string& outcomes, bool other, ComparedPolicy& policy) {
+    for (std::size_t seed = 0; seed < outcomes.size(); ++seed)
+      Add(task, (other ? "-" : "") + outcomes.substr(seed, 1), policy, seed);
+  };
+  const std::vector<std::pair<std::string, std::string>> outcomes = {
+      {"sss", "sss"}, {"sss", "sss"}, {"ssf", "sff"}, {"fff", "fff"}, {"fff", "fff"}};
+  for (std::size_t task = 0; task < outcomes.size(); ++task) {
+    add("t" + std::to_string(task), outcomes[task].first, false, one);
+    add("t" + std::to_string(task), outcomes[task].second, true, two);
+  }
+  const ComparisonRow row = ComparePolicies(one, two).all;
+  EXPECT_FALSE(row.is_paired);
+  EXPECT_NEAR(*row.difference.value, 1.0 / 15, 1e-12);
+}
+
+TEST(ComparePolicies, ATaskThatOneOfThemNeverTriedIsInNoNumberOfAllTasks) {
+  ComparedPolicy one = Policy("a", "ssssffff", "t"), two = Policy("b", "--------sfffffff", "t");
+  Add("u", "ssffffff", one);
+  Add("u", "--------ssssffff", two);
+  Add("v", Times(20, "s") + "e", one);
+  const PolicyComparison comparison = ComparePolicies(one, two);
+  const ComparisonRow& all = comparison.all;
+  EXPECT_EQ(comparison.left_out, std::vector<std::string>{"v"});
+  EXPECT_EQ(all.first_episodes, 16);
+  EXPECT_EQ(*all.first.value, 6.0 / 16);
+  EXPECT_EQ(*all.second.value, 5.0 / 16);
+  EXPECT_NEAR(*all.difference.value, 1.0 / 16, 1e-12);
+  EXPECT_EQ(all.first_apart, 1) << "what went wrong is told of every task";
+  const ComparedWorld compared{"sim", "oracle", comparison, {}, {}};
+  EXPECT_THAT(ComparisonText(compared), HasSubstr("Not in all tasks, for want of episodes of both that count: v."));
+  EXPECT_EQ(ComparisonJson(compared).at("all_tasks").at("left_out").at(0), "v");
+}
+
+TEST(ComparePolicies, WhereNoTaskIsOfBothNothingIsCompared) {
+  const PolicyComparison comparison = ComparePolicies(Policy("a", "ssss", "t"), Policy("b", "ffff", "u"));
+  EXPECT_FALSE(comparison.all.p) << "a rate of one task is not held against one of another";
+  EXPECT_FALSE(comparison.all.difference.value);
+  EXPECT_EQ(comparison.left_out.size(), 2u);
+  EXPECT_THAT(DecisionOf(comparison), HasSubstr("Nothing to compare a and b by"));
+}
+
+TEST(ComparePolicies, WhatIsNamedDecidesOverTasksToo) {
+  const std::string better = Times(6, "s") + Times(4, "f"), worse = Times(5, "s") + Times(5, "f");
+  const auto compare = [&](int times) {
+    ComparedPolicy one{"a", {}}, two{"b", {}};
+    for (const char* task : {"t", "u"}) {
+      Add(task, Times(times, better), one);
+      Add(task, std::string(static_cast<std::size_t>(10 * times), '-') + Times(times, worse), two);
+    }
+    return ComparePolicies(one, two).all;
+  };
+  const ComparisonRow row = compare(1);
+  ASSERT_TRUE(row.more);
+  const int times = static_cast<int>((20 + *row.more) / 20);
+  EXPECT_GT(*compare(times / 3).p, 0.05);
+  EXPECT_LT(*compare(times + 1).p, 0.05 / 2) << "as many have power to spare where the difference is as planned";
+}
+
 TEST(ComparePolicies, HowManyMoreIsPlannedFromWhatRepeatsTell) {
   const ComparisonRow once = ComparePolicies(Policy("a", "sssssfff"), Policy("b", "sssfffff")).all;
   const ComparisonRow row =

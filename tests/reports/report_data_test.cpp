@@ -1,9 +1,11 @@
 #include "reports/report_data.h"
 
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include "core/error.h"
+#include "core/statistics/planning.h"
 #include "reports/headlines.h"
 #include "reports/methods.h"
 #include "tests/reports/sample_run.h"
@@ -128,6 +130,21 @@ TEST(Headlines, AClearLossIsWorseWithItsNumbersAndASmallOneIsNotDecided) {
   EXPECT_THAT(small_text, HasSubstr("Is pick@new worse than pick@good?"));
   EXPECT_THAT(small_text, HasSubstr("[not decided] pick@new: 50 % against 75 %"));
   EXPECT_THAT(small_text, Not(HasSubstr("[worse]")));
+}
+
+TEST(Headlines, HowManyMoreIsPlannedAtACandidatesShareOfAlpha) {
+  const std::string good = "ssssffffss", less = "sfsfffffss";
+  const SampleRun run({{"a", "pick", "good", good, good}, {"a", "pick", "x", less, less}, {"a", "pick", "y", less, less}});
+  const ReportData report = ReportDataOf(run.Summary());
+  ASSERT_EQ(report.candidates.size(), 2u);
+  const FlipRates rates{0.5 / 11, 2.5 / 11};
+  for (const Candidate& candidate : report.candidates) {
+    ASSERT_TRUE(candidate.more);
+    EXPECT_GE(McNemarPower(10 + *candidate.more, rates, 0.025), 0.8);
+    EXPECT_LT(McNemarPower(10 + *candidate.more - 1, rates, 0.025), 0.8);
+  }
+  EXPECT_THAT(AllText(HeadlinesOf(report)),
+              HasSubstr(fmt::format("About {} more pairs would decide on pick@x", *report.candidates[0].more)));
 }
 
 TEST(Headlines, TheBaselineCanBeNamedAndMustBeAPolicyOfTheRun) {

@@ -151,6 +151,14 @@ TEST(Stratified, OneStratumIsTheTwoRates) {
   EXPECT_TRUE(test.risk_difference.interval);
 }
 
+TEST(Stratified, TrialsNeedNotBeWhole) {
+  const std::vector<Stratum> whole{{{4, 8}, {2, 8}}, {{6, 8}, {5, 8}}}, part{{{2, 4}, {1, 4}}, {{3, 4}, {2.5, 4}}};
+  const StratifiedTest all = MantelHaenszel(whole), half = MantelHaenszel(part);
+  EXPECT_NEAR(*half.risk_difference.value, *all.risk_difference.value, 1e-12);
+  EXPECT_NEAR(*half.difference_se, *all.difference_se * std::sqrt(2), 1e-12) << "half of the trials tell half as much";
+  EXPECT_THROW(MantelHaenszel(std::vector<Stratum>{{{2.5, 2}, {1, 4}}}), Error);
+}
+
 TEST(Stratified, WhatCannotTellIsUndefined) {
   EXPECT_FALSE(MantelHaenszel({}).chi2);
   EXPECT_FALSE(MantelHaenszel(std::vector<Stratum>{{{3, 3}, {4, 4}}}).p);

@@ -2,9 +2,12 @@
 #include <gtest/gtest.h>
 
 #include "core/error.h"
+#include "core/seed.h"
 #include "core/statistics/betting.h"
 #include "core/statistics/planning.h"
 #include "core/statistics/ppi.h"
+#include "core/statistics/sequential.h"
+#include "core/statistics/sequential_planning.h"
 
 namespace evac {
 namespace {
@@ -185,6 +188,58 @@ TEST(Planning, WhatNoSizeCanShowIsUndefinedAndNonsenseIsRefused) {
 TEST(Planning, NonInferiorityNeedsTheSizesOfTheDesign) {
   EXPECT_NEAR(static_cast<double>(TrialsForNonInferiority(0.7, 0.1).n), 260, 3);
   EXPECT_NEAR(static_cast<double>(PairsForNonInferiority(0.2, 0.1).n), 124, 1);
+}
+
+/// How often the look at `n` pairs decides, of many such runs.
+template <typename Decides>
+double ShareThatDecides(std::int64_t n, const FlipRates& rates, Decides decides) {
+  constexpr int kRuns = 2000;
+  SplitMix64 random(5);
+  int decided = 0;
+  for (int run = 0; run < kRuns; ++run) {
+    PairedOutcomes seen{{}, n};
+    for (std::int64_t pair = 0; pair < n; ++pair) {
+      const double u = random.Uniform();
+      seen.flips.only_first += u < rates.only_first;
+      seen.flips.only_second += u >= rates.only_first && u < rates.only_first + rates.only_second;
+    }
+    decided += decides(seen);
+  }
+  return static_cast<double>(decided) / kRuns;
+}
+
+TEST(SequentialPlanning, ThePlannedPairsHaveThePowerThatIsPromised) {
+  for (const FlipRates& rates : {FlipRates{0.1, 0.1}, FlipRates{0.05, 0.02}, FlipRates{0.1, 0.15}}) {
+    const SampleSize size = PairsForSequentialNonInferiority(rates, 0.1);
+    ASSERT_TRUE(size.exact);
+    const double power = ShareThatDecides(size.n, rates, [](const PairedOutcomes& seen) {
+      return SequentialPairedDifference(seen).interval->low > -0.1;
+    });
+    EXPECT_NEAR(power, 0.8, 0.04) << rates.only_first << " " << rates.only_second << ", " << size.n << " pairs";
+  }
+  for (const FlipRates& rates : {FlipRates{0.05, 0.2}, FlipRates{0.3, 0.1}}) {
+    const SampleSize size = PairsForFlipsBet(rates);
+    ASSERT_TRUE(size.exact);
+    const double power = ShareThatDecides(size.n, rates, [](const PairedOutcomes& seen) {
+      return FlipsEValue(seen.flips.only_first, seen.flips.only_second) >= 20;
+    });
+    EXPECT_NEAR(power, 0.8, 0.04) << rates.only_first << " " << rates.only_second << ", " << size.n << " pairs";
+  }
+}
+
+TEST(SequentialPlanning, TakesMoreThanATestThatLooksOnce) {
+  EXPECT_GT(PairsForSequentialNonInferiority({0.1, 0.1}, 0.1).n, 2 * PairsForNonInferiority(0.2, 0.1).n);
+  EXPECT_GT(PairsForFlipsBet({0.05, 0.2}).n, PairsForMcNemar({0.05, 0.2}).n);
+}
+
+TEST(SequentialPlanning, WhatCannotBeShownIsUndefined) {
+  EXPECT_FALSE(PairsForFlipsBet({0.1, 0.1}).exact);
+  EXPECT_FALSE(PairsForFlipsBet({0.1, 0.101}, {}, 1000).exact) << "more than 1000";
+  EXPECT_FALSE(PairsForSequentialNonInferiority({0, 0.1}, 0.1).exact);
+  EXPECT_THROW(PairsForFlipsBet({0.7, 0.7}), Error);
+  EXPECT_THROW(PairsForFlipsBet({0.1, 0.2}, {.alpha = 0}), Error);
+  EXPECT_THROW(PairsForSequentialNonInferiority({0.1, 0.1}, 0), Error);
+  EXPECT_EQ(SequentialPairedDifference({{0, 0}, 0}).interval->low, -1);
 }
 
 TEST(FurtherWanted, CountsRepeatsByWhatTheyTell) {
