@@ -10,6 +10,7 @@
 #include "apps/evaluate.h"
 #include "apps/factory.h"
 #include "apps/network_parts.h"
+#include "apps/recorded_suite.h"
 #include "core/version.h"
 
 namespace evac {

@@ -7,6 +7,7 @@
 #include "apps/commands.h"
 #include "apps/factory.h"
 #include "apps/network_parts.h"
+#include "apps/recorded_suite.h"
 #include "core/error.h"
 #include "harness/scheduler.h"
 #include "harness/suite_hash.h"

@@ -9,6 +9,7 @@
 #include <thread>
 
 #include "apps/network_parts.h"
+#include "apps/recorded_suite.h"
 #include "core/config.h"
 #include "core/file.h"
 #include "judges/oracle_judge.h"
@@ -42,7 +43,11 @@ std::string Filled(std::string word, const Suite& suite) {
   const std::size_t at = word.find(variable);
   if (at == std::string::npos) return word;
   if (!suite.recording) throw InvalidInput("{}: a policy's command names ${{recording}}, but the suite has no field recording", suite.path.string());
-  return word.replace(at, variable.size(), fs::absolute(*suite.recording).lexically_normal().string());
+  if (suite.recordings.size() > 1)
+    throw InvalidInput("{}: a policy's command names ${{recording}}, but {} holds {}: name one as `recording`, or replay all with "
+                       "`evac fidelity`", suite.path.string(), suite.recording->string(), suite.recordings.size());
+  const fs::path one = suite.recordings.empty() ? *suite.recording : suite.recordings.begin()->second;
+  return word.replace(at, variable.size(), fs::absolute(one).lexically_normal().string());
 }
 
 /// EVAC_PERIOD_S is said where there is one task, a recording's: whoever replays it takes the same steps of it as the
@@ -59,8 +64,11 @@ PolicyProcessOptions ProcessOptions(const SuitePolicy& policy, const Suite& suit
   return options;
 }
 
-bool HasNetwork(const Suite& suite) {
-  return std::ranges::any_of(suite.worlds, [](const SuiteWorld& world) { return world.evac.has_value(); });
+/// What an episode begins from, and goes on as; one alone is read once.
+RecordedStart RecordingsOf(const Suite& suite) {
+  if (suite.initial_states.size() > 1)
+    return [suite](const Task&, const InitialState& initial) { return RecordingOf(suite, initial); };
+  return [only = RecordingOf(suite, suite.initial_states.front())](const Task&, const InitialState&) { return only; };
 }
 
 /// One that nobody has ever used, so that no policy left over from yesterday listens there: in a container even process
@@ -81,18 +89,6 @@ void CheckAllTasks(const Suite& suite, const PolicySpec& declared) {
 }
 
 }  // namespace
-
-Recording RecordingOf(const Suite& suite) {
-  return HasNetwork(suite) ? ReadAsTrained(suite) : ReadRecording(*suite.recording);
-}
-
-void FillInRecordedTask(Suite& suite) {
-  if (!suite.recording || !suite.tasks.empty()) return;
-  Task task = TaskFromRecording(RecordingOf(suite));
-  task.max_chunks = (task.max_chunks + suite.chunk_size - 1) / suite.chunk_size;  // it counts steps there
-  if (suite.recorded_still) task.still = *suite.recorded_still;
-  suite.tasks = {std::move(task)};
-}
 
 void CheckRubrics(const Suite& suite) {
   for (const Task& task : suite.tasks) {
@@ -130,7 +126,7 @@ void NeedNetworksFor(const Suite& suite) {
 
 std::unique_ptr<World> MakeWorld(const SuiteWorld& world, const Suite& suite, const Store* store) {
   if (world.type == "evac") return MakeEvacWorld(world, suite, store);
-  if (world.type == "echo") return std::make_unique<EchoWorld>(RecordingOf(suite));
+  if (world.type == "echo") return std::make_unique<EchoWorld>(RecordingsOf(suite), world.name);
   return std::make_unique<sim::MujocoWorld>(
       sim::MujocoWorldOptions{.name = world.name, .profile = world.profile, .threads = Threads(suite), .film = world.film});
 }

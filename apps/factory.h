@@ -7,7 +7,6 @@
 #include <string>
 #include <vector>
 
-#include "core/recording.h"
 #include "core/store.h"
 #include "core/world.h"
 #include "harness/policy_process.h"
@@ -17,14 +16,6 @@
 namespace evac {
 
 /// Suite entries become things: this is where modules meet.
-
-/// The recording that a suite is about, as all its worlds take it: as their networks were trained to see it (one in so
-/// many steps, some of its cameras), and whole where no world is a network.
-/// @throws InvalidInput as ReadRecording and ReadAsTrained
-Recording RecordingOf(const Suite& suite);
-
-/// The task of a suite that replays a recording is made from it; other suites are left as they are.
-void FillInRecordedTask(Suite& suite);
 
 /// @throws InvalidInput naming task, stage and condition if the oracle could not judge by a rubric.
 void CheckRubrics(const Suite& suite);
@@ -43,7 +34,7 @@ int Threads(const Suite& suite);
 std::unique_ptr<World> MakeWorld(const SuiteWorld& world, const Suite& suite, const Store* store);
 
 /// The command line of a policy with its program found and `${recording}` filled in.
-/// @throws InvalidInput if the program is not there.
+/// @throws InvalidInput if the program is not there; for `${recording}` where there are several.
 std::vector<std::string> CommandLine(const SuitePolicy& policy, const Suite& suite);
 
 /// A policy's process, if it is ours to start, and the link to it; both gone with this.

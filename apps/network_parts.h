@@ -34,11 +34,11 @@ std::unique_ptr<World> MakeEvacWorld(const SuiteWorld& world, const Suite& suite
 /// period, other cameras or arms than `tasks` have, other statistics, other pose maps.
 void CheckNetwork(const SuiteWorld& world, const std::vector<Task>& tasks);
 
-/// The recording of a suite with a world of type `evac`, as its network was trained to see one: in steps of the world's
+/// A recording of a suite with a world of type `evac`, as its network was trained to see one: in steps of the world's
 /// period, by the cameras that the weights say, or by as many as the network has views, the head first.
 /// @throws InvalidInput if its steps are no whole part of that period; if a camera is missing; if two of the suite's
 ///   networks want it otherwise: what each wants.
-Recording ReadAsTrained(const Suite& suite);
+Recording ReadAsTrained(const Suite& suite, const std::filesystem::path& folder);
 
 /// The classifier judge of a run. @throws InvalidInput if the weights are none of its, or do not know the run's tasks.
 std::unique_ptr<Judge> MakeClassifier(const std::filesystem::path& weights, const Store& store);

@@ -35,7 +35,7 @@ void NeedNetworks() { BecomeNetworks(); }
 
 std::unique_ptr<World> MakeEvacWorld(const SuiteWorld&, const Suite&, const Store*) { BecomeNetworks(); }
 void CheckNetwork(const SuiteWorld&, const std::vector<Task>&) { BecomeNetworks(); }
-Recording ReadAsTrained(const Suite&) { BecomeNetworks(); }
+Recording ReadAsTrained(const Suite&, const std::filesystem::path&) { BecomeNetworks(); }
 ClipRoundTrip CodecRoundTrip(const std::filesystem::path&, const std::filesystem::path&) { BecomeNetworks(); }
 std::unique_ptr<Policy> MakeLearnedPolicy(const std::filesystem::path&, int) { BecomeNetworks(); }
 std::unique_ptr<Judge> MakeClassifier(const std::filesystem::path&, const Store&) { BecomeNetworks(); }

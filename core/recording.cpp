@@ -1,11 +1,11 @@
 #include "core/recording.h"
 
 #include <algorithm>
-#include <cctype>
 #include <cmath>
 #include <utility>
 
 #include "core/error.h"
+#include "core/recording_folders.h"
 #include "core/recording_parts.h"
 
 namespace evac {
@@ -14,15 +14,6 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr double kRateTolerance = 0.02;  // periods are typed with few digits, time stamps rounded
-
-/// Safe in a path and in a URL.
-std::string SafeName(std::string name) {
-  for (char& letter : name) {
-    if (!std::isalnum(static_cast<unsigned char>(letter)) && letter != '-' && letter != '_' && letter != '.')
-      letter = '_';
-  }
-  return name.empty() || name.front() == '.' ? "recording" + name : name;
-}
 
 /// ROOT/observations/<task>/<episode> (or its videos folder) → the places of its parts.
 ClipFolders TreeFolders(const fs::path& episode) {

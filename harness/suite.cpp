@@ -97,6 +97,15 @@ std::vector<InitialState> ReadInitialStates(const Config& suite) {
   return states;
 }
 
+int ReadRecordedStates(const Config& suite) {
+  if (!suite.Has("initial_states")) return 0;
+  const Config page = suite.Section("initial_states");
+  page.AllowOnly({"count"});
+  const int count = page.Get<int>("count");
+  page.Require(count >= 1, "count", "at least 1: so many of the recordings");
+  return count;
+}
+
 std::vector<Task> ReadTasks(const Config& suite) {
   std::vector<Task> tasks;
   for (const Config& item : suite.List("tasks")) {
@@ -183,6 +192,7 @@ void RequireDistinct(const std::vector<Item>& items, const Config& suite, const 
 
 /// A world may try fewer initial states than the suite has; the real one no fewer than what starts from its frames.
 void CheckStates(const Suite& suite, const Config& page) {
+  if (suite.recording) return;  // how many there are is not known yet
   const auto tried = [&](const SuiteWorld& world) { return std::ssize(StatesOf(suite, world)); };
   const std::vector<Config> fields = page.List("worlds");
   for (std::size_t i = 0; i < fields.size(); ++i) {
@@ -245,8 +255,8 @@ void CheckWhole(const Suite& suite, const Config& page) {
 
 Suite Build(const Config& page) {
   page.AllowOnly({"suite", "description", "recording", "worlds", "tasks", "policies", "seeds", "initial_states",
-                  "chunk_size", "lanes", "threads", "error_budget", "image", "still", "judges", "video", "transport",
-                  "policy"});
+                  "chunk_size", "lanes", "threads", "error_budget", "image", "still", "max_chunks", "judges", "video",
+                  "transport", "policy"});
   Suite suite;
   suite.name = NameField(page, "suite");
   suite.path = page.file();
@@ -257,10 +267,14 @@ Suite Build(const Config& page) {
   if (suite.recording) {
     page.Require(!page.Has("image"), "image", "none beside a `recording`: its pictures are of its videos' size");
     if (page.Has("still")) suite.recorded_still = ReadStillRule(page.Section("still"), StillRule{});
+    suite.recorded_chunks = page.Get<int>("max_chunks", 0);
   }
+  page.Require(!page.Has("max_chunks") || (suite.recording && suite.recorded_chunks >= 1), "max_chunks",
+               "at least 1, beside a `recording`; a task page says its own");
   suite.tasks = ReadTasks(page);
   suite.seeds = page.Get<std::vector<std::uint64_t>>("seeds", {1});
   if (suite.recording) {
+    suite.recorded_states = ReadRecordedStates(page);
     suite.initial_states = {{"recording", 0}};
   } else {
     suite.initial_states = ReadInitialStates(page);
@@ -300,6 +314,10 @@ std::string WithPathsFromHere(const std::string& assignment) {
 }
 
 }  // namespace
+
+bool HasNetwork(const Suite& suite) {
+  return std::ranges::any_of(suite.worlds, [](const SuiteWorld& world) { return world.evac.has_value(); });
+}
 
 std::span<const InitialState> StatesOf(const Suite& suite, const SuiteWorld& world) {
   const std::span<const InitialState> all = suite.initial_states;

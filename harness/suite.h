@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <map>
 #include <optional>
 #include <span>
 #include <string>
@@ -50,10 +51,11 @@ struct Suite {
   std::string hash;  ///< of everything that can change a result: the effective suite and every page and scene it names
   std::string reality_hash;  ///< the same without the worlds of type evac and the number of initial states
   std::vector<SuiteWorld> worlds;
-  std::vector<Task> tasks;  ///< cameras resized to `image`; those of a recording are filled in by apps/factory
+  std::vector<Task> tasks;  ///< cameras resized to `image`; those of a recording are filled in by apps/recorded_suite
   std::vector<SuitePolicy> policies;
   std::vector<std::uint64_t> seeds;
-  std::vector<InitialState> initial_states;  ///< per task; their seeds mix in the task's id when used
+  std::vector<InitialState> initial_states;  ///< per task; their seeds mix in the task's id when used; of recordings
+                                             ///< filled in as `recordings` is
   int chunk_size = 8;
   int lanes = 4;
   int threads = 0;           ///< 0: one per core
@@ -63,9 +65,16 @@ struct Suite {
   Transport transport;
   PolicyLatency latency;
   StartProbe start_probe = StartProbe::kRefuse;
-  std::optional<std::filesystem::path> recording;
+  std::optional<std::filesystem::path> recording;  ///< one, or a folder of several: each an initial state of one task
+  int recorded_states = 0;                         ///< of such a folder only the first so many; 0: all
+  int recorded_chunks = 0;                         ///< limit of an episode; 0: as many as hold the longest recording
+  /// By initial state, the folder of what begins there; filled in with the task by apps/recorded_suite.
+  std::map<std::string, std::filesystem::path> recordings;
   std::optional<StillRule> recorded_still;  ///< of the recording's task; none: only the end of the actions or the limit ends it
 };
+
+/// Whether a world of the suite is imagined by a network.
+bool HasNetwork(const Suite& suite);
 
 /// The initial states that a world tries.
 std::span<const InitialState> StatesOf(const Suite& suite, const SuiteWorld& world);

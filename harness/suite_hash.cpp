@@ -6,6 +6,7 @@
 
 #include "core/hash.h"
 #include "core/recording.h"
+#include "core/recording_folders.h"
 
 namespace evac {
 namespace {
@@ -56,6 +57,19 @@ bool IsOfModel(const std::string& line, const Suite& suite) {
 /// An initial state is named by its seed and its number: how many there are changes none of them.
 bool SaysHowManyStates(const std::string& line) { return line.starts_with(".initial_states.count="); }
 
+/// All folders that hold files of a recording, or of a folder of several: of one task of a tree some lie beside it.
+std::vector<fs::path> FoldersWith(const fs::path& recording) {
+  std::vector<fs::path> folders = FoldersOf(recording);
+  if (IsRecording(recording)) return folders;
+  for (const fs::path& one : FindRecordings(recording)) {
+    for (const fs::path& part : FoldersOf(one)) {
+      const fs::path from_first = part.lexically_relative(folders.front());
+      if (from_first.empty() || *from_first.begin() == "..") folders.push_back(part);
+    }
+  }
+  return folders;
+}
+
 std::string HashOf(const Config& page, const Suite& suite, bool with_models) {
   std::ostringstream text;
   std::istringstream lines(page.Canonical());
@@ -80,7 +94,7 @@ std::string HashOf(const Config& page, const Suite& suite, bool with_models) {
            << "\n";
   }
   if (suite.recording) {
-    for (const fs::path& folder : FoldersOf(*suite.recording)) text << "recording " << HashOfTree(folder) << "\n";
+    for (const fs::path& folder : FoldersWith(*suite.recording)) text << "recording " << HashOfTree(folder) << "\n";
   }
   return Sha256Hex(text.str());
 }

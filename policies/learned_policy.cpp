@@ -46,12 +46,15 @@ TakeParameter From(WeightFile& file) {
 
 /// What differs between a camera as it was in training and as the task has it; empty: nothing that matters.
 std::string Difference(const Camera& trained, const Camera& asked) {
-  const auto focal = [](const Camera& camera) { return camera.fx_px / camera.width_px; };
+  const double wide = asked.fx_px / asked.width_px, high = asked.fy_px / asked.height_px,
+               trained_wide = trained.fx_px / trained.width_px, trained_high = trained.fy_px / trained.height_px;
   const Eigen::Isometry3d between = trained.mount_from_camera.inverse() * asked.mount_from_camera;
   const double turn_rad = Eigen::AngleAxisd(between.linear()).angle();
   if (trained.mount != asked.mount) return "is mounted elsewhere";
-  if (std::abs(focal(asked) / focal(trained) - 1) > kFocalTolerance)
-    return fmt::format("has a focal length of {:.3f} picture widths, in training {:.3f}", focal(asked), focal(trained));
+  if (std::abs(wide / trained_wide - 1) > kFocalTolerance)
+    return fmt::format("has a focal length of {:.3f} picture widths, in training {:.3f}", wide, trained_wide);
+  if (std::abs(high / trained_high - 1) > kFocalTolerance)
+    return fmt::format("has a focal length of {:.3f} picture heights, in training {:.3f}", high, trained_high);
   if (between.translation().norm() > kMountTolerance_m || turn_rad > kMountTolerance_rad)
     return fmt::format("stands {:.3f} m and {:.1f} degrees from where it stood in training",
                        between.translation().norm(), turn_rad * 180 / M_PI);
@@ -96,8 +99,7 @@ PolicySpec LearnedPolicy::Spec() const {
   spec.arms = network_->shape.arms;
   spec.period_s = network_->period_s;
   spec.chunk_size = chunk_size_;
-  for (const std::string& camera : network_->shape.cameras)
-    spec.cameras.push_back({camera, network_->shape.width_px, network_->shape.height_px});
+  for (const std::string& camera : network_->shape.cameras) spec.cameras.push_back({camera});  // of any size: made its own
   spec.needs = {"images", "arms", "whole_chunks"};
   return spec;
 }
@@ -129,6 +131,10 @@ void LearnedPolicy::Reset(SceneId scene, const Task& task, std::uint64_t) {
         std::find_if(task.cameras.begin(), task.cameras.end(), [&](const Camera& c) { return c.name == trained.name; });
     if (found == task.cameras.end())
       throw InvalidInput("learned@{}: task {} has no camera {}", network_->name, task.id, trained.name);
+    if (found->width_px < shape.width_px || found->height_px < shape.height_px)
+      throw InvalidInput("learned@{}: camera {} of task {} has pictures of {}x{}, in training they were {}x{}",
+                         network_->name, trained.name, task.id, found->width_px, found->height_px, shape.width_px,
+                         shape.height_px);
     const std::string difference = Difference(trained, *found);
     if (!difference.empty())
       throw InvalidInput("learned@{}: camera {} of task {} {}", network_->name, trained.name, task.id, difference);

@@ -29,6 +29,21 @@ void CheckMatches(const Task& task, const Recording& recording) {
   }
 }
 
+/// Called like their tasks; one alone is every task's.
+RecordedStart OfTasks(std::vector<Recording> recordings) {
+  std::set<std::string> ids;
+  for (const Recording& recording : recordings) {
+    if (!ids.insert(recording.id).second)
+      throw InvalidInput("two recordings are called {}: wanted folders of different names", recording.id);
+  }
+  return [recordings = std::move(recordings)](const Task& task, const InitialState&) {
+    if (recordings.size() == 1) return recordings.front();
+    const auto found = std::ranges::find(recordings, task.id, &Recording::id);
+    if (found == recordings.end()) throw InvalidInput("task {}: no recording is called so", task.id);
+    return *found;
+  };
+}
+
 WorldStep Step(RecordedFrames& frames, const Arms& arms) {
   return {{.images = frames.Next(), .arms = arms, .arms_are_commanded = true}, {}};
 }
@@ -45,27 +60,16 @@ Advanced Echo(RecordedFrames& frames, const ActionChunk& chunk) {
 
 }  // namespace
 
+EchoWorld::EchoWorld(RecordedStart find, std::string name) : find_(std::move(find)), name_(std::move(name)) {}
+
 EchoWorld::EchoWorld(Recording recording, std::string name)
-    : EchoWorld(std::vector<Recording>{std::move(recording)}, std::move(name)) {}
+    : EchoWorld([only = std::move(recording)](const Task&, const InitialState&) { return only; }, std::move(name)) {}
 
 EchoWorld::EchoWorld(std::vector<Recording> recordings, std::string name)
-    : recordings_(std::move(recordings)), name_(std::move(name)) {
-  std::set<std::string> ids;
-  for (const Recording& recording : recordings_) {
-    if (!ids.insert(recording.id).second)
-      throw InvalidInput("two recordings are called {}: wanted folders of different names", recording.id);
-  }
-}
+    : EchoWorld(OfTasks(std::move(recordings)), std::move(name)) {}
 
-const Recording& EchoWorld::RecordingOf(const Task& task) const {
-  if (recordings_.size() == 1) return recordings_.front();
-  const auto found = std::ranges::find(recordings_, task.id, &Recording::id);
-  if (found == recordings_.end()) throw InvalidInput("task {}: no recording is called so", task.id);
-  return *found;
-}
-
-WorldStep EchoWorld::Reset(SceneId scene, const Task& task, const InitialState&, std::uint64_t) {
-  const Recording& recording = RecordingOf(task);
+WorldStep EchoWorld::Reset(SceneId scene, const Task& task, const InitialState& initial, std::uint64_t) {
+  const Recording recording = find_(task, initial);
   CheckMatches(task, recording);
   RecordedFrames& frames = scenes_.insert_or_assign(scene, RecordedFrames(recording)).first->second;
   return Step(frames, recording.arms.front());

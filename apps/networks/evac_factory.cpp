@@ -5,6 +5,7 @@
 
 #include "apps/factory.h"
 #include "apps/network_parts.h"
+#include "apps/recorded_suite.h"
 #include "worldmodel/evac_config.h"
 #include "worldmodel/evac_world.h"
 #include "worldmodel/nn/memory.h"
@@ -55,7 +56,7 @@ InitialScene SeenInRealRun(const Store* store, const std::string& world, const T
 
 FirstScene FirstSceneOf(const Suite& suite, const Store* store, const std::string& world) {
   if (suite.recording) {
-    return [scene = InitialSceneOf(RecordingOf(suite))](const Task&, const InitialState&) { return scene; };
+    return [suite](const Task&, const InitialState& initial) { return InitialSceneOf(RecordingOf(suite, initial)); };
   }
   return [store, world](const Task& task, const InitialState& initial) {
     return SeenInRealRun(store, world, task, initial);
@@ -103,11 +104,11 @@ struct Sight {
   }
 };
 
-Sight SightOf(const SuiteWorld& world, const Suite& suite) {
+Sight SightOf(const SuiteWorld& world, const std::filesystem::path& folder) {
   const TrainedFor trained = TrainedFor::Read(world.evac->weights);
   trained.CheckPeriod(world.evac->period_s, fmt::format("world {}: field period_s", world.name));
   if (!trained.cameras.empty()) return {world.evac->period_s, trained.cameras};
-  std::vector<std::string> cameras = NamesOf(ReadRecording(*suite.recording, {.count_video_frames = false}).cameras);
+  std::vector<std::string> cameras = NamesOf(ReadRecording(folder, {.count_video_frames = false}).cameras);
   const auto views = static_cast<std::size_t>(ReadEvacConfig(world.evac->config).views);
   if (cameras.size() > views) cameras.resize(views);  // fewer are refused where an episode begins
   return {world.evac->period_s, std::move(cameras)};
@@ -115,12 +116,12 @@ Sight SightOf(const SuiteWorld& world, const Suite& suite) {
 
 }  // namespace
 
-Recording ReadAsTrained(const Suite& suite) try {
+Recording ReadAsTrained(const Suite& suite, const std::filesystem::path& folder) try {
   const SuiteWorld* first = nullptr;
   Sight wanted{};
   for (const SuiteWorld& world : suite.worlds) {
     if (!world.evac) continue;
-    const Sight own = SightOf(world, suite);
+    const Sight own = SightOf(world, folder);
     if (first == nullptr) {
       first = &world;
       wanted = own;
@@ -129,7 +130,7 @@ Recording ReadAsTrained(const Suite& suite) try {
     throw InvalidInput("{}: field recording: world {} is to see {}, world {} {}: wanted a suite for each",
                        suite.path.string(), first->name, wanted.Words(), world.name, own.Words());
   }
-  return Thinned(ReadRecording(*suite.recording, {.cameras = wanted.cameras}), wanted.period_s);
+  return Thinned(ReadRecording(folder, {.cameras = wanted.cameras}), wanted.period_s);
 } catch (const TensorError& error) {
   throw InvalidInput("{}", error.what());
 }

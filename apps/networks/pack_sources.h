@@ -9,6 +9,7 @@
 
 #include "core/collection.h"
 #include "core/recording.h"
+#include "core/recording_folders.h"
 #include "worldmodel/motion_statistics.h"
 
 namespace evac {
@@ -42,10 +43,6 @@ struct LeftOut {
   std::string kind;  ///< short_video, missing_camera, not_finite, …: docs/formats/recording.md
   std::string sentence;
 };
-
-/// Every folder below `input` that is meant as a recording, sorted: the episodes of a tree, `input` itself, or its
-/// subfolders. @throws InvalidInput if there is none.
-std::vector<std::filesystem::path> FindRecordings(const std::filesystem::path& input);
 
 /// The cameras that will be packed: those asked for, or the first of the first recording that can be read.
 std::vector<std::string> ChooseViews(const std::vector<std::filesystem::path>& folders, const SourceOptions& options);

@@ -40,6 +40,13 @@ TensorMetadata CardOf(const Task& task) {
   return card;
 }
 
+/// The same cameras, with pictures of another size.
+Task TrainedAt(int width_px, int height_px) {
+  Task task = Trained();
+  for (Camera& camera : task.cameras) camera = Resized(camera, width_px, height_px);
+  return task;
+}
+
 /// Weights that no training made.
 fs::path Weights(const fs::path& path, const TensorMetadata& card = CardOf(Trained())) {
   std::deque<std::vector<float>> numbers;
@@ -186,7 +193,10 @@ TEST(LearnedPolicy, DeclaresWhatItsCardSays) {
   other = Trained();
   other.arms = {"left", "right"};
   EXPECT_EQ(complaint(other, 8), "arms ");
-  EXPECT_EQ(complaint(wire::TwoCameraTask(32, 48), 8), "cameras ");
+  EXPECT_EQ(complaint(TrainedAt(48, 32), 8), "") << "larger pictures are made its own size";
+  other = Trained();
+  other.cameras.pop_back();
+  EXPECT_EQ(complaint(other, 8), "cameras ");
   EXPECT_EQ(complaint(Trained(), 16), "chunk_size ");
 }
 
@@ -214,6 +224,12 @@ TEST(LearnedPolicy, RefusesTasksCamerasAndRobotsItWasNotTrainedFor) {
   EXPECT_THAT(
       complaint(task),
       HasSubstr("camera head of task take_bottle has a focal length of 5.042 picture widths, in training 2.521"));
+  task = Trained();
+  task.cameras[1].fy_px *= 2;
+  EXPECT_THAT(complaint(task), HasSubstr("picture heights, in training"));
+  EXPECT_EQ(complaint(TrainedAt(48, 32)), "nothing") << "larger pictures are made its own size";
+  EXPECT_THAT(complaint(TrainedAt(12, 8)),
+              HasSubstr("camera head of task take_bottle has pictures of 12x8, in training they were 24x16"));
   task = Trained();
   task.cameras.pop_back();
   EXPECT_THAT(complaint(task), HasSubstr("has no camera hand_right"));

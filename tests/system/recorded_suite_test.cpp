@@ -2,10 +2,12 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <map>
 #include <set>
 
 #include "apps/factory.h"
 #include "apps/network_parts.h"
+#include "apps/recorded_suite.h"
 #include "core/error.h"
 #include "core/file.h"
 #include "core/recording_writer.h"
@@ -175,6 +177,123 @@ TEST_F(RecordedSuite, ItsHashCoversWhatLiesElsewhereInTheTree) {
     WriteText(last, ReadFile(last) + " ");
     EXPECT_TRUE(hashes.insert(hash()).second) << last << " was changed and the hash is the same";
   }
+}
+
+/// A folder of recordings of one robot: each begins with its hands a centimetre further on than the one before.
+class RecordedStates : public RecordedSuite {
+ protected:
+  RecordedStates() {
+    WriteClip("many/a", 25, 0);
+    WriteClip("many/b", 49, 1);
+    WriteClip("many/c", 25, 2);
+  }
+
+  void WriteClip(const std::string& name, int steps, int shift_cm,
+                 std::vector<std::string> cameras = {"head", "hand_left", "hand_right"}) const {
+    SyntheticClip clip(steps);
+    clip.cameras = std::move(cameras);
+    std::ranges::fill(clip.grippers, 60.0F);
+    for (std::size_t i = 0; i < clip.positions_m.size(); i += 3) clip.positions_m[i] += 0.01 * shift_cm;
+    clip.Write(OneFolder(folder_ / name));
+  }
+
+  static std::vector<std::string> States(const Suite& suite) {
+    std::vector<std::string> names;
+    for (const InitialState& state : suite.initial_states) names.push_back(state.id);
+    return names;
+  }
+
+  /// @param lines  more of the page
+  Suite Many(const std::string& lines = "", const std::string& recording = "many") const {
+    return Filled(std::string(kEcho) + kEvac + lines, {"recording=" + (folder_ / recording).string()});
+  }
+};
+
+TEST_F(RecordedStates, OfAFolderEachIsAnInitialStateOfOneTask) {
+  const Suite suite = Many();
+  ASSERT_EQ(suite.tasks.size(), 1u);
+  const Task& task = suite.tasks.front();
+  EXPECT_EQ(task.id, "many");
+  EXPECT_EQ(task.max_chunks, 2) << "the longest has 16 targets at 10 Hz";
+  EXPECT_EQ(States(suite), (std::vector<std::string>{"a", "b", "c"}));
+  EXPECT_NE(suite.initial_states[0].seed, suite.initial_states[1].seed);
+  for (const SuiteWorld& world : suite.worlds) {
+    const std::unique_ptr<World> made = MakeWorld(world, suite, nullptr);
+    const auto begins_at_m = [&](const InitialState& initial) {
+      return made->Reset(0, task, initial, 1).observation.arms[0].base_from_gripper.translation().x();
+    };
+    const double first_m = begins_at_m(suite.initial_states[0]);
+    EXPECT_NEAR(begins_at_m(suite.initial_states[1]) - first_m, 0.01, 1e-6) << world.name;
+    EXPECT_NEAR(begins_at_m(suite.initial_states[2]) - first_m, 0.02, 1e-6) << world.name;
+  }
+}
+
+TEST_F(RecordedStates, ThePageMayTakeTheFirstAndLimitTheEpisodes) {
+  const Suite suite = Many("initial_states: {count: 2}\nmax_chunks: 9\n");
+  EXPECT_EQ(States(suite), (std::vector<std::string>{"a", "b"}));
+  EXPECT_EQ(suite.tasks.front().max_chunks, 9);
+  EXPECT_THAT([&] { Many("initial_states: {count: 4}\n"); },
+              ThrowsMessage<Error>(HasSubstr("initial_states.count: found 4, wanted at most 3")));
+  EXPECT_THAT([&] { Many("  - {name: other, type: echo, initial_states: 4}\n"); },
+              ThrowsMessage<Error>(HasSubstr("initial_states of world other: found 4, wanted at most 3")));
+  EXPECT_THAT([&] { Many("initial_states: {count: 2, seed: 1}\n"); }, ThrowsMessage<Error>(HasSubstr("seed")));
+  EXPECT_THAT([&] { Many("max_chunks: 0\n"); }, ThrowsMessage<Error>(HasSubstr("max_chunks")));
+  EXPECT_THAT([&] { Filled(std::string(kEcho) + "initial_states: {count: 2}\n"); },
+              ThrowsMessage<Error>(HasSubstr("initial_states.count: found 2, wanted 1")));
+}
+
+TEST_F(RecordedStates, ThoseThatCannotBeginAreLeftOutAndNoneIsRefused) {
+  WriteClip("many/blind", 25, 0, {"head", "hand_left"});
+  WriteText(folder_ / "many/broken/proprio_stats.h5", "nothing");
+  EXPECT_EQ(States(Many()), (std::vector<std::string>{"a", "b", "c"})) << "neither without a camera nor broken";
+  WriteText(folder_ / "none/broken/proprio_stats.h5", "nothing");
+  EXPECT_THAT([&] { Many("", "none"); }, ThrowsMessage<Error>(HasSubstr("no recording can be begun from")));
+  fs::create_directories(folder_ / "empty");
+  EXPECT_THAT([&] { Many("", "empty"); }, ThrowsMessage<Error>(HasSubstr("no recordings; wanted")));
+}
+
+TEST_F(RecordedStates, OfATreeTheyAreOfOneTask) {
+  for (const auto& [task, episode] : {std::pair("carry", "1"), std::pair("carry", "2"), std::pair("pour", "7")})
+    WriteLateRecording({folder_ / "tree", task, episode});
+  Suite suite = ReadSuite(WriteSuite(kEcho), {"recording=" + (folder_ / "tree/observations/carry").string()});
+  FillInRecordedTask(suite);
+  EXPECT_EQ(suite.tasks.front().id, "carry");
+  EXPECT_EQ(States(suite), (std::vector<std::string>{"carry-1", "carry-2"}));
+  suite = ReadSuite(WriteSuite(kEcho), {"recording=" + (folder_ / "tree").string()});
+  EXPECT_THAT([&] { FillInRecordedTask(suite); },
+              ThrowsMessage<Error>(HasSubstr("found tasks carry and pour")));
+}
+
+TEST_F(RecordedStates, TheHashCoversWhatLiesBesideATasksFolder) {
+  for (const char* episode : {"1", "2"}) WriteLateRecording({folder_ / "tree", "carry", episode});
+  const auto hash = [&] {
+    return ReadSuite(WriteSuite(kEcho), {"recording=" + (folder_ / "tree/observations/carry").string()}).hash;
+  };
+  std::set<std::string> hashes = {hash()};
+  const fs::path proprio = folder_ / "tree/proprio_stats/carry/2/proprio_stats.h5";
+  WriteText(proprio, ReadFile(proprio) + " ");
+  EXPECT_TRUE(hashes.insert(hash()).second);
+  WriteLateRecording({folder_ / "tree", "carry", "3"});
+  EXPECT_TRUE(hashes.insert(hash()).second) << "another initial state";
+}
+
+TEST_F(RecordedStates, EveryPolicyBeginsInEachAndAReplayOfOneInNone) {
+  const std::string recording = "recording=" + (folder_ / "many").string();
+  const CommandResult refused = RunCommand(RunWords(WriteSuite(kEcho), folder_ / "replay", {recording}));
+  EXPECT_EQ(refused.exit_code, 2) << refused.err;
+  EXPECT_THAT(refused.err, HasSubstr("names ${recording}, but"));
+
+  const fs::path run = folder_ / "run";
+  const std::vector<std::string> assignments = {recording, "policies.0.name=hold", "policies.0.command=[evac-policy, hold]"};
+  const CommandResult result = RunCommand(RunWords(WriteSuite(std::string(kEcho) + kEvac), run, assignments));
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  std::map<std::string, std::set<std::string>> worlds_of;
+  for (const Episode& episode : Store::Open(run, Store::Mode::kReadOnly).Episodes()) {
+    EXPECT_EQ(episode.stop, StopReason::kMaxChunks) << episode.failure;
+    worlds_of[episode.key.pair.initial_state].insert(episode.key.world);
+  }
+  EXPECT_EQ(worlds_of.size(), 3u);
+  for (const auto& [state, worlds] : worlds_of) EXPECT_EQ(worlds.size(), 2u) << state;
 }
 
 TEST_F(RecordedSuite, ToldArmsAreReplayedWhereThatIsAskedForAndRecorded) {

@@ -1,0 +1,151 @@
+#include "apps/recorded_suite.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <filesystem>
+
+#include "apps/network_parts.h"
+#include "core/collection.h"
+#include "core/error.h"
+#include "core/recording_folders.h"
+#include "core/seed.h"
+
+namespace evac {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr std::size_t kMostSaid = 5;
+
+Recording ReadAt(const Suite& suite, const fs::path& folder) {
+  return HasNetwork(suite) ? ReadAsTrained(suite, folder) : ReadRecording(folder);
+}
+
+Task TaskOf(const Suite& suite, const Recording& recording) {
+  Task task = TaskFromRecording(recording);
+  const int steps = task.max_chunks;  // it counts them so, whatever the suite's chunks
+  task.max_chunks =
+      suite.recorded_chunks > 0 ? suite.recorded_chunks : (steps + suite.chunk_size - 1) / suite.chunk_size;
+  if (suite.recorded_still) task.still = *suite.recorded_still;
+  return task;
+}
+
+void FillInOne(Suite& suite) {
+  if (suite.recorded_states > 1)
+    throw InvalidInput("{}: field initial_states.count: found {}, wanted 1: {} is one recording", suite.path.string(),
+                       suite.recorded_states, suite.recording->string());
+  suite.tasks = {TaskOf(suite, ReadAt(suite, *suite.recording))};
+  suite.initial_states = {{"recording", 0}};
+  suite.recordings = {{"recording", *suite.recording}};
+}
+
+/// Why the recording cannot begin episodes of the task; empty: it can.
+std::string WhatDiffers(const Recording& recording, const Task& task) {
+  if (recording.arm_names != task.arms) return "other arms";
+  if (std::abs(recording.period_s - task.period_s) > 1e-9)
+    return fmt::format("steps of {:.4g} s, not {:.4g} s", recording.period_s, task.period_s);
+  const auto same = [](const Camera& a, const Camera& b) {
+    return a.name == b.name && a.width_px == b.width_px && a.height_px == b.height_px;
+  };
+  return std::ranges::equal(recording.cameras, task.cameras, same) ? "" : "other cameras, or of another size";
+}
+
+/// The task of a tree's or collection's recording, else what their folder is called.
+std::string TaskName(const fs::path& folder, const std::optional<CollectedEpisode>& row, const fs::path& all) {
+  if (row) return SafeName(row->task);
+  const std::optional<TreePlace> place = PlaceOf(folder);
+  return SafeName(place ? place->task : fs::canonical(all).filename().string());
+}
+
+/// Takes recording after recording into the suite.
+class RecordedStates {
+ public:
+  explicit RecordedStates(Suite& suite) : suite_(suite) {}
+
+  void Take(const fs::path& folder) {
+    const std::optional<CollectedEpisode> row = RowOf(folder);
+    CheckTask(folder, TaskName(folder, row, *suite_.recording));
+    const bool is_enough = suite_.recorded_states > 0 && std::ssize(suite_.initial_states) >= suite_.recorded_states;
+    if (is_enough || (row && suite_.recordings.contains(row->initial_state))) return;  // or it began alike
+    try {
+      Add(folder, row, ReadAt(suite_, folder));
+    } catch (const Error& error) {
+      if (error.exit_code() != ExitCode::kInvalidInput) throw;
+      left_out_.push_back(error.what());
+    }
+  }
+
+  void Finish() {
+    for (std::size_t i = 0; i < std::min(left_out_.size(), kMostSaid); ++i)
+      fmt::print(stderr, "evac: warning: left out: {}\n", left_out_[i]);
+    if (!left_out_.empty())
+      fmt::print(stderr, "evac: warning: {} recordings of {} left out\n", left_out_.size(), suite_.recording->string());
+    const auto found = std::ssize(suite_.initial_states);
+    if (found == 0) throw InvalidInput("{}: no recording can be begun from", suite_.recording->string());
+    Limit("initial_states.count", suite_.recorded_states);
+    for (const SuiteWorld& world : suite_.worlds) Limit("initial_states of world " + world.name, world.initial_states);
+  }
+
+ private:
+  void CheckTask(const fs::path& folder, const std::string& task) {
+    if (task_.empty()) task_ = task;
+    if (task_ == task) return;
+    throw InvalidInput("{}: field recording: found tasks {} and {} (in {}), wanted recordings of one task: a suite for each",
+                       suite_.path.string(), task_, task, folder.string());
+  }
+
+  void Add(const fs::path& folder, const std::optional<CollectedEpisode>& row, const Recording& recording) {
+    if (suite_.tasks.empty()) {
+      suite_.tasks = {TaskOf(suite_, recording)};
+      suite_.tasks.front().id = task_;
+      suite_.tasks.front().instruction = fmt::format("Do what was recorded in {}.", task_);
+    }
+    Task& task = suite_.tasks.front();
+    if (const std::string why = WhatDiffers(recording, task); !why.empty())
+      throw InvalidInput("{}: {} than those of {}", recording.source, why, suite_.initial_states.front().id);
+    const Task own = TaskOf(suite_, recording);
+    task.max_chunks = std::max(task.max_chunks, own.max_chunks);
+    task.workspace_m.extend(own.workspace_m);
+    const std::string state = row ? row->initial_state : recording.id;
+    if (!suite_.recordings.emplace(state, folder).second)
+      throw InvalidInput("{}: another recording is called {} too", recording.source, state);
+    suite_.initial_states.push_back({state, SeedFor(0, state)});
+  }
+
+  void Limit(const std::string& field, int wanted) const {
+    const auto found = std::ssize(suite_.initial_states);
+    if (wanted > found)
+      throw InvalidInput("{}: field {}: found {}, wanted at most {}: so many recordings can be begun from",
+                         suite_.path.string(), field, wanted, found);
+  }
+
+  Suite& suite_;
+  std::string task_;
+  std::vector<std::string> left_out_;
+};
+
+void FillInSeveral(Suite& suite) {
+  suite.initial_states.clear();
+  RecordedStates states(suite);
+  for (const fs::path& folder : FindRecordings(*suite.recording)) states.Take(folder);
+  states.Finish();
+}
+
+}  // namespace
+
+Recording RecordingOf(const Suite& suite, const InitialState& initial) {
+  const auto found = suite.recordings.find(initial.id);
+  if (found == suite.recordings.end())
+    throw InvalidInput("{}: no recording is called {}", suite.path.string(), initial.id);
+  return ReadAt(suite, found->second);
+}
+
+void FillInRecordedTask(Suite& suite) {
+  if (!suite.recording || !suite.tasks.empty()) return;
+  IsRecording(*suite.recording) ? FillInOne(suite) : FillInSeveral(suite);
+}
+
+}  // namespace evac
