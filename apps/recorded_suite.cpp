@@ -106,12 +106,12 @@ class RecordedStates {
     Task& task = suite_.tasks.front();
     if (const std::string why = WhatDiffers(recording, task); !why.empty())
       throw InvalidInput("{}: {} than those of {}", recording.source, why, suite_.initial_states.front().id);
-    const Task own = TaskOf(suite_, recording);
-    task.max_chunks = std::max(task.max_chunks, own.max_chunks);
-    task.workspace_m.extend(own.workspace_m);
     const std::string state = row ? row->initial_state : recording.id;
     if (!suite_.recordings.emplace(state, folder).second)
       throw InvalidInput("{}: another recording is called {} too", recording.source, state);
+    const Task own = TaskOf(suite_, recording);
+    task.max_chunks = std::max(task.max_chunks, own.max_chunks);
+    task.workspace_m.extend(own.workspace_m);
     suite_.initial_states.push_back({state, SeedFor(0, state)});
   }
 
