@@ -117,7 +117,6 @@ Defined<std::int64_t> MorePairs(const ComparisonRow& row, const Promise& promise
 
 /// Every stratum grows alike, so that the difference's variance falls as episodes are added.
 Defined<std::int64_t> MoreOfEachTask(const ComparisonRow& row, const Promise& promise) {
-  if (*row.difference.value == 0) return Undefined{"the two rates are equal"};
   const double z = TwoSidedZ(1 - promise.alpha) + NormalQuantile(promise.power);
   const double times = std::pow(z * *row.stratified_se / *row.difference.value, 2);
   const auto further = [times](const Repeated& have) {
@@ -127,8 +126,9 @@ Defined<std::int64_t> MoreOfEachTask(const ComparisonRow& row, const Promise& pr
 }
 
 Defined<std::int64_t> MoreEpisodes(const ComparisonRow& row, const Promise& promise) {
-  if (row.stratified_se) return MoreOfEachTask(row, promise);
   if (!row.first.value || !row.second.value) return Undefined{"one of the two has no episode that counts"};
+  if (*row.difference.value == 0) return Undefined{"the two rates are equal"};  // task by task, where there are several
+  if (row.stratified_se) return MoreOfEachTask(row, promise);
   const SampleSize size = TrialsPerPolicy(*row.first.value, *row.second.value, promise);
   if (!size.exact) return Undefined{size.exact.reason()};
   const double wanted = static_cast<double>(size.n);

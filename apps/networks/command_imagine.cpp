@@ -18,6 +18,10 @@ void AddInputs(CLI::App& command, ImagineArguments& arguments) {
       .add_option("--cameras", inputs.cameras, "the views, with commas between them (a folder's; default: what the weights "
                   "say, else the first of head, hand_left, hand_right)")
       ->delimiter(',');
+  command
+      .add_option("--arms", inputs.arms, "the actions are where the arms were told to be, or measured; default: as the weights "
+                  "say, else measured")
+      ->check(CLI::IsMember({"told", "measured"}));
   command.add_option("--stride", inputs.stride, "every Nth recorded step is a frame; default: those as far apart as the weights say, else 0.1 s")
       ->check(CLI::Range(1, 1000));
 }

@@ -29,6 +29,7 @@ std::vector<std::string> CommandWords(const ImagineArguments& arguments, const I
   path("--extrinsics", inputs.files.extrinsics);
   path("--intrinsics", inputs.files.intrinsics);
   say("--cameras", fmt::format("{}", fmt::join(inputs.cameras, ",")));
+  say("--arms", inputs.arms);
   say("--stride", std::to_string(start.stride));
   path("--config", arguments.config);
   path("--statistics", arguments.statistics);

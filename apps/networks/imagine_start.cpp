@@ -37,9 +37,12 @@ std::vector<std::string> Cameras(const ImagineInputs& inputs, std::size_t views)
 
 Recording Read(const ImagineInputs& inputs, std::size_t views) {
   const RecordingOptions options{.cameras = Cameras(inputs, views), .count_video_frames = false,
-                                 .read_told = inputs.read_told};
-  return inputs.recording.empty() ? ReadRecordingFiles(inputs.files, options)
-                                  : ReadRecording(inputs.recording, options);
+                                 .read_told = inputs.arms.empty() ? inputs.read_told : inputs.arms == "told"};
+  Recording recording = inputs.recording.empty() ? ReadRecordingFiles(inputs.files, options)
+                                                 : ReadRecording(inputs.recording, options);
+  if (inputs.arms == "told" && recording.told.empty())
+    throw InvalidInput("{}: it does not say where the arms were told to be, as --arms told wants", recording.source);
+  return recording;
 }
 
 void Append(std::string& bytes, double value) { bytes.append(reinterpret_cast<const char*>(&value), sizeof(value)); }

@@ -213,6 +213,17 @@ TEST(ComparePolicies, WhatIsNamedDecidesOverTasksToo) {
   EXPECT_LT(*compare(times + 1).p, 0.05 / 2) << "as many have power to spare where the difference is as planned";
 }
 
+TEST(ComparePolicies, WhereBothAreAlikeInEveryTaskNoNumberOfEpisodesDecides) {
+  ComparedPolicy one = Policy("a", "sss", "t"), two = Policy("b", "---ssss", "t");
+  Add("u", "fff", one);
+  Add("u", "---" + Times(20, "f"), two);
+  const ComparisonRow row = ComparePolicies(one, two).all;
+  EXPECT_EQ(*row.difference.value, 0);
+  EXPECT_NE(*row.first.value, *row.second.value) << "of unlike numbers of easy and hard tasks";
+  ASSERT_FALSE(row.more);
+  EXPECT_EQ(row.more.reason(), "the two rates are equal");
+}
+
 TEST(ComparePolicies, HowManyMoreIsPlannedFromWhatRepeatsTell) {
   const ComparisonRow once = ComparePolicies(Policy("a", "sssssfff"), Policy("b", "sssfffff")).all;
   const ComparisonRow row =

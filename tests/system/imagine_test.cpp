@@ -16,6 +16,7 @@
 #include "core/tensor_file.h"
 #include "core/video.h"
 #include "tests/support/command.h"
+#include "tests/support/late_recording.h"
 #include "tests/support/synthetic_recording.h"
 #include "tests/support/temp_folder.h"
 #include "tests/system/process_support.h"
@@ -283,6 +284,23 @@ TEST_F(ImagineCommand, MapsOfWeightsThatAreNamedAreThoseThatTheirFramesAreImagin
   const auto of_maps = Files("maps"), of_frames = Files("frames");
   ASSERT_EQ(of_maps.size(), 7u) << "every step of 30 Hz";
   for (const auto& [name, hash] : of_maps) EXPECT_EQ(of_frames.at(name), hash) << name;
+}
+
+TEST_F(ImagineCommand, ToldArmsAreDrawnWhereTheyAreAskedForAndRecorded) {
+  const TreePlace place{folder_ / "late", "carry", "1"};
+  WriteLateRecording(place);
+  const auto maps = [&](const std::string& arms) {
+    const CommandResult result =
+        RunCommand({Binary("evac"), "imagine", "--maps-only", "--recording", place.Folder().string(), "--config",
+                    folder_ / "tiny.yaml", "--stride", "1", "--arms", arms, "--out", folder_ / arms});
+    EXPECT_EQ(result.exit_code, 0) << result.err;
+    return Files(arms);
+  };
+  const auto told = maps("told"), measured = maps("measured");
+  ASSERT_EQ(told.size(), 4u);
+  EXPECT_EQ(told.at("maps/frame_00001.png"), measured.at("maps/frame_00002.png")) << "the arms are a step late";
+  EXPECT_NE(told.at("maps/frame_00001.png"), measured.at("maps/frame_00001.png"));
+  ExpectRefused(Words("refused", {"--maps-only", "--arms", "told"}), "does not say where the arms were told to be");
 }
 
 TEST_F(ImagineCommand, TheVideoShowsEachPictureAboveItsMapAndTheSidecarSaysHowItWasMade) {
