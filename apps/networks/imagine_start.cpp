@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdio>
 
 #include "core/error.h"
 #include "core/hash.h"
@@ -36,12 +37,17 @@ std::vector<std::string> Cameras(const ImagineInputs& inputs, std::size_t views)
 }
 
 Recording Read(const ImagineInputs& inputs, std::size_t views) {
-  const RecordingOptions options{.cameras = Cameras(inputs, views), .count_video_frames = false,
-                                 .read_told = inputs.arms.empty() ? inputs.read_told : inputs.arms == "told"};
+  const bool wants_told = inputs.arms.empty() ? inputs.read_told : inputs.arms == "told";
+  const RecordingOptions options{.cameras = Cameras(inputs, views), .count_video_frames = false, .read_told = wants_told};
   Recording recording = inputs.recording.empty() ? ReadRecordingFiles(inputs.files, options)
                                                  : ReadRecording(inputs.recording, options);
-  if (inputs.arms == "told" && recording.told.empty())
+  if (!wants_told || !recording.told.empty()) return recording;
+  if (!inputs.arms.empty())
     throw InvalidInput("{}: it does not say where the arms were told to be, as --arms told wants", recording.source);
+  fmt::print(stderr,
+             "evac: warning: {}: the network learned from where arms were told to be, which is not recorded here: where they were is "
+             "taken\n",
+             recording.source);
   return recording;
 }
 

@@ -303,6 +303,21 @@ TEST_F(ImagineCommand, ToldArmsAreDrawnWhereTheyAreAskedForAndRecorded) {
   ExpectRefused(Words("refused", {"--maps-only", "--arms", "told"}), "does not say where the arms were told to be");
 }
 
+TEST_F(ImagineCommand, WhereToldArmsAreNotRecordedThatIsSaid) {
+  nn::RandomWeights weights(5);
+  nn::SaveWeights(folder_ / "tiny.safetensors", weights, ReadEvacConfig(folder_ / "tiny.yaml"),
+                  {.metadata = {{"arms_read", "told"}}});
+  const CommandResult result =
+      RunCommand(Words("maps", {"--maps-only", "--stride", "1", "--weights", folder_ / "tiny.safetensors"}));
+  EXPECT_EQ(result.exit_code, 0);
+  EXPECT_THAT(result.err, HasSubstr("warning"));
+  EXPECT_THAT(result.err, HasSubstr("where they were is taken"));
+  const CommandResult asked = RunCommand(Words(
+      "asked", {"--maps-only", "--stride", "1", "--weights", folder_ / "tiny.safetensors", "--arms", "measured"}));
+  EXPECT_EQ(asked.err, "");
+  EXPECT_EQ(Files("asked"), Files("maps"));
+}
+
 TEST_F(ImagineCommand, TheVideoShowsEachPictureAboveItsMapAndTheSidecarSaysHowItWasMade) {
   ASSERT_EQ(RunCommand(Frames("out")).exit_code, 0);
   const std::vector<cv::Mat> video = ReadAllFrames(folder_ / "out/imagined.mp4");
