@@ -16,7 +16,7 @@ struct ImagineInputs {
   std::vector<std::string> cameras;  ///< the views, in this order; empty: of head, hand_left, hand_right the first V
   int stride = 0;         ///< every nth recorded step is one frame; 0: as many as make `period_s`
   double period_s = 0.1;  ///< the network's; the released model's, unless its weights say another
-  std::string arms;        ///< told or measured: which of a recording's are the actions; empty: `read_told`
+  std::string arms;       ///< told or measured: which of a recording's are the actions; empty: `read_told`
   bool read_told = false;  ///< the arms are where they were told to be, if the recording says so; else where they were
 };
 
