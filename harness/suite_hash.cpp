@@ -54,6 +54,8 @@ bool IsOfModel(const std::string& line, const Suite& suite) {
   return false;
 }
 
+bool IsOfPolicies(const std::string& line) { return line.starts_with(".policies."); }
+
 /// An initial state is named by its seed and its number: how many there are changes none of them.
 bool SaysHowManyStates(const std::string& line) { return line.starts_with(".initial_states.count="); }
 
@@ -70,11 +72,18 @@ std::vector<fs::path> FoldersWith(const fs::path& recording) {
   return folders;
 }
 
-std::string HashOf(const Config& page, const Suite& suite, bool with_models) {
+std::string FilesOf(const SuitePolicy& policy) {
+  std::ostringstream text;
+  for (std::size_t i = 0; i < policy.files.size(); ++i)
+    text << "file " << i << " of " << policy.name << "@" << policy.checkpoint << " " << HashOfTree(policy.files[i]) << "\n";
+  return text.str();
+}
+
+std::string HashOf(const Config& page, const Suite& suite, bool whole) {
   std::ostringstream text;
   std::istringstream lines(page.Canonical());
   for (std::string line; std::getline(lines, line);) {
-    if (!with_models && (IsOfModel(line, suite) || SaysHowManyStates(line))) continue;
+    if (!whole && (IsOfModel(line, suite) || IsOfPolicies(line) || SaysHowManyStates(line))) continue;
     const bool by_content = StartsWithAny(line, {".recording=", ".tasks."}) || IsHashedByContent(line);
     if (!by_content &&
         !StartsWithAny(line, {".lanes=", ".threads=", ".error_budget=", ".description=", ".transport.deadline_s=",
@@ -86,12 +95,10 @@ std::string HashOf(const Config& page, const Suite& suite, bool with_models) {
     if (!world.profile.empty()) text << "profile " << world.name << " " << HashOfPage(world.profile) << "\n";
   }
   for (const SuiteWorld& world : suite.worlds) {
-    if (world.evac && with_models) text << "evac " << world.name << " " << world.evac->hash << "\n";
+    if (world.evac && whole) text << "evac " << world.name << " " << world.evac->hash << "\n";
   }
   for (const SuitePolicy& policy : suite.policies) {
-    for (std::size_t i = 0; i < policy.files.size(); ++i)
-      text << "file " << i << " of " << policy.name << "@" << policy.checkpoint << " " << HashOfTree(policy.files[i])
-           << "\n";
+    if (whole) text << FilesOf(policy);
   }
   if (suite.recording) {
     for (const fs::path& folder : FoldersWith(*suite.recording)) text << "recording " << HashOfTree(folder) << "\n";
@@ -120,5 +127,13 @@ std::vector<std::string> FilesInNoHash(const Suite& suite, const SuitePolicy& po
 std::string SuiteHash(const Config& page, const Suite& suite) { return HashOf(page, suite, true); }
 
 std::string RealityHash(const Config& page, const Suite& suite) { return HashOf(page, suite, false); }
+
+std::string PolicyHash(const SuitePolicy& policy) {
+  std::ostringstream text;
+  text << policy.name << "@" << policy.checkpoint << "\n";
+  for (const std::string& word : policy.command) text << "word " << word.size() << " " << word << "\n";
+  text << "listens at " << policy.join_url << "\n" << FilesOf(policy);
+  return Sha256Hex(text.str());
+}
 
 }  // namespace evac

@@ -13,9 +13,13 @@ namespace evac {
 /// not what.
 std::string SuiteHash(const Config& page, const Suite& suite);
 
-/// The same without the worlds of type evac and how many initial states there are: suites that differ in these alone
-/// have the same reality, one perhaps less of it.
+/// The same without the worlds of type evac, the policies and how many initial states there are: suites that differ in
+/// these alone have the same reality, and what a policy that both have did in it is the same.
 std::string RealityHash(const Config& page, const Suite& suite);
+
+/// SHA-256 of all that decides what a policy does, as its suite says it: its name and checkpoint, its command or where it
+/// listens, and its `files` by content.
+std::string PolicyHash(const SuitePolicy& policy);
 
 /// The arguments of a policy's command that name files which its `files` do not list. They may decide what it does, and
 /// they may be what it writes: only the suite's author knows.

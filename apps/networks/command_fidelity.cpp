@@ -15,7 +15,7 @@ void AddFidelity(CLI::App& app, ExitCode& exit_code) {
   command->add_option("--parts", arguments->parts, "beside the closed loop, which is always run: open, executed, counterfactual, horizon")
       ->delimiter(',')->capture_default_str();
   command->add_option("--classifier", arguments->classifier, "weights of the judge of imagined clips (docs/classifier_judge.md)");
-  command->add_option("--reality", arguments->reality, "an earlier OUT of the same suite but for its world model, of as many initial states or others: what it saw in the simulated worlds is taken over")
+  command->add_option("--reality", arguments->reality, "an earlier OUT of the same suite, but for its world model, policies and how many initial states: its episodes that would come out the same are taken over")
       ->check(CLI::ExistingDirectory);
   command->add_option("--counterfactual-states", arguments->counterfactual_states, "successes per task that are made to fail")
       ->check(CLI::Range(1, 100000))->capture_default_str();

@@ -35,6 +35,7 @@ class Measuring {
         out_(arguments.out),
         suite_(suite),
         worlds_(WorldsOf(suite_)),
+        subject_(SubjectOf(suite_)),
         model_(ReadEvacConfig(worlds_.model.evac->config)),
         chunk_(static_cast<int>(model_.chunk)),
         judge_(arguments.classifier),
@@ -44,7 +45,8 @@ class Measuring {
   }
 
   /// What would else be found out when reality was already asked.
-  void Check() const {
+  void Check() {
+    if (!arguments_.reality.empty()) shared_ = SharedWith(arguments_.reality, subject_);
     judge_.RequireKnows(suite_.tasks);
     if (Asks(arguments_, "counterfactual")) Counterfactuals({}, replayed_, 1);
   }
@@ -55,8 +57,8 @@ class Measuring {
                                                             .suite_path = fs::absolute(suite_.path).lexically_normal().string(),
                                                             .evac_version = EVAC_VERSION});
     RequireSameParts();
-    StateReality(out_, suite_);
-    TakeRealityOf(store);
+    StateSubject(out_, subject_);
+    TakeOver(store);
     const ExitCode exit_code = Evaluate(suite_, store, {.part_of = "evac fidelity"});
     if (exit_code != ExitCode::kOk) return exit_code;
     OracleJudge oracle(store);  // whatever judges the suite asks for: it says what is true
@@ -160,12 +162,14 @@ class Measuring {
     run.scenes = out_ / "closed";
     return run;
   }
-  ReplayRun ExecutedRun() const { return ReplaysIn("executed", {worlds_.again}); }
+  ReplayRun ExecutedRun() const {
+    ReplayRun run = ReplaysIn("executed", {worlds_.again});
+    if (!shared_.model) run.reality.clear();  // in another model policies chose other actions
+    return run;
+  }
   ReplayRun CounterfactualRun(const evac::Counterfactual& kind) const {
-    const std::string folder = "counterfactual_" + kind.name;
-    ReplayRun run = ReplaysIn(folder, {worlds_.real, worlds_.model});
+    ReplayRun run = ReplaysIn("counterfactual_" + kind.name, {worlds_.real, worlds_.model});
     run.tasks = kind.tasks;
-    run.reality = Earlier(folder);
     return run;
   }
   ReplayRun HorizonRun() const {
@@ -174,12 +178,14 @@ class Measuring {
     run.frames = static_cast<std::size_t>(arguments_.horizon_chunks) * run.frames_per_chunk;
     run.rule = fmt::format("after {} frames", run.frames);
     for (Task& task : run.tasks) task.max_chunks = static_cast<int>(run.frames) / suite_.chunk_size + 1;
-    run.reality = Earlier("horizon");
     return run;
   }
   /// A part in that folder of OUT, every replay of it to its last action.
   ReplayRun ReplaysIn(const std::string& folder, const std::vector<SuiteWorld>& worlds) const {
-    return {.suite = suite_, .folder = out_ / folder, .name = folder, .tasks = replayed_, .worlds = worlds, .rule = kToTheLastAction};
+    ReplayRun run{.suite = suite_, .folder = out_ / folder, .name = folder, .tasks = replayed_, .worlds = worlds, .rule = kToTheLastAction};
+    run.reality = Earlier(folder);
+    run.model_is_the_same = shared_.model;
+    return run;
   }
 
   /// What an earlier call left in OUT goes on as it began, or not at all: found out before hours are spent.
@@ -196,13 +202,14 @@ class Measuring {
     return arguments_.reality.empty() ? fs::path() : fs::path(arguments_.reality) / part;
   }
 
-  void TakeRealityOf(Store& store) const {
+  void TakeOver(Store& store) const {
     if (arguments_.reality.empty()) return;
-    RequireSameReality(arguments_.reality, suite_);
     Declare(suite_, store);
     std::set<EpisodeKey> wanted;
-    for (const SuiteWorld& world : {worlds_.real, worlds_.again}) {
+    for (const SuiteWorld& world : {worlds_.real, worlds_.again, worlds_.model}) {
+      if (world.evac && !shared_.model) continue;
       for (const SuitePolicy& policy : suite_.policies) {
+        if (!shared_.Has(policy.name, policy.checkpoint)) continue;
         for (const Job& job : AllJobs(suite_, world, policy)) wanted.insert(job.key);
       }
     }
@@ -219,6 +226,8 @@ class Measuring {
   fs::path out_;
   Suite suite_;
   FidelityWorlds worlds_;
+  FidelitySubject subject_;
+  SharedSubject shared_ = {};  ///< with the OUT of `--reality`
   nn::ModelConfig model_;
   int chunk_;  ///< K
   FidelityJudge judge_;

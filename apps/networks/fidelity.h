@@ -2,6 +2,7 @@
 
 #include <filesystem>
 #include <functional>
+#include <map>
 #include <memory>
 #include <set>
 #include <span>
@@ -24,7 +25,7 @@ struct FidelityArguments {
   std::vector<std::string> assignments;
   std::vector<std::string> parts = {"closed", "open", "executed", "counterfactual", "horizon"};
   std::string classifier;       ///< weights of the judge of imagined clips
-  std::string reality;          ///< an earlier OUT whose episodes in the simulated worlds are taken over; empty: none
+  std::string reality;          ///< an earlier OUT whose episodes are taken over, where they would come out the same; empty: none
   int counterfactual_states = 10;  ///< successes per task that are made to fail
   int horizon_states = 3;          ///< long rollouts per task
   int horizon_chunks = 30;         ///< of the network's K frames
@@ -67,7 +68,8 @@ struct ReplayRun {
   std::size_t frames = 0;         ///< of long rollouts, of each; 0: they are as long as their actions
   std::size_t frames_per_chunk = 1;  ///< K, to say how many chunks that is
   std::filesystem::path scenes = {};  ///< the run whose first frames imagined episodes start from; empty: this one
-  std::filesystem::path reality = {}; ///< an earlier run whose simulated episodes are taken over; empty: none
+  std::filesystem::path reality = {}; ///< an earlier run whose episodes are taken over: of simulated worlds; empty: none
+  bool model_is_the_same = false;     ///< as that run's: what it imagined is taken over too
   /// Makes a world in the place of apps/factory.h; null, or an answer that is null: the factory does.
   std::function<std::unique_ptr<World>(const SuiteWorld& world)> make = {};
 };
@@ -88,10 +90,24 @@ Number SecondsPerChunk(World& world, std::span<const Replay> replays, int chunk)
 /// How many episodes a part has, and how many of them failed.
 PartEpisodes EpisodesOf(const std::string& part, const Store& store);
 
-/// Says in OUT which reality it is about: the suite without its world model.
-void StateReality(const std::filesystem::path& out, const Suite& suite);
-/// @throws InvalidInput unless `earlier` is an OUT about this suite's reality.
-void RequireSameReality(const std::filesystem::path& earlier, const Suite& suite);
+/// What an OUT is about, by SHA-256: two that are about one reality hold the same episodes of every policy that both have.
+struct FidelitySubject {
+  std::string reality;                          ///< Suite::reality_hash
+  std::string model;                            ///< of what imagines
+  std::map<std::string, std::string> policies;  ///< PolicyHash by NAME@CHECKPOINT
+};
+FidelitySubject SubjectOf(const Suite& suite);
+/// Writes it to OUT/reality.sha256, a line for each hash: the hash, two spaces, what it is of.
+void StateSubject(const std::filesystem::path& out, const FidelitySubject& subject);
+/// Which of a suite's policies an earlier OUT may be taken over of (NAME@CHECKPOINT), and whether its model is the same.
+struct SharedSubject {
+  std::set<std::string> policies;
+  bool model = false;
+  bool Has(const std::string& policy, const std::string& checkpoint) const { return policies.contains(policy + "@" + checkpoint); }
+};
+/// Policies that changed under their name are said to have.
+/// @throws InvalidInput unless `earlier` is an OUT about the same reality, and one policy at least is the same.
+SharedSubject SharedWith(const std::filesystem::path& earlier, const FidelitySubject& subject);
 /// Copies what a run that ended earlier holds of those episodes. No such run: nothing.
 /// @throws InvalidInput if another evac made it.
 void TakeReality(const std::filesystem::path& earlier_run, const std::set<EpisodeKey>& wanted, Store& store);

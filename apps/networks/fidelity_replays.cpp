@@ -117,11 +117,18 @@ void RequireSameActions(const ReplayRun& run, const std::vector<Replay>& replays
   }
 }
 
-/// Of an earlier run's simulated episodes those that played the same actions.
+/// Whether what the earlier run's episodes in a world came to is what this one's would.
+bool IsTheSame(const SuiteWorld& world, const ReplayRun& run) { return !world.evac || run.model_is_the_same; }
+
+bool TakesAny(const ReplayRun& run) {
+  return std::ranges::any_of(run.worlds, [&](const SuiteWorld& world) { return IsTheSame(world, run); });
+}
+
+/// Of an earlier run's episodes that would come out the same those that played the same actions.
 std::set<EpisodeKey> ToTake(const ReplayRun& run, const std::vector<Replay>& replays) {
-  std::set<std::string> simulated;
+  std::set<std::string> same;
   for (const SuiteWorld& world : run.worlds) {
-    if (!world.evac) simulated.insert(world.name);
+    if (IsTheSame(world, run)) same.insert(world.name);
   }
   const auto by_pair = ByPair(replays);
   const Store earlier = Store::Open(run.reality, Store::Mode::kReadOnly);
@@ -129,7 +136,7 @@ std::set<EpisodeKey> ToTake(const ReplayRun& run, const std::vector<Replay>& rep
   int others = 0;
   for (const Episode& episode : earlier.Episodes()) {
     const auto replay = by_pair.find(episode.key.pair);
-    if (IsFailure(episode.stop) || replay == by_pair.end() || !simulated.contains(episode.key.world)) continue;
+    if (IsFailure(episode.stop) || replay == by_pair.end() || !same.contains(episode.key.world)) continue;
     if (Played(earlier, episode, *replay->second))
       keys.insert(episode.key);
     else
@@ -241,7 +248,7 @@ Store RunReplays(const ReplayRun& run, std::vector<Replay> replays) {
   store.RemoveOrphans();
   RequireSameActions(run, replays, store);
   DeclareReplays(run, replays, store);
-  if (IsOfSameReplays(run)) TakeReality(run.reality, ToTake(run, replays), store);
+  if (TakesAny(run) && IsOfSameReplays(run)) TakeReality(run.reality, ToTake(run, replays), store);
   std::optional<Store> scenes;
   if (!run.scenes.empty()) scenes = Store::Open(run.scenes, Store::Mode::kReadOnly);
   int total = 0, missing = 0;

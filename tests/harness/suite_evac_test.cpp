@@ -6,6 +6,7 @@
 
 #include "core/error.h"
 #include "harness/suite.h"
+#include "harness/suite_hash.h"
 #include "tests/support/temp_folder.h"
 
 namespace evac {
@@ -94,14 +95,29 @@ TEST_F(EvacSuite, ItsHashIsOfTheFilesContentAndOfAllThatDecidesAFrame) {
   EXPECT_NE(Read().hash, hash);
 }
 
-TEST_F(EvacSuite, RealityIsTheSameWhateverTheModelAndAnotherWithAnotherWorldPolicyOrState) {
+TEST_F(EvacSuite, RealityIsTheSameWhateverTheModelAndThePoliciesAndAnotherWithAnotherWorldOrState) {
   const Suite suite = Read();
   EXPECT_NE(suite.reality_hash, suite.hash);
   EXPECT_EQ(Read({"worlds.0.steps=9"}).reality_hash, suite.reality_hash);
-  for (const char* change : {"chunk_size=5", "seeds=[2]", "policies.0.checkpoint=other"})
-    EXPECT_NE(Read({change}).reality_hash, suite.reality_hash) << change;
+  for (const char* change : {"chunk_size=5", "seeds=[2]"}) EXPECT_NE(Read({change}).reality_hash, suite.reality_hash) << change;
+  EXPECT_EQ(Read({"policies.0.checkpoint=other"}).reality_hash, suite.reality_hash);
   Write("w.safetensors", "other weights");
   EXPECT_EQ(Read().reality_hash, suite.reality_hash);
+}
+
+TEST_F(EvacSuite, APolicyIsTheSameAsLongAsItsNameItsCommandAndItsFilesAre) {
+  Write("p.safetensors", "weights");
+  const std::string file = (folder_ / "p.safetensors").string(), files = "policies.0.files=[" + file + "]";
+  const auto hash = [&](const std::vector<std::string>& changes) { return PolicyHash(Read(changes).policies.at(0)); };
+  const std::string before = hash({files});
+  EXPECT_EQ(before.size(), 64u);
+  EXPECT_EQ(hash({files, "chunk_size=5"}), before) << "the suite around it is another";
+  EXPECT_NE(hash({}), before);
+  EXPECT_NE(hash({files, "policies.0.name=other"}), before);
+  EXPECT_NE(hash({files, "policies.0.checkpoint=other"}), before);
+  EXPECT_NE(hash({files, "policies.0.command=[evac-policy, sine]"}), hash({files, "policies.0.command=[evac-policy sine]"}));
+  Write("p.safetensors", "other weights");
+  EXPECT_NE(hash({files}), before);
 }
 
 TEST_F(EvacSuite, RealityIsTheSameHoweverManyStatesOfASeedAreAsked) {

@@ -10,6 +10,7 @@
 
 #include "core/file.h"
 #include "core/store.h"
+#include "harness/suite.h"
 #include "tests/support/command.h"
 #include "tests/support/synthetic_recording.h"
 #include "tests/support/temp_folder.h"
@@ -24,6 +25,8 @@ namespace {
 namespace fs = std::filesystem;
 using testing::HasSubstr;
 
+const std::string kSuite = EVAC_SOURCE_DIR "/tests/system/fidelity.yaml";
+
 /// A world model of random weights, asked how true it is.
 class FidelityRun : public testing::Test {
  protected:
@@ -35,7 +38,7 @@ class FidelityRun : public testing::Test {
   std::vector<std::string> Words(const fs::path& out) const {
     return {Binary("evac"),
             "fidelity",
-            EVAC_SOURCE_DIR "/tests/system/fidelity.yaml",
+            kSuite,
             "--out",
             out.string(),
             "--set",
@@ -48,6 +51,19 @@ class FidelityRun : public testing::Test {
             "3"};
   }
 
+  /// The same suite with a second policy, which misses.
+  std::string SuiteOfTwoPolicies() const {
+    std::string text = ReadFile(kSuite);
+    const auto replace = [&](const std::string& from, const std::string& to) {
+      for (std::size_t at = 0; (at = text.find(from, at)) != std::string::npos; at += to.size()) text.replace(at, from.size(), to);
+    };
+    replace("../../", EVAC_SOURCE_DIR "/");
+    replace("evac_small.yaml", EVAC_SOURCE_DIR "/tests/system/evac_small.yaml");
+    replace("policies:\n", "policies:\n  - {name: visual_pick, checkpoint: poor, command: [evac-policy, visual_pick, --noise-m, \"0.08\", --retries, \"0\"]}\n");
+    WriteFileAtomically(folder_ / "two.yaml", text);
+    return (folder_ / "two.yaml").string();
+  }
+
   const TempFolder folder_;
   const fs::path weights_ = folder_ / "small.safetensors";
 };
@@ -57,6 +73,12 @@ nlohmann::json Numbers(const fs::path& out) {
   nlohmann::json json = nlohmann::json::parse(ReadFile(out / "fidelity.json"));
   json.erase("seconds_per_chunk");
   return json;
+}
+
+void PretendItWasAboutAnotherModel(const fs::path& out) {
+  std::string subject = ReadFile(out / "reality.sha256");
+  subject.replace(subject.find("  model\n") - 64, 64, std::string(64, '0'));
+  WriteFileAtomically(out / "reality.sha256", subject);
 }
 
 /// Where the bottle was in reality before anything was done, in a part's one episode.
@@ -135,8 +157,9 @@ TEST_F(FidelityRun, AsksEveryPartAndEndsInTheSameNumbersWhenItWasKilled) {
   EXPECT_EQ(Numbers(killed), numbers);
   EXPECT_EQ(ReadFile(killed / "episodes.csv"), ReadFile(whole / "episodes.csv"));
 
-  // Asked about the same reality again, it does not wait for that again, and ends in the same numbers.
+  // Asked about the same reality again, it does not wait for that again, imagines anew, and ends in the same numbers.
   const fs::path again = folder_ / "again";
+  PretendItWasAboutAnotherModel(whole);
   std::vector<std::string> words = Words(again);
   words.insert(words.end(), {"--reality", whole.string()});
   const CommandResult taken = RunCommand(words);
@@ -173,7 +196,7 @@ TEST_F(FidelityRun, ReplaysInRealityStartFromTheSceneThatTheirActionsAreOf) {
   const CommandResult later = RunCommand(words);
   ASSERT_EQ(later.exit_code, 0) << later.err;
   EXPECT_THAT(later.err, HasSubstr("counterfactual_shifted: its replays began in other scenes than their actions are of"));
-  EXPECT_THAT(later.err, HasSubstr("/counterfactual_never_closes: 1 episodes taken over"));
+  EXPECT_THAT(later.err, HasSubstr("/counterfactual_never_closes: 2 episodes taken over")) << "in reality and in the model, which is the same";
   EXPECT_TRUE(FirstPlaceOfTheBottleIn(folder_ / "later" / "counterfactual_shifted").isApprox(bottle, 1e-6));
 }
 
@@ -209,15 +232,52 @@ TEST_F(FidelityRun, AClassifierJudgesTheClipsAndSaysHowFarItIs) {
   EXPECT_EQ(Numbers(folder_ / "out"), numbers);
 }
 
-TEST_F(FidelityRun, TakesOverNoOtherReality) {
-  const fs::path earlier = folder_ / "earlier";
+/// A suite to which a checkpoint is added asks for that one alone, and one of fewer policies for nothing.
+TEST_F(FidelityRun, TakesOverWhatPoliciesThatBothSuitesHaveDid) {
+  const fs::path one = folder_ / "one", two = folder_ / "two", back = folder_ / "back";
+  const auto words = [&](const fs::path& out, const std::string& suite, const fs::path& reality) {
+    std::vector<std::string> words = Words(out);
+    words[2] = suite;
+    words.insert(words.end(), {"--parts", "open,executed"});
+    if (!reality.empty()) words.insert(words.end(), {"--reality", reality.string()});
+    return words;
+  };
+  const CommandResult first = RunCommand(words(one, kSuite, ""));
+  ASSERT_EQ(first.exit_code, 0) << first.err;
+
+  const CommandResult second = RunCommand(words(two, SuiteOfTwoPolicies(), one));
+  ASSERT_EQ(second.exit_code, 0) << second.err;
+  for (const std::string part : {"/closed: 3 ", "/open: 1 ", "/executed: 1 "})
+    EXPECT_THAT(second.err, HasSubstr(one.string() + part + "episodes taken over"));
+  EXPECT_EQ(Store::Open(two / "closed", Store::Mode::kReadOnly).Episodes().size(), 6u);
+  EXPECT_THAT(ReadFile(two / "episodes.csv"), HasSubstr("open_loop,take_bottle,visual_pick,poor,3-0000,1,"));
+
+  const CommandResult third = RunCommand(words(back, kSuite, two));
+  ASSERT_EQ(third.exit_code, 0) << third.err;
+  EXPECT_THAT(third.err, HasSubstr(two.string() + "/closed: 3 episodes taken over"));
+  EXPECT_EQ(Store::Open(back / "closed", Store::Mode::kReadOnly).Policies().size(), 1u) << "not the one it does not have";
+  EXPECT_EQ(ReadFile(back / "episodes.csv"), ReadFile(one / "episodes.csv"));
+  EXPECT_EQ(Numbers(back), Numbers(one));
+}
+
+TEST_F(FidelityRun, TakesOverNoOtherRealityAndNoPolicyThatChangedUnderItsName) {
+  const fs::path earlier = folder_ / "earlier", out = folder_ / "out";
   fs::create_directories(earlier);
-  WriteFileAtomically(earlier / "reality.sha256", std::string(64, '0') + "\n");
-  std::vector<std::string> words = Words(folder_ / "out");
+  std::vector<std::string> words = Words(out);
   words.insert(words.end(), {"--reality", earlier.string()});
-  const CommandResult result = RunCommand(words);
-  EXPECT_EQ(result.exit_code, 2) << result.err;
-  EXPECT_THAT(result.err, HasSubstr("is about another reality (000000000000…"));
+  const auto complaint = [&](const std::string& about) {
+    WriteFileAtomically(earlier / "reality.sha256", about);
+    const CommandResult result = RunCommand(words);
+    EXPECT_EQ(result.exit_code, 2) << result.err;
+    EXPECT_FALSE(fs::exists(out)) << "before anything is written";
+    return result.err;
+  };
+  const std::string zeros(64, '0'), reality = ReadSuite(kSuite, {"worlds.2.weights=" + weights_.string()}).reality_hash;
+  EXPECT_THAT(complaint(zeros + "\n"), HasSubstr("reality.sha256:1: found '000"));
+  EXPECT_THAT(complaint(zeros + "  reality\n"), HasSubstr("is about another reality (000000000000…"));
+  const std::string changed = complaint(reality + "  reality\n" + zeros + "  policy visual_pick@good\n");
+  EXPECT_THAT(changed, HasSubstr("visual_pick@good was another policy there (its command or files): not taken over"));
+  EXPECT_THAT(changed, HasSubstr("has none of this suite's policies as they are now: there is nothing to take over"));
 }
 
 TEST_F(FidelityRun, LooksAtTheClassifierBeforeItAsksReality) {
