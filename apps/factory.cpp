@@ -142,12 +142,12 @@ RunningPolicy::RunningPolicy(const SuitePolicy& policy, const Suite& suite, cons
   options.interrupted = std::move(interrupted);
   options.deadline_s = suite.transport.deadline_s;
   options.repeat_after_s = suite.transport.repeat_after_s;
+  options.start_s = suite.transport.start_s;
   options.keep_longer_chunks = suite.latency.kind != PolicyLatency::Kind::kOff;
   options.raw_images = suite.transport.images == "raw";
   if (policy.command.empty()) {
     options.address = {policy.join_url, policy.join_token};
   } else {
-    options.start_s = suite.transport.start_s;
     options.address = NewAddress(fmt::format("{} {}@{}", fs::absolute(run_folder).string(), policy.name, policy.checkpoint));
     process_.emplace(ProcessOptions(policy, suite, run_folder, options.address));
     options.why_gone = [this] { return process_->WhyGone(); };

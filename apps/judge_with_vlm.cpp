@@ -100,6 +100,11 @@ void ShowProgress(const Verdict& verdict) {
 ExitCode JudgeWithVlm(const VlmJudgeArguments& arguments) {
   const VlmConfig config = VlmConfig::FromFile(arguments.config);
   Store store = Store::Open(arguments.run, Store::Mode::kReadWrite);
+  for (const Task& task : store.Tasks()) {
+    if (task.rubric.version == kNoRubric)
+      throw InvalidInput("{}: task {} has no rubric: nobody said what success is; wanted a run of a suite with `rubric: {{success: …}}` "
+                         "beside its `recording` (docs/suite.md)", arguments.run.string(), task.id);
+  }
   if (arguments.dry_run) return SayWhatItWouldCost(config, store, arguments);
   CallCache cache(store.folder() / CallCache::kFile);
   VlmClient client(ClientOptions(config, arguments.offline));

@@ -26,10 +26,14 @@ Recording ReadAt(const Suite& suite, const fs::path& folder) {
 
 Task TaskOf(const Suite& suite, const Recording& recording) {
   Task task = TaskFromRecording(recording);
+  const RecordedTask& said = suite.recorded_task;
   const int steps = task.max_chunks;  // it counts them so, whatever the suite's chunks
-  task.max_chunks =
-      suite.recorded_chunks > 0 ? suite.recorded_chunks : (steps + suite.chunk_size - 1) / suite.chunk_size;
-  if (suite.recorded_still) task.still = *suite.recorded_still;
+  task.max_chunks = said.max_chunks > 0 ? said.max_chunks : (steps + suite.chunk_size - 1) / suite.chunk_size;
+  if (steps < suite.chunk_size) task.workspace_m = Task{}.workspace_m;  // a beginning says nothing of where the arms will go
+  if (said.workspace_m) task.workspace_m = *said.workspace_m;
+  if (said.instruction) task.instruction = *said.instruction;
+  if (said.rubric) task.rubric = *said.rubric;
+  if (said.still) task.still = *said.still;
   return task;
 }
 
@@ -101,7 +105,8 @@ class RecordedStates {
     if (suite_.tasks.empty()) {
       suite_.tasks = {TaskOf(suite_, recording)};
       suite_.tasks.front().id = task_;
-      suite_.tasks.front().instruction = fmt::format("Do what was recorded in {}.", task_);
+      if (!suite_.recorded_task.instruction)
+        suite_.tasks.front().instruction = fmt::format("Do what was recorded in {}.", task_);
     }
     Task& task = suite_.tasks.front();
     if (const std::string why = WhatDiffers(recording, task); !why.empty())

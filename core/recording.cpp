@@ -118,7 +118,7 @@ Task TaskFromRecording(const Recording& recording, double margin_m) {
   }
   task.workspace_m.min().array() -= margin_m;
   task.workspace_m.max().array() += margin_m;
-  task.rubric.version = "none";
+  task.rubric.version = kNoRubric;
   task.rubric.success = "A recording has no rubric of its own.";
   return task;
 }

@@ -13,6 +13,8 @@ namespace fs = std::filesystem;
 constexpr double kAgibotPeriod_s = 1.0 / 30;
 constexpr double kRateTolerance = 0.02;  // time stamps are rounded to a video's time base
 
+constexpr double kMoreFrames = 1.2;      // of a step each: a video may go on a little longer than the arms' track
+
 /// What one walk through a video tells.
 struct VideoFacts {
   cv::Mat first;
@@ -20,7 +22,7 @@ struct VideoFacts {
   double period_s = 0;  ///< mean; 0 if there is one frame
 };
 
-/// @param count  false: stop after two frames, which tell the rate.
+/// @param count  false: stop after two frames; the file says the mean rate, where it does not they do.
 VideoFacts LookThrough(const fs::path& path, bool count) {
   VideoReader video(path);
   VideoFacts facts{video.Next(), 0, 0};
@@ -33,6 +35,7 @@ VideoFacts LookThrough(const fs::path& path, bool count) {
     ++facts.frames;
   }
   if (facts.frames > 1) facts.period_s = (end_s - begin_s) / static_cast<double>(facts.frames - 1);
+  if (!count && facts.frames > 1 && video.mean_period_s() > 0) facts.period_s = video.mean_period_s();
   return facts;
 }
 
@@ -95,12 +98,17 @@ Camera ReadCamera(const Context& context, const std::string& name, const cv::Mat
   return camera;
 }
 
-/// @throws InvalidInput if a video is too short for the steps, or its rate differs from that of the videos before it.
+/// @throws InvalidInput if a video is too short or far too long for the steps, or its rate differs from that of the videos before it.
 void CheckVideo(const VideoFacts& facts, const fs::path& path, const Context& context, double period_s) {
   if (context.options.count_video_frames && facts.frames < context.arms.size()) {
     throw InvalidInput("{}: {} frames, wanted one for each of the {} steps of {}", path.string(), facts.frames,
                        context.arms.size(), context.folders.proprio.string())
         .Called("short_video");
+  }
+  if (context.options.count_video_frames && static_cast<double>(facts.frames) > kMoreFrames * static_cast<double>(context.arms.size())) {
+    throw InvalidInput("{}: {} frames for the {} steps of {}, wanted one for each: arms recorded at another rate than the video?",
+                       path.string(), facts.frames, context.arms.size(), context.folders.proprio.string())
+        .Called("other_rate");
   }
   if (period_s > 0 && std::abs(facts.period_s / period_s - 1) > kRateTolerance) {
     throw InvalidInput("{}: {:.2f} frames per second, wanted {:.2f} as the video before it", path.string(),
@@ -142,12 +150,7 @@ void AddStillCamera(const Context& context, const std::vector<std::string>& name
 Recording ReadClipLayout(const ClipFolders& folders, const RecordingOptions& options) {
   std::vector<Arms> arms = Calling("broken_track", [&] { return ReadProprio(folders.proprio); });
   std::vector<Arms> told;
-  if (options.read_told) told = Calling("broken_track", [&] { return ReadTold(folders.proprio); });
-  if (!told.empty() && told.size() != arms.size()) {
-    throw InvalidInput("{}: action/end/position has {} steps, wanted the {} of state/end/position",
-                       folders.proprio.string(), told.size(), arms.size())
-        .Called("broken_track");
-  }
+  if (options.read_told) told = ReadToldOf(folders.proprio, arms.size());
   const Context context{folders, options, arms};
   const std::vector<std::string> names = ChooseCameras(folders, options);
   Recording recording;

@@ -110,6 +110,7 @@ Recording ReadRecordingFiles(const RecordingFiles& files, const RecordingOptions
   recording.first_images = {ReadPng(files.frame)};
   recording.cameras = {ReadHead(files, arms, recording.first_images[0].size(), options)};
   recording.arms = EveryNth(arms, options.every_nth);
+  if (options.read_told && !npy) recording.told = EveryNth(ReadToldOf(files.actions, arms.size()), options.every_nth);
   const double found_period_s = npy ? kExamplePeriod_s : kAgibotPeriod_s;
   recording.period_s = (options.recorded_period_s > 0 ? options.recorded_period_s : found_period_s) * options.every_nth;
   recording.source = fmt::format("{}, {}", files.frame.string(), files.actions.string());

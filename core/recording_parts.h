@@ -55,6 +55,8 @@ std::vector<Arms> ReadProprio(const std::filesystem::path& path);
 /// The same of action/effector/position (0 open … 1 closed), action/end/position and action/end/orientation: where the
 /// arms were told to be at each step. @returns nothing if the file has no such groups.
 std::vector<Arms> ReadTold(const std::filesystem::path& path);
+/// The same beside a track of so many measured steps. @throws Error called broken_track, also where it has other ones.
+std::vector<Arms> ReadToldOf(const std::filesystem::path& path, std::size_t steps);
 /// HDF5 keeps state of its own, for the whole process: whoever calls it holds this.
 std::unique_lock<std::mutex> LockHdf5();
 /// A robot without a left arm: it lies at the base's origin, unturned, at every step, where no gripper can be. A camera

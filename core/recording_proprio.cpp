@@ -204,4 +204,11 @@ std::vector<Arms> ReadTold(const fs::path& path) {
   });
 }
 
+std::vector<Arms> ReadToldOf(const fs::path& path, std::size_t steps) {
+  std::vector<Arms> told = Calling("broken_track", [&] { return ReadTold(path); });
+  if (told.empty() || told.size() == steps) return told;
+  throw InvalidInput("{}: action/end/position has {} steps, wanted the {} of state/end/position", path.string(), told.size(), steps)
+      .Called("broken_track");
+}
+
 }  // namespace evac

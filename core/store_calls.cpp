@@ -37,6 +37,7 @@ std::vector<CallTotals> TotalsOfCalls(const std::filesystem::path& run) {
   const std::filesystem::path file = run / CallCache::kFile;
   if (!std::filesystem::exists(file)) return {};
   sqlite::Connection connection = sqlite::Connection::OpenReadOnly(file);
+  if (Pragma(connection, "SELECT count(*) FROM sqlite_schema") == 0) return {};  // a judge that was stopped as it began
   Check(connection, file);
   sqlite::Statement row = connection.Query(
       "SELECT judge, status, count(*), sum(attempts), sum(prompt_tokens), sum(completion_tokens), sum(latency_ms) "

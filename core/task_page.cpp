@@ -116,13 +116,6 @@ std::vector<Camera> ReadCameras(const Config& page) {
   return cameras;
 }
 
-Eigen::AlignedBox3d ReadWorkspace(const Config& page) {
-  page.AllowOnly({"min", "max"});
-  const Eigen::AlignedBox3d workspace_m(ReadVector(page, "min"), ReadVector(page, "max"));
-  page.Require(!workspace_m.isEmpty(), "max", "no coordinate below that of min");
-  return workspace_m;
-}
-
 std::optional<double> ReadBound(const Config& page, const std::string& key) {
   if (!page.Has(key)) return std::nullopt;
   return page.Get<double>(key);
@@ -204,6 +197,31 @@ Task ReadTask(const Config& page) {
 }
 
 }  // namespace
+
+Eigen::AlignedBox3d ReadWorkspace(const Config& page) {
+  page.AllowOnly({"min", "max"});
+  const Eigen::AlignedBox3d workspace_m(ReadVector(page, "min"), ReadVector(page, "max"));
+  page.Require(!workspace_m.isEmpty(), "max", "no coordinate below that of min");
+  return workspace_m;
+}
+
+Rubric ReadRubricInWords(const Config& page) {
+  page.AllowOnly({"version", "success", "stages"});
+  Rubric rubric;
+  rubric.version = page.Has("version") ? ReadText(page, "version") : "1";
+  page.Require(rubric.version != kNoRubric, "version", std::string("another word than ") + kNoRubric);
+  rubric.success = ReadText(page, "success");
+  if (!page.Has("stages")) return rubric;
+  std::set<std::string> names;
+  for (const Config& item : page.List("stages")) {
+    item.AllowOnly({"name", "description"});
+    Stage& stage = rubric.stages.emplace_back();
+    stage.name = ReadName(item, "name");
+    stage.description = ReadText(item, "description");
+    item.Require(names.insert(rubric.stages.back().name).second, "name", "a name that no other stage has");
+  }
+  return rubric;
+}
 
 StillRule ReadStillRule(const Config& page, const StillRule& otherwise) {
   page.AllowOnly({"enabled", "translation_m", "rotation_rad", "closure", "dwell_chunks", "min_chunks"});

@@ -19,4 +19,11 @@ Task ParseTaskPage(const std::string& text, const std::filesystem::path& path);
 /// @throws InvalidInput naming file, line and field: an unknown one, or a number out of its range.
 StillRule ReadStillRule(const Config& page, const StillRule& otherwise);
 
+/// A rubric that people and models read, where no physics is to be asked: `success`, and if there are any `stages`, each of
+/// a name and a description. @throws InvalidInput as above
+Rubric ReadRubricInWords(const Config& page);
+
+/// A box of the base frame: `min` and `max`, metres. @throws InvalidInput as above
+Eigen::AlignedBox3d ReadWorkspace(const Config& page);
+
 }  // namespace evac

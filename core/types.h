@@ -103,6 +103,9 @@ struct Stage {
   bool at_end = false;     ///< must (also) hold at the last frame
 };
 
+/// The version of a rubric that nobody wrote: what success is was not said.
+inline constexpr const char* kNoRubric = "none";
+
 struct Rubric {
   std::string version;
   std::string success;  ///< one sentence: what a human calls success

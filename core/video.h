@@ -63,6 +63,8 @@ class VideoReader {
   bool Skip();
   /// How many frames the file says it has; where it says nothing, 0. One that has fewer is an Error at its end.
   int frames() const;
+  /// Seconds between two frames on average, as the file says; where it says nothing, 0.
+  double mean_period_s() const;
   /// Presentation time of the frame last returned, seconds.
   double time_s() const;
   int width_px() const;

@@ -175,6 +175,10 @@ bool VideoReader::Skip() { return decoder_->Decode(); }
 int VideoReader::frames() const {
   return avformat_index_get_entries_count(decoder_->input_->streams[decoder_->stream_]);
 }
+double VideoReader::mean_period_s() const {
+  const AVRational rate_hz = decoder_->input_->streams[decoder_->stream_]->avg_frame_rate;
+  return rate_hz.num > 0 && rate_hz.den > 0 ? static_cast<double>(rate_hz.den) / rate_hz.num : 0;
+}
 double VideoReader::time_s() const { return decoder_->time_s_; }
 int VideoReader::width_px() const { return decoder_->rgb_ ? decoder_->rgb_->width : decoder_->codec_->width; }
 int VideoReader::height_px() const { return decoder_->rgb_ ? decoder_->rgb_->height : decoder_->codec_->height; }

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include <algorithm>
 #include <map>
 #include <set>
 #include <tuple>
@@ -12,6 +13,7 @@
 #include "core/file.h"
 #include "core/hash.h"
 #include "core/store.h"
+#include "core/store_lock.h"
 
 namespace evac {
 namespace {
@@ -30,17 +32,27 @@ std::vector<Store> OpenAll(const std::vector<fs::path>& shards) {
   return stores;
 }
 
+std::string TextOf(const Eigen::Isometry3d& pose) {
+  const Eigen::Matrix4d& numbers = pose.matrix();
+  return Sha256Hex({reinterpret_cast<const char*>(numbers.data()), sizeof(double) * 16});
+}
+
+std::string TextOf(const Arms& arms) {
+  std::string text;
+  for (const ArmState& arm : arms) text += TextOf(arm.base_from_gripper) + fmt::format("{} ", arm.closure);
+  return text;
+}
+
 /// All that makes an episode what it is, in one text.
 std::string Fingerprint(const Store& store, Episode episode) {
   store.LoadSteps(episode);
   std::string text =
       fmt::format("{} {} {} {}", episode.chunks, Name(episode.stop), episode.stop_reason, episode.video_sha256);
-  for (const Arms& arms : episode.commands) {
-    for (const ArmState& arm : arms) {
-      const Eigen::Matrix4d pose = arm.base_from_gripper.matrix();
-      text += Sha256Hex({reinterpret_cast<const char*>(pose.data()), sizeof(double) * 16}) +
-              fmt::format("{} ", arm.closure);
-    }
+  for (const Arms& arms : episode.commands) text += TextOf(arms);
+  // What was measured, and what judges of unfilmed episodes read.
+  for (const Observation& observation : episode.observations) text += TextOf(observation.arms);
+  for (const PrivilegedFrame& frame : store.LoadPrivileged(episode.key.Id())) {
+    for (const PrivilegedFrame::Body& body : frame.bodies) text += body.name + TextOf(body.base_from_body);
   }
   return text;
 }
@@ -132,28 +144,67 @@ std::vector<Verdict> VerdictsOf(const Store& store, const std::set<std::string>&
   return verdicts;
 }
 
+/// Who says it, and of what. Of what one speaker said the last counts.
+using Speaker = std::pair<std::string, std::string>;
+Speaker SpeakerOf(const Verdict& verdict) { return {verdict.episode_id, verdict.judge}; }
+
+std::map<Speaker, std::vector<Verdict>> BySpeaker(const std::vector<Verdict>& verdicts) {
+  std::map<Speaker, std::vector<Verdict>> by_speaker;
+  for (const Verdict& verdict : verdicts) by_speaker[SpeakerOf(verdict)].push_back(verdict);
+  return by_speaker;
+}
+
+bool SayAlike(const Verdict& one, const Verdict& other) {
+  const auto words = [](const Verdict& v) { return std::tuple(v.label, v.probability, v.stages, v.reason, v.rubric_version); };
+  return words(one) == words(other);
+}
+
+/// How many of a speaker's verdicts are there already: those with which both begin, or all if what is there ends with them.
+std::ptrdiff_t SaidAlready(const std::vector<Verdict>& there, const std::vector<Verdict>& verdicts) {
+  const auto count = std::ssize(verdicts);
+  const bool at_the_end = std::ssize(there) >= count && std::equal(verdicts.begin(), verdicts.end(), there.end() - count, SayAlike);
+  return at_the_end ? count : std::ranges::mismatch(verdicts, there, SayAlike).in1 - verdicts.begin();
+}
+
 /// What was said of those episodes, in its order, and after what others said; what another said alike is said once.
 void AddWhatWasNotSaid(const Store& from, const std::set<std::string>& episodes, Store& to) {
-  const auto words = [](const Verdict& v) {
-    return std::tuple(v.episode_id, v.judge, v.label, v.probability, v.stages, v.reason, v.rubric_version);
-  };
-  std::set<decltype(words(Verdict{}))> said;
-  for (const Verdict& verdict : to.Verdicts()) said.insert(words(verdict));
   std::vector<Verdict> verdicts = VerdictsOf(from, episodes);
-  std::erase_if(verdicts, [&](const Verdict& verdict) { return said.contains(words(verdict)); });
+  const auto there = BySpeaker(to.Verdicts());
+  std::map<Speaker, std::ptrdiff_t> said;
+  for (const auto& [speaker, all] : BySpeaker(verdicts)) {
+    if (const auto known = there.find(speaker); known != there.end()) said[speaker] = SaidAlready(known->second, all);
+  }
+  std::erase_if(verdicts, [&](const Verdict& verdict) { return said[SpeakerOf(verdict)]-- > 0; });
   to.AddVerdicts(verdicts);
 }
 
-/// Imported trials, those of the first shard that has them.
+auto KeyOf(const RealTrial& t) { return std::tuple(t.task, t.initial_state, t.policy, t.checkpoint, t.trial); }
+
+/// @throws InvalidInput naming all trials of which two shards say otherwise: two lists may both count from one
+void RequireSameTrials(const std::vector<Store>& stores, const std::vector<fs::path>& shards) {
+  std::map<decltype(KeyOf(RealTrial{})), std::pair<std::size_t, RealTrial>> first;
+  std::vector<std::string> disagreements;
+  for (std::size_t s = 0; s < stores.size(); ++s) {
+    for (const RealTrial& trial : stores[s].RealTrials()) {
+      const auto& [shard, known] = first.try_emplace(KeyOf(trial), s, trial).first->second;
+      if (known.outcome == trial.outcome && known.video == trial.video) continue;
+      disagreements.push_back(fmt::format("{} {} {}@{} trial {}: {} ({}) and {} ({})", trial.task, trial.initial_state, trial.policy,
+                                          trial.checkpoint, trial.trial, known.source, shards[shard].string(), trial.source,
+                                          shards[s].string()));
+    }
+  }
+  if (!disagreements.empty())
+    throw InvalidInput("{} real trials are not the same in all shards that hold them; nothing was merged (number them apart, "
+                       "column trial, and import again):\n  {}", disagreements.size(), fmt::join(disagreements, "\n  "));
+}
+
+/// Imported trials that are not there yet.
 void CopyRealTrials(const Store& from, Store& to) {
-  std::set<std::tuple<std::string, std::string, std::string, std::string, std::int64_t>> known;
-  const auto key = [](const RealTrial& t) {
-    return std::tuple(t.task, t.initial_state, t.policy, t.checkpoint, t.trial);
-  };
-  for (const RealTrial& trial : to.RealTrials()) known.insert(key(trial));
+  std::set<decltype(KeyOf(RealTrial{}))> known;
+  for (const RealTrial& trial : to.RealTrials()) known.insert(KeyOf(trial));
   std::vector<RealTrial> fresh;
   for (const RealTrial& trial : from.RealTrials()) {
-    if (!known.insert(key(trial)).second) continue;
+    if (!known.insert(KeyOf(trial)).second) continue;
     fresh.push_back(trial);
     if (trial.video.empty()) continue;
     MakeFolders((to.folder() / trial.video).parent_path());
@@ -188,7 +239,13 @@ MergeSummary MergeRuns(const std::vector<fs::path>& shards, const fs::path& want
   if (fs::exists(out)) throw InvalidInput("{}: is there already, wanted a new folder for the merged run", out.string());
   const std::vector<Store> stores = OpenAll(shards);
   const Choice choice = Choose(stores, shards);
+  RequireSameTrials(stores, shards);
   const fs::path part = out.string() + ".tmp";
+  for (const fs::path& shard : shards) {
+    if (fs::exists(part) && fs::equivalent(shard, part))
+      throw InvalidInput("{}: is where {} would be made, wanted another name for the merged run", shard.string(), out.string());
+  }
+  const RunLock lock(out.string() + ".lock");
   fs::remove_all(part);
   {
     Store merged = Store::CreateOrContinue(part, stores.front().run());
@@ -200,6 +257,7 @@ MergeSummary MergeRuns(const std::vector<fs::path>& shards, const fs::path& want
     for (std::size_t s = 0; s < stores.size(); ++s) AddWhatWasNotSaid(stores[s], choice.judged[s], merged);
   }
   fs::rename(part, out);
+  fs::remove(out.string() + ".lock");
   std::size_t count = 0;
   for (const std::vector<Episode>& taken : choice.episodes) count += taken.size();
   return {.episodes = static_cast<int>(count), .duplicates = choice.duplicates};
@@ -209,11 +267,11 @@ int TakeEpisodes(const Store& from, const std::function<bool(const EpisodeKey&)>
   std::vector<Episode> episodes = from.Episodes();
   std::erase_if(episodes, [&](const Episode& episode) { return IsFailure(episode.stop) || !wanted(episode.key); });
   TakeInitialScenes(from, episodes, to);
-  std::erase_if(episodes, [&](const Episode& episode) { return to.Has(episode.key); });
-  std::set<std::string> taken;
+  std::set<std::string> taken;  // also those that a call which was killed before it came to their verdicts took
   for (const Episode& episode : episodes) taken.insert(episode.key.Id());
+  std::erase_if(episodes, [&](const Episode& episode) { return to.Has(episode.key); });
   CopyEpisodes(episodes, from, to);
-  to.AddVerdicts(VerdictsOf(from, taken));
+  AddWhatWasNotSaid(from, taken, to);
   return static_cast<int>(episodes.size());
 }
 

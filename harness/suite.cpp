@@ -137,6 +137,7 @@ Transport ReadTransport(const Config& suite) {
   transport.images = page.Get<std::string>("images", transport.images);
   page.Require(transport.deadline_s > 0, "deadline_s", "more than 0 s");
   page.Require(transport.repeat_after_s > 0, "repeat_after_s", "more than 0 s");
+  page.Require(transport.start_s > 0, "start_s", "more than 0 s");
   page.Require(transport.images == "jpeg" || transport.images == "raw", "images", "jpeg or raw");
   return transport;
 }
@@ -166,7 +167,7 @@ void ReadPolicySection(const Config& suite_page, Suite& suite) {
 
 VideoOptions ReadVideo(const Config& suite) {
   VideoOptions video;
-  video.scale = 4;
+  video.scale = suite.Has("recording") ? 1 : 4;  // pictures of a desk's simulation are small, those of a robot's cameras are not
   if (!suite.Has("video")) return video;
   const Config page = suite.Section("video");
   page.AllowOnly({"crf", "preset", "scale"});
@@ -253,10 +254,22 @@ void CheckWhole(const Suite& suite, const Config& page) {
   }
 }
 
+RecordedTask ReadRecordedTask(const Config& page) {
+  RecordedTask task;
+  if (page.Has("instruction")) task.instruction = page.Get<std::string>("instruction");
+  page.Require(!task.instruction || !task.instruction->empty(), "instruction", "what is to be done, in words");
+  if (page.Has("rubric")) task.rubric = ReadRubricInWords(page.Section("rubric"));
+  if (page.Has("workspace_m")) task.workspace_m = ReadWorkspace(page.Section("workspace_m"));
+  if (page.Has("still")) task.still = ReadStillRule(page.Section("still"), StillRule{});
+  task.max_chunks = page.Get<int>("max_chunks", 0);
+  page.Require(!page.Has("max_chunks") || task.max_chunks >= 1, "max_chunks", "at least 1");
+  return task;
+}
+
 Suite Build(const Config& page) {
   page.AllowOnly({"suite", "description", "recording", "worlds", "tasks", "policies", "seeds", "initial_states",
-                  "chunk_size", "lanes", "threads", "error_budget", "image", "still", "max_chunks", "judges", "video",
-                  "transport", "policy"});
+                  "chunk_size", "lanes", "threads", "error_budget", "image", "still", "max_chunks", "instruction", "rubric",
+                  "workspace_m", "judges", "video", "transport", "policy"});
   Suite suite;
   suite.name = NameField(page, "suite");
   suite.path = page.file();
@@ -266,11 +279,10 @@ Suite Build(const Config& page) {
   if (page.Has("recording")) suite.recording = page.Path("recording");
   if (suite.recording) {
     page.Require(!page.Has("image"), "image", "none beside a `recording`: its pictures are of its videos' size");
-    if (page.Has("still")) suite.recorded_still = ReadStillRule(page.Section("still"), StillRule{});
-    suite.recorded_chunks = page.Get<int>("max_chunks", 0);
+    suite.recorded_task = ReadRecordedTask(page);
   }
-  page.Require(!page.Has("max_chunks") || (suite.recording && suite.recorded_chunks >= 1), "max_chunks",
-               "at least 1, beside a `recording`; a task page says its own");
+  for (const char* field : {"max_chunks", "instruction", "rubric", "workspace_m"})
+    page.Require(suite.recording || !page.Has(field), field, "none but beside a `recording`: a task page says its own");
   suite.tasks = ReadTasks(page);
   suite.seeds = page.Get<std::vector<std::uint64_t>>("seeds", {1});
   if (suite.recording) {
@@ -282,6 +294,7 @@ Suite Build(const Config& page) {
   suite.chunk_size = page.Get<int>("chunk_size", suite.chunk_size);
   suite.lanes = page.Get<int>("lanes", suite.lanes);
   suite.threads = page.Get<int>("threads", suite.threads);
+  page.Require(suite.threads >= 0 && suite.threads <= 1024, "threads", "0 (one per core) … 1024");
   suite.error_budget = page.Get<double>("error_budget", suite.error_budget);
   suite.judges = page.Get<std::vector<std::string>>("judges", {});
   suite.video = ReadVideo(page);
@@ -309,7 +322,8 @@ std::string WithPathsFromHere(const std::string& assignment) {
     return fmt::format("{}=[\"{}\"]", field, fmt::join(paths, "\", \""));
   }
   const bool is_path = last == "recording" || last == "profile" || last == "weights" || last == "config" ||
-                       last == "statistics" || last == "folder" || field.starts_with("tasks.");
+                       last == "statistics" || last == "folder" || field.starts_with("tasks.") ||
+                       field.find(".files.") != std::string::npos;
   return is_path ? field + "=" + FromWorkingDirectory(value) : assignment;
 }
 

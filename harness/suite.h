@@ -43,6 +43,15 @@ struct Transport {
 /// What is done about a policy whose first chunk does not look like its declared conventions (harness/start_probe.h).
 enum class StartProbe { kRefuse, kWarn, kOff };
 
+/// What a suite says of the task of its recordings; what it leaves out is made up from these.
+struct RecordedTask {
+  std::optional<std::string> instruction;          ///< what policies, raters and judges are told
+  std::optional<Rubric> rubric;                    ///< in words
+  std::optional<Eigen::AlignedBox3d> workspace_m;  ///< base frame
+  std::optional<StillRule> still;                  ///< none: only the end of the actions or the limit ends an episode
+  int max_chunks = 0;                              ///< 0: as many as hold the longest recording
+};
+
 /// One YAML file holds a whole evaluation (docs/suite.md). Paths in it are relative to the file.
 struct Suite {
   std::string name;
@@ -67,10 +76,9 @@ struct Suite {
   StartProbe start_probe = StartProbe::kRefuse;
   std::optional<std::filesystem::path> recording;  ///< one, or a folder of several: each an initial state of one task
   int recorded_states = 0;                         ///< of such a folder only the first so many; 0: all
-  int recorded_chunks = 0;                         ///< limit of an episode; 0: as many as hold the longest recording
   /// By initial state, the folder of what begins there; filled in with the task by apps/recorded_suite.
   std::map<std::string, std::filesystem::path> recordings;
-  std::optional<StillRule> recorded_still;  ///< of the recording's task; none: only the end of the actions or the limit ends it
+  RecordedTask recorded_task;
 };
 
 /// Whether a world of the suite is imagined by a network.

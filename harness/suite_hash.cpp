@@ -1,6 +1,7 @@
 #include "harness/suite_hash.h"
 
 #include <algorithm>
+#include <set>
 #include <sstream>
 #include <vector>
 
@@ -17,14 +18,21 @@ bool StartsWithAny(const std::string& line, std::initializer_list<const char*> p
   return std::any_of(prefixes.begin(), prefixes.end(), [&](const char* prefix) { return line.starts_with(prefix); });
 }
 
+/// A line for each file below a folder, through links too. @param above  folders that this one lies in: a link back to one is not followed
+void AddFilesBelow(const fs::path& folder, const std::string& name, std::set<fs::path> above, std::vector<std::string>& lines) {
+  if (!above.insert(fs::canonical(folder)).second) return;
+  for (const auto& entry : fs::directory_iterator(folder)) {
+    const std::string own = name + entry.path().filename().string();
+    if (entry.is_directory()) AddFilesBelow(entry.path(), own + "/", above, lines);
+    if (entry.is_regular_file()) lines.push_back(own + " " + Sha256HexOfFile(entry.path()));
+  }
+}
+
 /// The files below a folder by name and content, in name order; or the one file.
 std::string HashOfTree(const fs::path& path) {
   if (!fs::is_directory(path)) return Sha256HexOfFile(path);
   std::vector<std::string> lines;
-  for (const auto& entry : fs::recursive_directory_iterator(path)) {
-    if (entry.is_regular_file())
-      lines.push_back(fs::relative(entry.path(), path).string() + " " + Sha256HexOfFile(entry.path()));
-  }
+  AddFilesBelow(path, "", {}, lines);
   std::sort(lines.begin(), lines.end());
   std::string text;
   for (const std::string& line : lines) text += line + "\n";

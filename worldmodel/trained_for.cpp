@@ -76,6 +76,12 @@ ActionStatistics TrainedFor::StatisticsOr(const std::optional<std::filesystem::p
   return given;
 }
 
+void TrainedFor::CheckStatistics(const ActionStatistics& asked, const std::string& who) const {
+  const std::string difference = statistics ? Difference(asked, *statistics) : "";
+  if (!difference.empty())
+    throw InvalidInput("{}: not the statistics that {} was trained with: {}", who, weights, difference);
+}
+
 void TrainedFor::CheckPeriod(double asked_period_s, const std::string& who) const {
   if (!period_s || std::abs(*period_s - asked_period_s) <= kPeriodTolerance_s) return;
   throw InvalidInput("{}: frames {:.4g} s apart are asked for, {} was trained with frames {:.4g} s apart", who,

@@ -35,6 +35,9 @@ struct TrainedFor {
   /// @throws InvalidInput if page and weights differ: the first number that does, and where each is from.
   ActionStatistics StatisticsOr(const std::optional<std::filesystem::path>& page) const;
 
+  /// @throws InvalidInput if these differ from the weights': the first number that does
+  void CheckStatistics(const ActionStatistics& asked, const std::string& who) const;
+
   /// @param who   for the message: "world evac"
   /// @throws InvalidInput with both periods
   void CheckPeriod(double asked_period_s, const std::string& who) const;

@@ -15,6 +15,7 @@
 #include "core/error.h"
 #include "core/file.h"
 #include "core/hash.h"
+#include "core/names.h"
 #include "worldmodel/evac_config.h"
 #include "worldmodel/nn/threads.h"
 #include "worldmodel/nn/weights.h"
@@ -22,6 +23,7 @@
 #include "worldmodel/train/imagine_shards.h"
 #include "worldmodel/train/trainable_weights.h"
 #include "worldmodel/train/weight_files.h"
+#include "worldmodel/trained_for.h"
 
 namespace evac {
 namespace {
@@ -84,6 +86,17 @@ void LinkInto(const std::filesystem::path& folder, const std::filesystem::path& 
   LinkOrCopy(file, to);
 }
 
+/// @throws InvalidInput, TensorError where the shards are not what the world model learned from: what differs
+void CheckLearnedFrom(const train::ShardSet& set, const TrainedFor& trained, const EncodeArguments& arguments) {
+  const auto said = [&](const char* key) { return set.metadata().at(key); };
+  const std::string& who = arguments.shards;
+  trained.CheckPeriod(std::stod(said("period_s")), who);
+  trained.CheckCameras(NamesIn(said("cameras")), who);
+  trained.CheckArms(NamesIn(said("arms")), who);
+  trained.CheckPoseMap(said("pose_map"), who);
+  trained.CheckStatistics(ParseActionStatistics(said("statistics"), who + ": statistics"), who);
+}
+
 /// A packing as SHARDS, whose latents are what a world model imagines of its clips; shards.json comes last.
 ExitCode Imagine(const EncodeArguments& arguments) {
   const std::filesystem::path from = arguments.shards, to = arguments.imagined;
@@ -94,6 +107,7 @@ ExitCode Imagine(const EncodeArguments& arguments) {
   if (arguments.bf16) options = {.dtype = at::kBFloat16, .products = at::kBFloat16};
   const nn::EvacModel model = nn::LoadModel(arguments.codec, config, options);
   const std::string codec = CodecSha256(arguments.codec);
+  const TrainedFor trained = TrainedFor::Read(arguments.codec);
   const std::string products = fmt::format("{}, imagined by {} in {} steps", ProductsOf(arguments),
                                            Sha256HexOfFile(arguments.codec), arguments.steps);
   MakeFolders(to);
@@ -102,6 +116,7 @@ ExitCode Imagine(const EncodeArguments& arguments) {
   for (const train::Split split : {train::Split::kTrain, train::Split::kHoldout}) {
     if (!train::HasSplit(from, split)) continue;
     train::ShardSet set(from, split);
+    CheckLearnedFrom(set, trained, arguments);
     set.OpenLatents(config.vae.z_channels, config.vae.Stride(), config.vae.scale_factor);
     if (set.codec() != codec)
       throw TensorError(arguments.codec + " did not make the shards' latents: wanted `evac encode` with it first");

@@ -63,10 +63,10 @@ bool IsPlain(const cv::Mat& patch) {
   return std::max({deviation[0], deviation[1], deviation[2]}) < kPlain;
 }
 
-/// Where the gripper is in the head camera's real picture; nothing if it is out of sight, or too plain to be found.
-std::optional<cv::Rect> GripperPatch(const ClipPair& clips, const Arms& arms, const cv::Mat& real) {
+/// Where an arm's gripper is in the first camera's real picture; nothing if it is out of sight, or too plain to be found.
+std::optional<cv::Rect> GripperPatch(const ClipPair& clips, const Arms& arms, const ArmState& arm, const cv::Mat& real) {
   const Camera& camera = clips.task->cameras.front();
-  const Eigen::Vector3d tool = arms.back().base_from_gripper * Eigen::Vector3d(0, 0, clips.tool_length_m);
+  const Eigen::Vector3d tool = arm.base_from_gripper * Eigen::Vector3d(0, 0, clips.tool_length_m);
   const auto at = Project(camera, BaseFromCamera(camera, arms).inverse() * tool);
   if (!at) return std::nullopt;
   const cv::Point centre(static_cast<int>(std::floor(at->x())), static_cast<int>(std::floor(at->y())));
@@ -124,12 +124,14 @@ void DriftMeter::Add(const ClipPair& clips) {
     sums.copy_error += SquaredError(real[t], real[0], moved);
     sums.moving_values += 3.0 * cv::countNonZero(moved);
     if (t - 1 >= clips.commands.size()) continue;
-    const auto patch = GripperPatch(clips, clips.commands[t - 1], real[t](head_px));
-    if (!patch) continue;
-    ++sums.grippers_in_sight;
-    if (const auto px = GripperError(*patch, real[t](head_px), model[t](head_px))) {
-      sums.gripper_px += *px;
-      ++sums.grippers;
+    for (const ArmState& arm : clips.commands[t - 1]) {
+      const auto patch = GripperPatch(clips, clips.commands[t - 1], arm, real[t](head_px));
+      if (!patch) continue;
+      ++sums.grippers_in_sight;
+      if (const auto px = GripperError(*patch, real[t](head_px), model[t](head_px))) {
+        sums.gripper_px += *px;
+        ++sums.grippers;
+      }
     }
   }
   if (frames < 2) return;

@@ -12,6 +12,8 @@
 namespace evac {
 namespace {
 
+constexpr double kPeriodTolerance = 0.02;  // as of a recording that is thinned
+
 void CheckNamed(const ImagineInputs& inputs) {
   const std::pair<const char*, const std::filesystem::path*> files[] = {{"--frame", &inputs.files.frame},
                                                                         {"--actions", &inputs.files.actions},
@@ -86,6 +88,10 @@ ImagineStart ReadImagineStart(const ImagineInputs& inputs, std::size_t views) {
                        track.size(), start.stride);
   }
   start.period_s = recording.period_s * start.stride;
+  if (inputs.stride == 0 && std::abs(start.period_s / inputs.period_s - 1) > kPeriodTolerance)
+    fmt::print(stderr,
+               "evac: warning: {}: its steps are {:.4g} s apart: every {} taken, {:.4g} s apart, where the network expects {:.4g} s\n",
+               recording.source, recording.period_s, start.stride, start.period_s, inputs.period_s);
   start.files = std::move(recording.files);
   return start;
 }

@@ -30,6 +30,7 @@ using Json = nlohmann::ordered_json;
 
 constexpr double kRawFrames_hz = 30;  // of the statistics
 constexpr double kLagToTell_frames = 0.2;
+constexpr double kHalfClosed = 0.5;
 
 /// One clip to be made: which recording, and which of its crops.
 struct PlannedClip {
@@ -141,6 +142,20 @@ void SayLag(const LagSums& lag, const Packing& packing) {
                        : ""));
 }
 
+/// A gripper that is told or measured in another unit reads as one that never closes, and nothing is learned of grasps.
+void SayGrippers(const Packing& packing) {
+  double furthest = 0;
+  for (const PackSource& source : packing.sources) {
+    for (const Arms& arms : source.track) {
+      for (const ArmState& arm : arms) furthest = std::max(furthest, arm.closure);
+    }
+  }
+  if (furthest >= kHalfClosed) return;
+  Tell(fmt::format("evac: warning: no hand of any recording closes by half (the furthest is {:.2g} of the way): wanted "
+                   "state/effector/position from 0 (open) to 120 (closed), action/effector/position from 0 to 1",
+                   furthest));
+}
+
 void MeasureMotion(const PackArguments& arguments, Packing& packing) {
   MotionSums sums;
   LagSums lag;
@@ -202,6 +217,7 @@ Packing Plan(const PackArguments& arguments) {
   for (const PackSource& source : packing.sources) packing.tasks.push_back(source.task);
   std::sort(packing.tasks.begin(), packing.tasks.end());
   packing.tasks.erase(std::unique(packing.tasks.begin(), packing.tasks.end()), packing.tasks.end());
+  SayGrippers(packing);
   MeasureMotion(arguments, packing);
   PlanShards(arguments, packing);
   packing.recipe = RecipeOf(arguments, packing);

@@ -116,6 +116,18 @@ TEST_F(Drift, AGripperThatIsFoundElsewhereIsOffAndOneThatIsGoneIsNotFound) {
   EXPECT_DOUBLE_EQ(*chunks[1].gripper_found, 0.25);
 }
 
+/// Only the last arm was looked at: a robot that works with its left hand was measured by the other.
+TEST_F(Drift, BothArmsGrippersAreLookedFor) {
+  ArmState works, idle;
+  works.base_from_gripper.translation() = Eigen::Vector3d((kGripper.x + 0.5 - 48) / 100, (kGripper.y + 0.5 - 32) / 100, 1);
+  idle.base_from_gripper.translation() = Eigen::Vector3d(0, 0, -1);  // behind the camera
+  DriftMeter drift(kChunk);
+  drift.Add({&task_, Write("real.mp4", InReality), Write("model.mp4", [](int time) { return Seen{InReality(time).thing, kGripper + cv::Point(3, 4)}; }),
+             std::vector<Arms>(kFrames - 1, Arms{works, idle}), 1, 0});
+  ASSERT_EQ(drift.Chunks().size(), 2u);
+  EXPECT_DOUBLE_EQ(*drift.Chunks()[0].gripper_px, 5);
+}
+
 TEST_F(Drift, AGripperThatIsTooPlainToBeFoundIsNotFoundAnywhere) {
   const auto plain = [](int time) { return Seen{InReality(time).thing, std::nullopt}; };
   DriftMeter drift(kChunk);

@@ -225,6 +225,18 @@ TEST(Recording, AVideoShorterThanTheArmsTrackIsRefused) {
   EXPECT_THROW(frames.Next(), Error);
 }
 
+/// Frames of 30 Hz beside arms of 10 Hz: picture k was shown with the arms of three times its time.
+TEST(Recording, AVideoFarLongerThanTheArmsTrackIsRefused) {
+  const TempFolder folder;
+  SyntheticClip clip(6);
+  clip.frames = 7;
+  clip.Write(OneFolder(folder / "a"));
+  EXPECT_EQ(ErrorOf(folder / "a"), "it was read") << "it went on a little longer";
+  clip.frames = 12;
+  clip.Write(OneFolder(folder / "b"));
+  EXPECT_THAT(ErrorOf(folder / "b"), AllOf(HasSubstr("head_color.mp4: 12 frames for the 6 steps"), HasSubstr("another rate")));
+}
+
 TEST(Recording, WhatIsMissingIsNamed) {
   const TempFolder folder;
   const fs::path clip = folder / "a";

@@ -2,9 +2,11 @@
 
 #include <gmock/gmock.h>
 
+#include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 
 #include "core/error.h"
+#include "core/file.h"
 #include "core/hash.h"
 #include "core/recording.h"
 #include "core/seed.h"
@@ -80,6 +82,24 @@ TEST(RecordingWriter, AnEpisodeThatWasWrittenIsReadAsItWas) {
   EXPECT_EQ(read.cameras[1].width_px, 2 * kWidth_px);
   EXPECT_DOUBLE_EQ(read.cameras[1].fy_px, 42);
   EXPECT_TRUE(read.cameras[1].mount_from_camera.isApprox(episode.cameras[1].mount_from_camera, 1e-9));
+}
+
+TEST(RecordingWriter, FourFilesSayWhereTheArmsWereToldToBe) {
+  const TempFolder folder;
+  const TreePlace place{folder.path(), "take_bottle", "000007"};
+  const RecordedEpisode episode = OneArmEpisode();
+  WriteRecording(place, episode, {.scale = 1});
+  std::vector<uchar> png;
+  cv::imencode(".png", Colourful(0), png);
+  WriteFileAtomically(folder / "frame.png", std::string(png.begin(), png.end()));
+  const std::filesystem::path parameters = folder / "parameters/take_bottle/000007/camera",
+                              track = folder / "proprio_stats/take_bottle/000007/proprio_stats.h5";
+  const RecordingFiles files{folder / "frame.png", track, parameters / "head_extrinsic_params_aligned.json",
+                             parameters / "head_intrinsic_params.json"};
+  const Recording read = ReadRecordingFiles(files, {.read_told = true});
+  ASSERT_EQ(read.told.size(), read.arms.size());
+  EXPECT_TRUE(read.told[1][0].base_from_gripper.isApprox(episode.told[1][0].base_from_gripper, 1e-9));
+  EXPECT_TRUE(ReadRecordingFiles(files).told.empty()) << "nobody asked";
 }
 
 TEST(RecordingWriter, DrawnTwiceAsLargeTheColoursOfSmallThingsComeBackCloser) {

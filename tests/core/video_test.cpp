@@ -67,6 +67,7 @@ TEST(Video, EveryFrameComesBackAtItsTimeAndInItsPlace) {
     int k = 0;
     for (cv::Mat frame = reader.Next(); !frame.empty(); frame = reader.Next(), ++k) {
       ASSERT_LT(k, 60);
+      EXPECT_NEAR(reader.mean_period_s(), period_s, 0.01 * period_s) << "as the file says";
       EXPECT_NEAR(reader.time_s(), k * period_s, 1e-9 * (1 + k * period_s))
           << "frame " << k << " of period " << period_s;
       EXPECT_LT(cv::norm(frame, frames[k], cv::NORM_L1) / (frame.total() * 3), 5) << "frame " << k;

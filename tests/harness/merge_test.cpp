@@ -1,5 +1,6 @@
 #include "harness/merge.h"
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include "core/error.h"
@@ -103,6 +104,55 @@ TEST_F(MergedRuns, KeepTheVerdictsOfTheCopyThatWasNotTakenAndSayOnceWhatBothSay)
   b_.AddVerdict(Says("human:night:r1", "I saw it"));
   EXPECT_EQ(Merge().duplicates, 1);
   EXPECT_EQ(Said(), (std::vector<std::string>{"oracle: it stands", "human:night:r1: I saw it"}));
+}
+
+/// The last verdict of a judge counts: an older copy beside a newer one brought an outdated one back.
+TEST_F(MergedRuns, GoOnWithTheLongerOfTwoListsOfOneJudge) {
+  for (Store* store : {&a_, &b_}) {
+    store->Add(samples::SomeEpisode(*store, key_));
+    store->AddVerdict(Says("oracle", "it stands"));
+    store->AddVerdict(Says("oracle", "it fell"));
+  }
+  b_.AddVerdict(Says("oracle", "it stands"));
+  Merge();
+  EXPECT_EQ(Said(), (std::vector<std::string>{"oracle: it stands", "oracle: it fell", "oracle: it stands"}));
+}
+
+/// Two labs' lists that both count from one: the second's were dropped without a word.
+TEST_F(MergedRuns, RefuseRealTrialsOfWhichTwoShardsSayOtherwise) {
+  for (Store* store : {&a_, &b_}) store->Add(samples::SomeEpisode(*store, key_));
+  RealTrial trial{.task = key_.pair.task, .initial_state = key_.pair.initial_state, .policy = key_.pair.policy, .checkpoint = key_.pair.checkpoint,
+                  .trial = 1, .outcome = Label::kSuccess, .video = "", .source = "lab1.csv:2"};
+  a_.AddRealTrials({trial});
+  trial.source = "copy.csv:2";
+  b_.AddRealTrials({trial});
+  Merge("alike");
+  EXPECT_EQ(Store::Open(folder_ / "alike", Store::Mode::kReadOnly).RealTrials().size(), 1u);
+  trial.trial = 2;
+  a_.AddRealTrials({trial});
+  trial.outcome = Label::kFailure;
+  trial.source = "lab2.csv:3";
+  b_.AddRealTrials({trial});
+  EXPECT_THAT([&] { Merge(); }, testing::ThrowsMessage<Error>(testing::AllOf(testing::HasSubstr("copy.csv:2"), testing::HasSubstr("lab2.csv:3"))));
+  EXPECT_FALSE(std::filesystem::exists(folder_ / "merged"));
+}
+
+TEST_F(MergedRuns, DoNotRemoveAShardThatIsWhereTheyWouldBeMade) {
+  a_.Add(samples::SomeEpisode(a_, key_));
+  Merge("all.tmp");
+  EXPECT_THAT([&] { MergeRuns({folder_ / "all.tmp"}, folder_ / "all"); }, testing::ThrowsMessage<Error>(testing::HasSubstr("another name")));
+  EXPECT_TRUE(std::filesystem::exists(folder_ / "all.tmp"));
+}
+
+TEST_F(MergedRuns, TakenEpisodesBringTheirVerdictsAlsoAfterACallThatWasKilledBeforeThem) {
+  a_.Add(samples::SomeEpisode(a_, key_));
+  b_.Add(samples::SomeEpisode(b_, key_));
+  b_.AddVerdict(Says("human:night:r1", "I saw it"));
+  const auto all = [](const EpisodeKey&) { return true; };
+  EXPECT_EQ(TakeEpisodes(b_, all, a_), 0) << "it is there";
+  ASSERT_EQ(a_.Verdicts().size(), 1u);
+  TakeEpisodes(b_, all, a_);
+  EXPECT_EQ(a_.Verdicts().size(), 1u) << "said once";
 }
 
 TEST_F(MergedRuns, LoseWhatWasSaidOfAFailedCopyThatYieldedAndDoNotCountItAsTheSame) {

@@ -120,6 +120,23 @@ TEST_F(EvacSuite, APolicyIsTheSameAsLongAsItsNameItsCommandAndItsFilesAre) {
   EXPECT_NE(hash({files}), before);
 }
 
+/// Checkpoints behind a link `last` were in no hash: a run went on with others.
+TEST_F(EvacSuite, FilesBehindLinksAreHashedToo) {
+  namespace fs = std::filesystem;
+  for (const char* step : {"step-4000", "step-6000"}) fs::create_directories(folder_ / "ckpts" / step);
+  Write("ckpts/step-4000/w", "four");
+  Write("ckpts/step-6000/w", "six");
+  fs::create_directory(folder_ / "used");
+  const auto hash = [&](const char* step) {
+    fs::remove(folder_ / "used" / "last");
+    fs::create_directory_symlink(folder_ / "ckpts" / step, folder_ / "used" / "last");
+    return PolicyHash(Read({"policies.0.files=[" + (folder_ / "used").string() + "]"}).policies.at(0));
+  };
+  EXPECT_NE(hash("step-4000"), hash("step-6000"));
+  fs::create_directory_symlink(folder_ / "used", folder_ / "ckpts" / "step-4000" / "back");
+  EXPECT_FALSE(hash("step-4000").empty()) << "a link to a folder that it lies in";
+}
+
 TEST_F(EvacSuite, RealityIsTheSameHoweverManyStatesOfASeedAreAsked) {
   WriteBoth();
   const auto reality = [&](const char* change) { return ReadSuite(folder_ / "both.yaml", {change}).reality_hash; };

@@ -43,9 +43,9 @@ Tensor ArmsAt(double x_m, double y_m, double z_m, double turn = 0) {
 }
 
 /// Red, green, blue and seen of one point about the right hand in frame 1, in the last view.
-std::vector<float> PointOf(const Tensor& arms, std::int64_t point, std::int64_t views = 1) {
+std::vector<float> PointOf(const Tensor& arms, std::int64_t point, std::int64_t views = 1, double tool_length_m = 0) {
   const Scene scene(views);
-  const Tensor about = HandViews(scene.image, scene.direction, scene.origin, arms);
+  const Tensor about = HandViews(scene.image, scene.direction, scene.origin, arms, tool_length_m);
   EXPECT_EQ(about.sizes(), (std::vector<std::int64_t>{1, kFrames, 2, views * kHandPoints * kHandPointNumbers}));
   const Tensor numbers = about[0][1][1].reshape({views, kHandPoints, kHandPointNumbers})[views - 1][point].contiguous();
   return {numbers.data_ptr<float>(), numbers.data_ptr<float>() + kHandPointNumbers};
@@ -88,7 +88,7 @@ struct ShownTurn {
     closing[10] -= 0.02;  // it came along x
     Tensor arms = ArmsAt(0, 0, 0);
     arms[0][2].copy_(now[0][1]);
-    all = TurnViews(scene.image, scene.direction, scene.origin, arms, turns.flatten(2));
+    all = TurnViews(scene.image, scene.direction, scene.origin, arms, turns.flatten(2), 0);
     const Tensor mine = all[0][2][1][0].contiguous();
     numbers.assign(mine.data_ptr<float>(), mine.data_ptr<float>() + mine.numel());
   }
@@ -102,6 +102,19 @@ struct ShownTurn {
   Tensor all;
   std::vector<float> numbers;
 };
+
+/// A robot whose poses are its flange's: they were read there, a hand's length from what the fingers hold.
+TEST(HandViews, AreReadWhereTheFingersMeetNotWhereThePoseIs) {
+  constexpr double kTool_m = 0.23;
+  Tensor arms = ArmsAt(0.12 - kTool_m, -0.07, 0);
+  const double s = std::sqrt(0.5);  // turned about y, so that its z axis is the base's x
+  const double turn[] = {0, s, 0, s};
+  for (std::int64_t i = 0; i < 4; ++i) arms[0][1][11 + i] = turn[i];
+  const std::vector<float> middle = PointOf(arms, kPlaneOfXAndY + kMiddle, 1, kTool_m);
+  EXPECT_NEAR(middle[0], 0.12, 1e-5);
+  EXPECT_NEAR(middle[1], -0.07, 1e-5);
+  EXPECT_EQ(middle[3], 1);
+}
 
 TEST(TurnViews, AreReadWhereTheHandTurned) {
   const ShownTurn shown(ArmsAt(0.12, -0.07, 0), ArmsAt(-0.1, 0.1, 0.3));

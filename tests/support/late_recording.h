@@ -14,6 +14,7 @@ inline void WriteLateRecording(const TreePlace& place) {
     ArmState left, right;
     left.base_from_gripper = Eigen::Translation3d(0.4 + 0.01 * step, 0.2, 0.3);
     right.base_from_gripper = Eigen::Translation3d(0.4 + 0.01 * step, -0.2, 0.3);
+    left.closure = right.closure = 0.25 * step;
     return Arms{left, right};
   };
   RecordedEpisode recorded;

@@ -209,6 +209,17 @@ TEST_F(PackCommand, WarnsOfMeasuredArmsOnAPageThatHasToldOnesFollowLate) {
                               Not(HasSubstr("warning"))));
 }
 
+/// In metres or from 0 to 1 a gripper reads as one that never closes.
+TEST_F(PackCommand, WarnsOfGrippersThatNeverClose) {
+  SyntheticClip clip = Good();
+  for (float& gripper : clip.grippers) gripper /= 120;
+  Add("a", clip);
+  const CommandResult result = RunCommand(Words("out"));
+  EXPECT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_THAT(result.err, AllOf(HasSubstr("evac: warning: no hand of any recording closes by half (the furthest is 0.0042 of the way)"),
+                                HasSubstr("from 0 (open) to 120 (closed)")));
+}
+
 TEST_F(PackCommand, DrawsMapsAsThePageOfTheNetworkSays) {
   Add("a", Good());
   ASSERT_EQ(RunCommand(Words("published")).exit_code, 0);
@@ -267,6 +278,21 @@ TEST_F(PackCommand, ShardsAreImaginedAgainIntoAFolderOfTheirOwn) {
   EXPECT_EQ(Sha256HexOfFile(folder_ / "imagined/shards.json"), Sha256HexOfFile(folder_ / "out/shards.json"));
   encode.insert(encode.end(), {"--imagined", shards});
   EXPECT_EQ(RunCommand(encode).exit_code, 2) << "would be written over";
+}
+
+/// They were imagined anyway: a judge was calibrated on what the network says of another robot's motion.
+TEST_F(PackCommand, ShardsOfAnotherRobotThanTheWeightsAreNotImagined) {
+  Add("a", Good());
+  OneArmed().Write(OneFolder(folder_ / "one/a"));
+  ASSERT_EQ(RunCommand(Words("out")).exit_code, 0);
+  ASSERT_EQ(RunCommand(Words("of_one", {}, {"one"})).exit_code, 0);
+  const std::string page = folder_ / "tiny.yaml", weights = folder_ / "w.safetensors", told = folder_ / "told.safetensors";
+  ASSERT_EQ(RunCommand({Binary("evac"), "weights", "init", weights, "--config", page}).exit_code, 0);
+  const CommandResult converted = RunCommand({Binary("evac"), "weights", "convert", weights, told, "--config", page, "--shards", folder_ / "of_one"});
+  ASSERT_EQ(converted.exit_code, 0) << converted.err;
+  const CommandResult result = RunCommand({Binary("evac"), "encode", folder_ / "out", "--config", page, "--codec", told, "--imagined", folder_ / "imagined"});
+  EXPECT_EQ(result.exit_code, 2);
+  EXPECT_THAT(result.err, HasSubstr("found arms left, right, wanted right: those that"));
 }
 
 TEST_F(PackCommand, GivesTheSameBytesForAnyNumberOfJobsAndGoesOnWhereItWasCut) {

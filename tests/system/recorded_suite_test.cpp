@@ -122,6 +122,25 @@ TEST_F(RecordedSuite, ComesToRestByTheRuleThatThePageSaysAndByNoneOfItsOwn) {
               testing::ThrowsMessage<Error>(testing::HasSubstr("none beside a `recording`")));
 }
 
+/// Policies, raters and the VLM were told "Do what was recorded in 327" and no rubric, and nothing could be done about it.
+TEST_F(RecordedSuite, ThePageSaysWhatIsToBeDoneAndWhatSuccessIs) {
+  const auto with = [&](const std::string& lines) { return Filled(std::string(kEcho) + lines); };
+  EXPECT_EQ(Filled(kEcho).tasks.front().rubric.version, kNoRubric);
+  const Suite suite = with(
+      "instruction: Put the cup on the shelf.\n"
+      "rubric: {success: The cup stands on the shelf., stages: [{name: held, description: The hand holds the cup.}]}\n"
+      "workspace_m: {min: [-1, -1, 0], max: [1, 1, 1.5]}\n");
+  const Task& task = suite.tasks.front();
+  EXPECT_EQ(task.instruction, "Put the cup on the shelf.");
+  EXPECT_EQ(task.rubric.success, "The cup stands on the shelf.");
+  ASSERT_EQ(task.rubric.stages.size(), 1u);
+  EXPECT_EQ(task.rubric.stages[0].name, "held");
+  EXPECT_EQ(task.workspace_m.max().z(), 1.5);
+  EXPECT_NE(suite.hash, Filled(kEcho).hash);
+  EXPECT_THAT([&] { with("rubric: {stages: []}\n"); }, testing::ThrowsMessage<Error>(testing::HasSubstr("success")));
+  EXPECT_THAT([&] { with("instruction: ''\n"); }, testing::ThrowsMessage<Error>(testing::HasSubstr("instruction")));
+}
+
 TEST_F(RecordedSuite, OfWeightsThatDoNotSayTheirCamerasAsManyAreSeenAsThereAreViews) {
   WriteWeights("two", {});
   EXPECT_EQ(Cameras(Filled(kEvac)), (std::vector<std::string>{"head", "hand_left"}));
@@ -240,6 +259,15 @@ TEST_F(RecordedStates, ThePageMayTakeTheFirstAndLimitTheEpisodes) {
   EXPECT_THAT([&] { Many("max_chunks: 0\n"); }, ThrowsMessage<Error>(HasSubstr("max_chunks")));
   EXPECT_THAT([&] { Filled(std::string(kEcho) + "initial_states: {count: 2}\n"); },
               ThrowsMessage<Error>(HasSubstr("initial_states.count: found 2, wanted 1")));
+}
+
+/// Half a metre about where the arms stood: a task that begins with the arms at home could not reach its table.
+TEST_F(RecordedStates, BeginningsShorterThanAChunkLeaveTheArmsAllOfTheTaskPagesRoom) {
+  WriteClip("short/a", 7, 0);
+  const Suite suite = Many("instruction: Pour.\n", "short");
+  EXPECT_EQ(suite.tasks.front().workspace_m.max(), Task{}.workspace_m.max());
+  EXPECT_EQ(suite.tasks.front().instruction, "Pour.");
+  EXPECT_LT(Many().tasks.front().workspace_m.max().norm(), Task{}.workspace_m.max().norm()) << "where whole episodes went, and some more";
 }
 
 TEST_F(RecordedStates, ThoseThatCannotBeginAreLeftOutAndNoneIsRefused) {

@@ -34,19 +34,25 @@ Tensor PointsOfAHand() {
 }
 
 /// [B, T, arms, kHandPoints, 3] metres, base frame.
-Tensor PointsAboutHands(const Tensor& arms) {
+Tensor PointsAboutHands(const Tensor& arms, double tool_length_m) {
   const Tensor rows = arms.to(at::kFloat).unflatten(2, {kArms, kArmNumbers});
-  return rows.narrow(3, 0, 3).unsqueeze(3) + at::matmul(PointsOfAHand().to(arms.device()), HandRotation(rows));
+  return Fingertips(rows, tool_length_m).unsqueeze(3) + at::matmul(PointsOfAHand().to(arms.device()), HandRotation(rows));
 }
 
 }  // namespace
 
-Tensor HandViews(const Tensor& image, const Tensor& direction, const Tensor& origin, const Tensor& arms) {
+Tensor Fingertips(const Tensor& hands, double tool_length_m) {
+  const Tensor pose_m = hands.narrow(-1, 0, 3);
+  return tool_length_m == 0 ? pose_m : pose_m + HandRotation(hands).select(-2, 2) * tool_length_m;
+}
+
+Tensor HandViews(const Tensor& image, const Tensor& direction, const Tensor& origin, const Tensor& arms,
+                 double tool_length_m) {
   CheckShape("arms of the frames", arms, {-1, -1, kArms * kArmNumbers});
   const std::int64_t scenes = arms.size(0), frames = arms.size(1), views = image.size(0) / scenes,
                      h = direction.size(3), w = direction.size(4);
   CheckShape("the picture about the hands", image, {scenes * views, 3, -1, -1});
-  const Tensor points = PointsAboutHands(arms).flatten(1, 3).repeat_interleave(views, 0);  // [BV, T arms P, 3]
+  const Tensor points = PointsAboutHands(arms, tool_length_m).flatten(1, 3).repeat_interleave(views, 0);  // [BV, T arms P, 3]
   const Tensor found = SeenAt(points, direction.narrow(2, 0, 1), origin.narrow(2, 0, 1)).select(1, 0);
   const auto scaled = [&](std::int64_t axis, std::int64_t side) {  // -1 and 1: the outer edges of the picture
     constexpr double kOutside = 4;
@@ -63,13 +69,13 @@ Tensor HandViews(const Tensor& image, const Tensor& direction, const Tensor& ori
 }
 
 Tensor TurnViews(const Tensor& image, const Tensor& direction, const Tensor& origin, const Tensor& arms,
-                 const Tensor& turns) {
+                 const Tensor& turns, double tool_length_m) {
   CheckShape("turns of the hands", turns, {arms.size(0), arms.size(1), static_cast<std::int64_t>(kTurnRow)});
   const Tensor each = turns.to(at::kFloat).unflatten(2, {kArms, kKinds, kNumbers});  // [B, T, arms, kinds, …]
   const Tensor was = each.narrow(4, 0, 1), then = each.narrow(4, 2, kArmNumbers),
                before = each.narrow(4, 2 + kArmNumbers, kArmNumbers);
   const Tensor as_frames = then.permute({0, 1, 3, 2, 4}).flatten(3).flatten(1, 2);  // [B, T kinds, 16]
-  const Tensor views = HandViews(image, direction, origin, as_frames)
+  const Tensor views = HandViews(image, direction, origin, as_frames, tool_length_m)
                            .unflatten(1, {arms.size(1), kKinds})
                            .transpose(2, 3);  // [B, T, arms, kinds, any]
   const Tensor now = arms.to(at::kFloat).unflatten(2, {kArms, 1, kArmNumbers}).expand_as(then);

@@ -17,8 +17,13 @@ constexpr std::int64_t kHandPointNumbers = 4;  ///< red, green, blue; 1 where th
 /// @param direction  [BV, 3, T, h, w] unit rays of pinhole cameras, base frame
 /// @param origin     [BV, 3, T, h, w] metres, base frame
 /// @param arms       [B, T, 16]: rows as in frame_actions.h
+/// @param tool_length_m  from an arm's pose along its z axis to where the fingers meet (`pose_map.tool_length_m`)
 /// @returns          [B, T, 2, V kHandPoints kHandPointNumbers]: left hand, right hand; 0 where the picture does not reach
-Tensor HandViews(const Tensor& image, const Tensor& direction, const Tensor& origin, const Tensor& arms);
+Tensor HandViews(const Tensor& image, const Tensor& direction, const Tensor& origin, const Tensor& arms,
+                 double tool_length_m);
+
+/// Where the fingers meet. @param hands  [..., 8]: rows of one arm each @returns [..., 3] metres, base frame
+Tensor Fingertips(const Tensor& hands, double tool_length_m);
 
 /// Beside the pictures of a turn: whether there was one; how long ago, slowly and quickly forgotten; where the hand is
 /// now, seen from there, in that hand's axes and in the base frame; how it is turned against then; how it moved then.
@@ -28,6 +33,6 @@ constexpr std::int64_t kTurnFeatures = 1 + 2 + 3 + 3 + 6 + 3;
 /// @param turns  [B, T, kTurnRow]: HandTurns
 /// @returns      [B, T, 2, kTurnKinds, V kHandPoints kHandPointNumbers + kTurnFeatures]: zeros where there was no turn
 Tensor TurnViews(const Tensor& image, const Tensor& direction, const Tensor& origin, const Tensor& arms,
-                 const Tensor& turns);
+                 const Tensor& turns, double tool_length_m);
 
 }  // namespace evac::nn

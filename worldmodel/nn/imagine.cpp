@@ -25,7 +25,8 @@ Conditioning Condition(const EvacModel& model, const ChunkRequest& request) {
   conditioning.tokens = model.ContextTokens(model.ImageTokens(request.image), model.ActionTokens(request.deltas));
   if (model.config().unet.frame_actions) conditioning.frames = FrameActions(request.arms, conditioning.memory);
   if (model.config().unet.hand_views > 0)
-    conditioning.hands = HandViews(request.image, request.direction, request.origin, request.arms);
+    conditioning.hands = HandViews(request.image, request.direction, request.origin, request.arms,
+                                   model.config().pose_map.tool_length_m);
   return conditioning;
 }
 
@@ -38,7 +39,8 @@ Conditioning Unconditioned(const EvacModel& model, const ChunkRequest& request, 
   const Tensor nothing = at::zeros_like(request.image);
   if (conditioning.concat.object.defined()) without.concat.object = at::zeros_like(conditioning.concat.object);
   if (conditioning.hands.defined())
-    without.hands = HandViews(nothing, request.direction, request.origin, request.arms);
+    without.hands = HandViews(nothing, request.direction, request.origin, request.arms,
+                              model.config().pose_map.tool_length_m);
   without.tokens = model.ContextTokens(model.ImageTokens(nothing), model.ActionTokens(request.deltas));
   return without;
 }

@@ -70,6 +70,7 @@ ObjectForecast::ObjectForecast(const Scope& at, const ModelConfig& config)
       width_(config.LatentWidth()),
       stride_(config.vae.Stride()),
       plane_m_(config.schedule.carry_plane_m.value_or(0)),
+      tool_length_m_(config.pose_map.tool_length_m),
       finder_{{at / "finder" / 0, {24, kPictureChannels, 5, 5}}, {at / "finder" / 1, {32, 24, 3, 3}},
               {at / "finder" / 2, {48, 32, 3, 3}},               {at / "finder" / 3, {48, 48, 3, 3}},
               {at / "finder" / 4, {48, 48, 3, 3}},               {at / "finder" / 5, {48, 48, 3, 3}},
@@ -117,7 +118,7 @@ Tensor ObjectForecast::AboutThing(const Found& found, const Scenes& scenes) cons
   const Tensor now = scenes.arms.to(at::kFloat).unflatten(2, {kHandsSeen, 1, kPose});
   const Tensor hands = at::cat({now, turns.narrow(4, 2, kPose)}, 3);  // [B, T, hands, kMoments, 8]
   const Tensor was = at::cat({at::ones_like(now.narrow(4, 0, 1)), turns.narrow(4, 0, 1)}, 3);
-  const Tensor away_m = thing - hands.narrow(4, 0, 3);
+  const Tensor away_m = thing - Fingertips(hands, tool_length_m_);
   const Tensor in_hand_m = at::matmul(HandRotation(hands), away_m.unsqueeze(5)).squeeze(5);
   constexpr double kPer_m = 10, kNearPer_m = 25;
   const Tensor to_thing = at::cat({away_m * kPer_m, in_hand_m * kPer_m, (in_hand_m * kNearPer_m).tanh()}, 4) * was;
@@ -139,8 +140,8 @@ ObjectForecast::Answer ObjectForecast::operator()(const Scenes& given, const Dro
   const auto through = [](const Layer& layer, const Tensor& x) { return at::linear(x, layer.weight, layer.bias); };
   const Found found = Find(scenes.image);
   const std::int64_t seen_numbers = eye_.weight.size(1);
-  const Tensor now = HandViews(scenes.image, scenes.direction, scenes.origin, scenes.arms).unsqueeze(3);
-  const Tensor turns = TurnViews(scenes.image, scenes.direction, scenes.origin, scenes.arms, scenes.turns);
+  const Tensor now = HandViews(scenes.image, scenes.direction, scenes.origin, scenes.arms, tool_length_m_).unsqueeze(3);
+  const Tensor turns = TurnViews(scenes.image, scenes.direction, scenes.origin, scenes.arms, scenes.turns, tool_length_m_);
   const Tensor seen = at::cat({now, turns.narrow(4, 0, seen_numbers)}, 3);
   const Tensor known = at::cat({left_out(at::silu(through(eye_, seen))).flatten(3),
                                 turns.narrow(4, seen_numbers, kTurnFeatures).flatten(3),

@@ -68,7 +68,7 @@ class ObjectForecast {
 
   std::int64_t views_, height_, width_;  ///< of the latent
   std::int64_t stride_;
-  double plane_m_;
+  double plane_m_, tool_length_m_;
   std::vector<Layer> finder_;
   Layer eye_, hand_, both_, ends_, places_, success_;
 };

@@ -126,7 +126,8 @@ nn::UNet::Context WorldTraining::ContextOf(const Tensor& tokens, const WorldBatc
   nn::UNet::Context context{tokens, constant(model_.config().fps), constant(model_.config().domain), batch.views};
   if (model_.config().unet.frame_actions) context.frames = nn::FrameActions(batch.arms, batch.memory);
   if (model_.config().unet.hand_views > 0)
-    context.hands = nn::HandViews(batch.images, batch.direction, batch.origin, batch.arms);
+    context.hands = nn::HandViews(batch.images, batch.direction, batch.origin, batch.arms,
+                                  model_.config().pose_map.tool_length_m);
   return context;
 }
 
