@@ -92,7 +92,7 @@ TEST(RecordingWriter, FourFilesSayWhereTheArmsWereToldToBe) {
   std::vector<uchar> png;
   cv::imencode(".png", Colourful(0), png);
   WriteFileAtomically(folder / "frame.png", std::string(png.begin(), png.end()));
-  const std::filesystem::path parameters = folder / "parameters/take_bottle/000007/camera",
+  const std::filesystem::path parameters = folder / "parameters/take_bottle/000007/parameters/camera",
                               track = folder / "proprio_stats/take_bottle/000007/proprio_stats.h5";
   const RecordingFiles files{folder / "frame.png", track, parameters / "head_extrinsic_params_aligned.json",
                              parameters / "head_intrinsic_params.json"};
