@@ -14,6 +14,7 @@ constexpr double kAgibotPeriod_s = 1.0 / 30;
 constexpr double kRateTolerance = 0.02;  // time stamps are rounded to a video's time base
 
 constexpr double kMoreFrames = 1.2;      // of a step each: a video may go on a little longer than the arms' track
+constexpr std::size_t kBeginning = 16;   // steps: fewer are where an episode begins, whatever its video goes on to show
 
 /// What one walk through a video tells.
 struct VideoFacts {
@@ -105,7 +106,8 @@ void CheckVideo(const VideoFacts& facts, const fs::path& path, const Context& co
                        context.arms.size(), context.folders.proprio.string())
         .Called("short_video");
   }
-  if (context.options.count_video_frames && static_cast<double>(facts.frames) > kMoreFrames * static_cast<double>(context.arms.size())) {
+  const std::size_t steps = context.arms.size();
+  if (context.options.count_video_frames && steps >= kBeginning && static_cast<double>(facts.frames) > kMoreFrames * static_cast<double>(steps)) {
     throw InvalidInput("{}: {} frames for the {} steps of {}, wanted one for each: arms recorded at another rate than the video?",
                        path.string(), facts.frames, context.arms.size(), context.folders.proprio.string())
         .Called("other_rate");

@@ -15,7 +15,6 @@
 #include "core/error.h"
 #include "core/file.h"
 #include "core/hash.h"
-#include "core/names.h"
 #include "worldmodel/evac_config.h"
 #include "worldmodel/nn/threads.h"
 #include "worldmodel/nn/weights.h"
@@ -88,13 +87,13 @@ void LinkInto(const std::filesystem::path& folder, const std::filesystem::path& 
 
 /// @throws InvalidInput, TensorError where the shards are not what the world model learned from: what differs
 void CheckLearnedFrom(const train::ShardSet& set, const TrainedFor& trained, const EncodeArguments& arguments) {
-  const auto said = [&](const char* key) { return set.metadata().at(key); };
   const std::string& who = arguments.shards;
-  trained.CheckPeriod(std::stod(said("period_s")), who);
-  trained.CheckCameras(NamesIn(said("cameras")), who);
-  trained.CheckArms(NamesIn(said("arms")), who);
-  trained.CheckPoseMap(said("pose_map"), who);
-  trained.CheckStatistics(ParseActionStatistics(said("statistics"), who + ": statistics"), who);
+  const TrainedFor shards = TrainedFor::Of(who, set.metadata());  // the same words: weights have them from shards
+  if (shards.period_s) trained.CheckPeriod(*shards.period_s, who);
+  trained.CheckCameras(shards.cameras, who);
+  trained.CheckArms(shards.arms, who);
+  trained.CheckPoseMap(shards.pose_map, who);
+  if (shards.statistics) trained.CheckStatistics(*shards.statistics, who);
 }
 
 /// A packing as SHARDS, whose latents are what a world model imagines of its clips; shards.json comes last.

@@ -228,13 +228,18 @@ TEST(Recording, AVideoShorterThanTheArmsTrackIsRefused) {
 /// Frames of 30 Hz beside arms of 10 Hz: picture k was shown with the arms of three times its time.
 TEST(Recording, AVideoFarLongerThanTheArmsTrackIsRefused) {
   const TempFolder folder;
-  SyntheticClip clip(6);
-  clip.frames = 7;
+  SyntheticClip clip(16);
+  std::ranges::fill(clip.grippers, 60.0F);
+  clip.frames = 19;
   clip.Write(OneFolder(folder / "a"));
   EXPECT_EQ(ErrorOf(folder / "a"), "it was read") << "it went on a little longer";
-  clip.frames = 12;
+  clip.frames = 32;
   clip.Write(OneFolder(folder / "b"));
-  EXPECT_THAT(ErrorOf(folder / "b"), AllOf(HasSubstr("head_color.mp4: 12 frames for the 6 steps"), HasSubstr("another rate")));
+  EXPECT_THAT(ErrorOf(folder / "b"), AllOf(HasSubstr("head_color.mp4: 32 frames for the 16 steps"), HasSubstr("another rate")));
+  SyntheticClip beginning(2);
+  beginning.frames = 20;
+  beginning.Write(OneFolder(folder / "c"));
+  EXPECT_EQ(ErrorOf(folder / "c"), "it was read") << "of an initial state a step or two are enough, beside its whole video";
 }
 
 TEST(Recording, WhatIsMissingIsNamed) {
