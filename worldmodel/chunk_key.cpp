@@ -29,12 +29,17 @@ class Collected {
   std::string text_;
 };
 
+/// One more whenever the same weights give other bits.
+constexpr int kArithmetic = 2;
+
 /// The deltas and maps say what statistics, stride and sizes of discs do, so those are not listed.
 std::string Settings(const ImaginerOptions& options) {
   const nn::ImagineOptions& sampler = options.sampler;
-  return fmt::format("evac {} {} solver {} steps {} eta {} guidance {} {} memory_not_scaled {} residual_noise {}",
-                     EVAC_VERSION, options.identity, static_cast<int>(sampler.solver), sampler.steps, sampler.eta,
-                     sampler.guidance, sampler.guidance_rescale, sampler.memory_not_scaled, sampler.residual_noise);
+  return fmt::format("evac {} arithmetic {} {} solver {} steps {} eta {} guidance {} {} memory_not_scaled {} "
+                     "residual_noise {}",
+                     EVAC_VERSION, kArithmetic, options.identity, static_cast<int>(sampler.solver), sampler.steps,
+                     sampler.eta, sampler.guidance, sampler.guidance_rescale, sampler.memory_not_scaled,
+                     sampler.residual_noise);
 }
 
 }  // namespace

@@ -1,5 +1,7 @@
 #include "worldmodel/nn/differentiable.h"
 
+#include <ATen/Parallel.h>
+#include <ATen/ops/conv2d.h>
 #include <ATen/ops/group_norm.h>
 #include <ATen/ops/layer_norm.h>
 #include <gtest/gtest.h>
@@ -105,6 +107,40 @@ TEST(FastGradients, OfTheCausalPadCountTheFirstFrameThreeTimes) {
     return at::cat({first, first, in[0]}, 1);
   };
   ExpectSame([](const std::vector<Tensor>& in) { return FastCausalPad(in[0]); }, plain, {Noise({2, 4, 3, 8}, 1)}, 1);
+}
+
+/// Pictures that tiles do and do not cover, channels that fill lanes and do not, more tiles than a block has.
+TEST(FastGradients, OfConvolutionsAreThoseOfLibtorch) {
+  struct Sizes {
+    std::int64_t samples, height, width, in, out;
+  };
+  for (const Sizes& size :
+       {Sizes{3, 8, 12, 64, 48}, Sizes{2, 5, 7, 49, 10}, Sizes{1, 1, 1, 3, 1}, Sizes{110, 9, 13, 24, 17}}) {
+    const auto fast = [](const std::vector<Tensor>& in) { return FastConv3x3(in[0], in[1], in[2]); };
+    const auto plain = [](const std::vector<Tensor>& in) {
+      return at::conv2d(in[0].permute({0, 3, 1, 2}).to(at::kDouble), in[1].to(at::kDouble), in[2].to(at::kDouble), 1, 1)
+          .permute({0, 2, 3, 1})
+          .to(at::kFloat);
+    };
+    const std::vector<Tensor> inputs = {Noise({size.samples, size.height, size.width, size.in}, 1),
+                                        Noise({size.out, size.in, 3, 3}, 2), Noise({size.out}, 3)};
+    const std::vector<Tensor> wanted = AnswerAndGradients(plain, inputs), found = AnswerAndGradients(fast, inputs);
+    for (std::size_t i = 0; i < wanted.size(); ++i)
+      EXPECT_LT(RelativeDifference(found[i], wanted[i]), 2e-5) << size.samples << ", " << i;
+  }
+}
+
+TEST(FastGradients, OfConvolutionsDoNotDependOnThreads) {
+  const Tensor x = Noise({20, 8, 12, 64}, 1), weight = Noise({64, 64, 3, 3}, 2), bias = Noise({64}, 3);
+  const auto fast = [](const std::vector<Tensor>& in) { return FastConv3x3(in[0], in[1], in[2]); };
+  std::vector<std::vector<Tensor>> results;
+  const int before = at::get_num_threads();
+  for (const int threads : {1, 3}) {
+    at::set_num_threads(threads);
+    results.push_back(AnswerAndGradients(fast, {x, weight, bias}));
+  }
+  at::set_num_threads(before);
+  for (std::size_t i = 0; i < 3; ++i) EXPECT_TRUE(results[0][i].equal(results[1][i])) << i;  // the bias: libtorch's sum
 }
 
 }  // namespace

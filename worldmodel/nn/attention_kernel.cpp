@@ -11,14 +11,14 @@
 namespace evac::nn::kernels {
 namespace {
 
-constexpr std::int64_t kLane = 16;  // floats worked on together
+constexpr std::int64_t kLane = 8;  // floats worked on together: gcc takes longer ones apart where registers are shorter
 constexpr std::int64_t kRows = 8;   // queries worked on together
 
 using Lane = float __attribute__((vector_size(kLane * sizeof(float))));
 
 std::int64_t RoundedUp(std::int64_t count) { return (count + kLane - 1) / kLane * kLane; }
 
-/// Keys as the scores want them: [keys / 16][width][16], padded with zeros. Values: [keys][width rounded up].
+/// Keys as the scores want them: [keys / 8][width][8], padded with zeros. Values: [keys][width rounded up].
 struct Packed {
   std::vector<float> keys, values;
   std::int64_t padded_keys = 0, padded_width = 0;
@@ -36,7 +36,7 @@ void Pack(const AttentionShape& shape, const TokenRows& k, const TokenRows& v, P
   }
 }
 
-/// scores[r][16 keys] = q[r] · keys, for 8 queries. @param q  [width][8]
+/// scores[r][8 keys] = q[r] · keys, for 8 queries. @param q  [width][8]
 EVAC_EACH_PROCESSOR void Scores(std::int64_t width, std::int64_t padded_keys, const float* q, const float* keys,
                                 float* scores) {
   for (std::int64_t j = 0; j < padded_keys; j += kLane) {
@@ -53,7 +53,7 @@ EVAC_EACH_PROCESSOR void Scores(std::int64_t width, std::int64_t padded_keys, co
   }
 }
 
-/// y[r][16 channels] = weights[r] · values[:, channels], for 8 queries.
+/// y[r][8 channels] = weights[r] · values[:, channels], for 8 queries.
 EVAC_EACH_PROCESSOR void Mix(std::int64_t keys, std::int64_t padded_keys, const float* weights, const float* values,
                              std::int64_t stride, float* y) {
   Lane sums[kRows] = {};

@@ -1,8 +1,10 @@
 #include "worldmodel/nn/differentiable.h"
 
 #include <ATen/ops/empty_like.h>
+#include <ATen/record_function.h>
 #include <torch/csrc/autograd/custom_function.h>
 
+#include "worldmodel/nn/conv_kernel.h"
 #include "worldmodel/nn/train_kernels.h"
 
 namespace evac::nn {
@@ -120,6 +122,34 @@ struct AttentionFunction : Function<AttentionFunction> {
   }
 };
 
+Tensor Convolved(const Tensor& x, const Tensor& weight, const float* bias) {
+  const kernels::ConvShape shape{x.size(0), x.size(1), x.size(2), x.size(3), weight.size(0)};
+  Tensor y = at::empty({shape.samples, shape.height, shape.width, shape.out}, x.options());
+  kernels::Conv3x3(shape, x.data_ptr<float>(), weight.data_ptr<float>(), bias, y.data_ptr<float>());
+  return y;
+}
+
+struct ConvFunction : Function<ConvFunction> {
+  static Tensor forward(AutogradContext* context, const Tensor& x, const Tensor& weight, const Tensor& bias) {
+    context->save_for_backward({x, weight});
+    return Convolved(x, weight, bias.data_ptr<float>());
+  }
+  static Tensors backward(AutogradContext* context, const Tensors& gradients) {
+    const Tensors saved = context->get_saved_variables();
+    const Tensor &x = saved[0], &weight = saved[1], gradient = Matching(gradients[0], x);
+    Tensor dx, dweight, dbias;
+    if (context->needs_input_grad(0))
+      dx = Convolved(gradient, weight.flip({2, 3}).transpose(0, 1).contiguous(), nullptr);
+    if (context->needs_input_grad(1)) {
+      dweight = at::empty_like(weight);
+      kernels::Conv3x3WeightGradient({x.size(0), x.size(1), x.size(2), x.size(3), weight.size(0)}, x.data_ptr<float>(),
+                                     gradient.data_ptr<float>(), dweight.data_ptr<float>());
+    }
+    if (context->needs_input_grad(2)) dbias = gradient.sum({0, 1, 2});
+    return {dx, dweight, dbias};
+  }
+};
+
 struct CausalPadFunction : Function<CausalPadFunction> {
   static Tensor forward(AutogradContext*, const Tensor& x) {
     const Tensor first = x.narrow(1, 0, 1);
@@ -151,6 +181,12 @@ Tensor FastGatedGelu(const Tensor& x) { return GatedGeluFunction::apply(x.contig
 
 Tensor FastAttention(const Tensor& q, const Tensor& k, const Tensor& v, std::int64_t heads) {
   return AttentionFunction::apply(q.contiguous(), k.contiguous(), v.contiguous(), heads);
+}
+
+Tensor FastConv3x3(const Tensor& x, const Tensor& weight, const Tensor& bias) {
+  RECORD_FUNCTION("evac::conv3x3", (std::vector<c10::IValue>{x, weight}));
+  if (!at::GradMode::is_enabled()) return Convolved(x, weight, bias.data_ptr<float>());
+  return ConvFunction::apply(x, weight, bias);
 }
 
 Tensor FastCausalPad(const Tensor& x) { return CausalPadFunction::apply(x); }

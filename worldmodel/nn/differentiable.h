@@ -26,6 +26,12 @@ Tensor FastGatedGelu(const Tensor& x);
 /// @param q     [outer, queries, inner, C]
 /// @param k, v  [outer, keys, inner, C]
 Tensor FastAttention(const Tensor& q, const Tensor& k, const Tensor& v, std::int64_t heads);
+/// A convolution of 3x3, one place of zeros around: floats alone (conv_kernel.h).
+/// @param x       [N, H, W, in]
+/// @param weight  [out, in, 3, 3]
+/// @param bias    [out]
+/// @returns       [N, H, W, out]
+Tensor FastConv3x3(const Tensor& x, const Tensor& weight, const Tensor& bias);
 /// [N, T, L, C] → [N, T + 2, L, C]: the first frame three times.
 Tensor FastCausalPad(const Tensor& x);
 

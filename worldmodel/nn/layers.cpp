@@ -19,11 +19,18 @@ Tensor ForProduct(const ProductType& product, const Tensor& weight) {
   return product && weight.defined() ? weight.to(*product) : weight;
 }
 
-/// x weightᵀ + bias as a convolution of one pixel: libtorch hands convolutions to oneDNN, whose products are faster
-/// here than those of the BLAS that at::linear calls (docs/performance.md).
+/// On one thread libtorch hands convolutions of one pixel to oneDNN from 16 pictures on, and to its BLAS below. With
+/// their gradients neither is always the faster one.
+std::int64_t PicturesOf(std::int64_t rows) {
+  constexpr std::int64_t kPictures = 16;
+  return !at::GradMode::is_enabled() && rows % kPictures == 0 ? kPictures : 1;
+}
+
+/// x weightᵀ + bias as a convolution of one pixel: libtorch hands most of them to oneDNN, whose products are faster here
+/// than those of the BLAS that at::linear calls (docs/performance.md).
 Tensor AsConvolution(const Tensor& x, const Tensor& weight, const Tensor& bias) {
-  const std::int64_t in = weight.size(1), out = weight.size(0), rows = x.numel() / in;
-  const Tensor pixels = x.view({1, rows, 1, in}).permute({0, 3, 1, 2});  // channels last, as x lies
+  const std::int64_t in = weight.size(1), out = weight.size(0), rows = x.numel() / in, n = PicturesOf(rows);
+  const Tensor pixels = x.view({n, rows / n, 1, in}).permute({0, 3, 1, 2});  // channels last, as x lies
   std::vector<std::int64_t> shape = x.sizes().vec();
   shape.back() = out;
   return at::conv2d(pixels, weight.view({out, in, 1, 1}), bias).permute({0, 2, 3, 1}).contiguous().view(shape);
@@ -78,8 +85,18 @@ Conv2d::Conv2d(const Scope& at, std::int64_t in, std::int64_t out, const Options
       options_(options),
       product_(at.ProductType()) {}
 
+/// Whatever the number of pictures: scenes together are to be the same as each alone.
+bool Conv2d::CanUseKernel(const Tensor& x, const Tensor& kernel) const {
+  constexpr std::int64_t kSmallest = 4;  // a tile
+  const bool is_of_kind = options_.kernel == 3 && options_.stride == 1 && options_.padding == 1;
+  const bool is_in_floats = IsFloatsInARow(x) && IsFloatsInARow(kernel) && IsFloatsInARow(bias);
+  return is_of_kind && is_in_floats && x.dim() == 4 && x.size(1) >= kSmallest && x.size(2) >= kSmallest &&
+         x.size(3) == kernel.size(1);
+}
+
 Tensor Conv2d::operator()(const Tensor& x) const {
   const Tensor kernel = ForProduct(product_, weight);
+  if (CanUseKernel(x, kernel)) return FastConv3x3(x, kernel, bias);
   const Tensor channels_second = InTypeOf(kernel, x).permute({0, 3, 1, 2});
   const Tensor y = at::conv2d(channels_second, kernel, ForProduct(product_, bias), options_.stride, options_.padding);
   return y.permute({0, 2, 3, 1}).contiguous().to(x.scalar_type());

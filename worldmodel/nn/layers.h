@@ -54,6 +54,8 @@ class Conv2d {
   Tensor bias;    ///< [out]
 
  private:
+  bool CanUseKernel(const Tensor& x, const Tensor& kernel) const;
+
   Options options_;
   ProductType product_;
 };

@@ -4,7 +4,11 @@
 /// Sanitizers come before the picking does, and clang has no such thing here: then there is one, for the plainest.
 #if defined(__x86_64__) && defined(__GNUC__) && !defined(__clang__) && !defined(__SANITIZE_THREAD__) && \
     !defined(__SANITIZE_ADDRESS__)
+#if __GNUC__ >= 12
+#define EVAC_EACH_PROCESSOR __attribute__((target_clones("arch=x86-64-v4", "arch=x86-64-v3", "default")))
+#else  // knows no levels; without fused multiply-add on processors of 256 bits
 #define EVAC_EACH_PROCESSOR __attribute__((target_clones("avx512f", "avx2", "default")))
+#endif
 #else
 #define EVAC_EACH_PROCESSOR
 #endif

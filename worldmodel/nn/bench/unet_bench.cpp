@@ -2,7 +2,7 @@
 // of the same run:
 //   evac_unet_bench [--width 320] [--frames 20] [--height 40] [--latent-width 64] [--scenes 1] [--calls 1]
 //                   [--threads 2] [--dtype f32|bf16] [--device cpu|cuda] [--plain 1]
-// --plain 1: libtorch's own attention and norms, as a port without kernels of its own.
+// --plain 1: the path that training takes.
 // Needs a compiler and libtorch alone, so that it also runs on a machine that has nothing else.
 #include <ATen/Context.h>
 #include <ATen/Parallel.h>
@@ -75,6 +75,7 @@ double FlopOf(const std::string& name, const at::RecordFunction& function) {
     return static_cast<double>(function.inputs()[i].toTensor().size(axis));
   };
   if (name == "aten::linear") return 2 * size(0) * side(1, 0);
+  if (name == "evac::conv3x3") return 2 * size(0) / side(0, 3) * size(1);  // as if done place by place
   if (name == "evac::attention") return 4 * size(0) * side(1, 1);
   if (name == "evac::temporal_attention") return 4 * size(0) * side(1, 1);
   return 0;
