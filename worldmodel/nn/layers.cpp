@@ -19,21 +19,22 @@ Tensor ForProduct(const ProductType& product, const Tensor& weight) {
   return product && weight.defined() ? weight.to(*product) : weight;
 }
 
-/// On one thread libtorch hands convolutions of one pixel to oneDNN from 16 pictures on, and to its BLAS below. With
-/// their gradients neither is always the faster one.
-std::int64_t PicturesOf(std::int64_t rows) {
-  constexpr std::int64_t kPictures = 16;
-  return !at::GradMode::is_enabled() && rows % kPictures == 0 ? kPictures : 1;
+/// x weightᵀ + bias of rows [N, in] as a convolution of one pixel in this many pictures: libtorch hands most of them to
+/// oneDNN, whose products are faster here than those of the BLAS that at::linear calls (docs/performance.md).
+Tensor AsConvolution(const Tensor& rows, std::int64_t pictures, const Tensor& weight, const Tensor& bias) {
+  const std::int64_t in = weight.size(1), out = weight.size(0), n = rows.size(0);
+  const Tensor pixels = rows.view({pictures, n / pictures, 1, in}).permute({0, 3, 1, 2});  // channels last, as x lies
+  return at::conv2d(pixels, weight.view({out, in, 1, 1}), bias).permute({0, 2, 3, 1}).contiguous().view({n, out});
 }
 
-/// x weightᵀ + bias as a convolution of one pixel: libtorch hands most of them to oneDNN, whose products are faster here
-/// than those of the BLAS that at::linear calls (docs/performance.md).
-Tensor AsConvolution(const Tensor& x, const Tensor& weight, const Tensor& bias) {
-  const std::int64_t in = weight.size(1), out = weight.size(0), rows = x.numel() / in, n = PicturesOf(rows);
-  const Tensor pixels = x.view({n, rows / n, 1, in}).permute({0, 3, 1, 2});  // channels last, as x lies
-  std::vector<std::int64_t> shape = x.sizes().vec();
-  shape.back() = out;
-  return at::conv2d(pixels, weight.view({out, in, 1, 1}), bias).permute({0, 2, 3, 1}).contiguous().view(shape);
+/// The same for rows of any number, each rounded the same whatever is beside it: a scene among others is to be the scene
+/// alone. On one thread libtorch hands convolutions of one pixel to oneDNN from 16 pictures on, so rows are added to
+/// make it so; its BLAS sums few rows and many in different orders.
+Tensor EachRowAlike(const Tensor& rows, const Tensor& weight, const Tensor& bias) {
+  constexpr std::int64_t kPictures = 16;
+  const std::int64_t n = rows.size(0), missing = (kPictures - n % kPictures) % kPictures;
+  const Tensor whole = missing == 0 ? rows : at::cat({rows, rows.new_zeros({missing, rows.size(1)})});
+  return AsConvolution(whole, kPictures, weight, bias).narrow(0, 0, n);
 }
 
 bool IsFloatsInARow(const Tensor& x) { return x.is_cpu() && x.scalar_type() == at::kFloat && x.is_contiguous(); }
@@ -74,9 +75,15 @@ Tensor Linear::operator()(const Tensor& x) const {
   constexpr std::int64_t kManyRows = 512;
   const Tensor matrix = ForProduct(product_, weight.dim() > 2 ? weight.flatten(1) : weight);
   const Tensor addend = ForProduct(product_, bias);
-  if (IsFloatsInARow(x) && matrix.scalar_type() == at::kFloat && x.numel() >= kManyRows * x.size(-1))
-    return AsConvolution(x, matrix, addend);
-  return at::linear(InTypeOf(matrix, x), matrix, addend).to(x.scalar_type());
+  const bool is_in_floats = x.is_cpu() && x.scalar_type() == at::kFloat && matrix.scalar_type() == at::kFloat;
+  const bool is_trained = at::GradMode::is_enabled();
+  const bool is_large = x.is_contiguous() && x.numel() >= kManyRows * x.size(-1);
+  if (!is_in_floats || x.numel() == 0 || (is_trained && !is_large))
+    return at::linear(InTypeOf(matrix, x), matrix, addend).to(x.scalar_type());
+  std::vector<std::int64_t> shape = x.sizes().vec();
+  shape.back() = matrix.size(0);
+  const Tensor rows = x.contiguous().view({-1, x.size(-1)});
+  return (is_trained ? AsConvolution(rows, 1, matrix, addend) : EachRowAlike(rows, matrix, addend)).view(shape);
 }
 
 Conv2d::Conv2d(const Scope& at, std::int64_t in, std::int64_t out, const Options& options)
@@ -109,8 +116,10 @@ CausalConv::CausalConv(const Scope& at, std::int64_t channels)
 
 Tensor CausalConv::operator()(const Tensor& x) const {
   const Tensor kernel = ForProduct(product_, weight.flatten(3));  // (3, 1)
-  const Tensor padded = FastCausalPad(InTypeOf(kernel, x));       // [N, T + 2, L, C]
-  const Tensor y = at::conv2d(padded.permute({0, 3, 1, 2}), kernel, ForProduct(product_, bias));
+  Tensor padded = FastCausalPad(InTypeOf(kernel, x));             // [N, T + 2, L, C]
+  // libtorch hands one small picture to another library than two: a scene among others is to be the scene alone.
+  if (padded.size(0) == 1 && CanUseKernels(padded)) padded = at::cat({padded, padded});
+  const Tensor y = at::conv2d(padded.permute({0, 3, 1, 2}), kernel, ForProduct(product_, bias)).narrow(0, 0, x.size(0));
   return y.permute({0, 2, 3, 1}).contiguous().to(x.scalar_type());
 }
 

@@ -12,8 +12,10 @@ namespace {
 
 constexpr double kOutEpsilon = 1e-5;
 
-/// [BV, C, T, h, w] → [BVT, h, w, C]
-Tensor ToRows(const Tensor& x) { return x.permute({0, 2, 3, 4, 1}).reshape({-1, x.size(3), x.size(4), x.size(1)}); }
+/// [BV, C, T, h, w] → [BVT, h, w, C], in a row: one scene's would be a view, and layers take other ways for views
+Tensor ToRows(const Tensor& x) {
+  return x.permute({0, 2, 3, 4, 1}).contiguous().view({-1, x.size(3), x.size(4), x.size(1)});
+}
 
 /// [BVT, h, w, C] → [BV, C, T, h, w]
 Tensor FromRows(const Tensor& rows, std::int64_t frames) {
