@@ -27,9 +27,9 @@ Tensor AsConvolution(const Tensor& rows, std::int64_t pictures, const Tensor& we
   return at::conv2d(pixels, weight.view({out, in, 1, 1}), bias).permute({0, 2, 3, 1}).contiguous().view({n, out});
 }
 
-/// The same for rows of any number, each rounded the same whatever is beside it: a scene among others is to be the scene
-/// alone. On one thread libtorch hands convolutions of one pixel to oneDNN from 16 pictures on, so rows are added to
-/// make it so; its BLAS sums few rows and many in different orders.
+/// The same for rows of any number, each rounded the same whatever is beside it: a scene among others is to be the
+/// scene alone. On one thread libtorch hands convolutions of one pixel to oneDNN from 16 pictures on, so rows are added
+/// to make it so; its BLAS sums few rows and many in different orders.
 Tensor EachRowAlike(const Tensor& rows, const Tensor& weight, const Tensor& bias) {
   constexpr std::int64_t kPictures = 16;
   const std::int64_t n = rows.size(0), missing = (kPictures - n % kPictures) % kPictures;
@@ -117,8 +117,11 @@ CausalConv::CausalConv(const Scope& at, std::int64_t channels)
 Tensor CausalConv::operator()(const Tensor& x) const {
   const Tensor kernel = ForProduct(product_, weight.flatten(3));  // (3, 1)
   Tensor padded = FastCausalPad(InTypeOf(kernel, x));             // [N, T + 2, L, C]
-  // libtorch hands one small picture to another library than two: a scene among others is to be the scene alone.
-  if (padded.size(0) == 1 && CanUseKernels(padded)) padded = at::cat({padded, padded});
+  // libtorch hands one picture of so few numbers to another library than two: a scene among others is to be the scene
+  // alone.
+  constexpr std::int64_t kFewNumbers = 20480;
+  const bool is_small = padded.size(0) == 1 && padded.numel() <= kFewNumbers;
+  if (is_small && CanUseKernels(padded)) padded = at::cat({padded, padded});
   const Tensor y = at::conv2d(padded.permute({0, 3, 1, 2}), kernel, ForProduct(product_, bias)).narrow(0, 0, x.size(0));
   return y.permute({0, 2, 3, 1}).contiguous().to(x.scalar_type());
 }
