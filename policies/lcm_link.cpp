@@ -110,11 +110,14 @@ void LcmLink::Subscribe(const std::string& channels, Handler handler) {
 }
 
 void LcmLink::Handle(double timeout_s) {
-  int timeout_ms = std::max(0, static_cast<int>(timeout_s * 1000 + 0.999));
-  while (lcm_handle_timeout(lcm_, timeout_ms) > 0) {
-    if (thrown_) std::rethrow_exception(std::exchange(thrown_, nullptr));
-    timeout_ms = 0;
-  }
+  while (HandleOne(timeout_s)) timeout_s = 0;
+}
+
+bool LcmLink::HandleOne(double timeout_s) {
+  const int timeout_ms = std::max(0, static_cast<int>(timeout_s * 1000 + 0.999));
+  if (lcm_handle_timeout(lcm_, timeout_ms) <= 0) return false;
+  if (thrown_) std::rethrow_exception(std::exchange(thrown_, nullptr));
+  return true;
 }
 
 void LcmLink::PublishBytes(const std::string& channel, std::span<const std::uint8_t> bytes) {

@@ -61,6 +61,10 @@ class LcmLink {
   /// Waits at most `timeout_s` for a message, then handles it and all others that are already here.
   void Handle(double timeout_s);
 
+  /// Waits at most `timeout_s` for a message and handles that one.
+  /// @returns whether one came.
+  bool HandleOne(double timeout_s);
+
   /// @throws Error if the system refuses to send.
   template <typename Message>
   void Publish(const std::string& channel, const Message& message) {

@@ -278,7 +278,7 @@ PolicyServer::PolicyServer(Policy& policy, PolicySpec spec, const LcmAddress& ad
 
 PolicyServer::~PolicyServer() = default;
 
-void PolicyServer::Handle(double timeout_s) { impl_->link.Handle(timeout_s); }
+void PolicyServer::Handle(double timeout_s) { impl_->link.HandleOne(timeout_s); }
 
 void PolicyServer::Run() {
   while (!stop_) Handle(0.1);

@@ -25,12 +25,13 @@ class PolicyServer {
   PolicyServer(Policy& policy, PolicySpec spec, const LcmAddress& address = LcmAddress::FromEnvironment());
   ~PolicyServer();
 
-  /// Answers until Stop is called, by another thread or by the policy.
+  /// Answers until Stop is called, by another thread or by the policy: what is under way then is answered, what waits
+  /// behind it is not.
   void Run();
   void Stop() { stop_ = true; }
   bool stopped() const { return stop_; }
 
-  /// Waits at most `timeout_s` for a message and answers what is here.
+  /// Waits at most `timeout_s` for a message and answers that one.
   void Handle(double timeout_s);
 
   /// requests, repeated_requests, stale_requests, foreign_messages, undecodable_messages, errors, resets.

@@ -16,6 +16,16 @@ namespace {
 using wire::Count;
 using wire::Told;
 
+episode_start_t StartOf(const Task& task, const std::string& client, std::int64_t episode, int lane) {
+  episode_start_t start;
+  PutTask(task, start);
+  start.client = client;
+  start.episode = episode;
+  start.lane = lane;
+  start.seed = 1;
+  return start;
+}
+
 /// A harness of bare messages: what the server sends is kept as bytes.
 class BareClient {
  public:
@@ -26,14 +36,8 @@ class BareClient {
   }
 
   void Start(std::int64_t episode, int lane, const Task& task) {
-    episode_start_t start;
-    PutTask(task, start);
-    start.client = name_;
-    start.episode = episode;
-    start.lane = lane;
-    start.seed = 1;
     const std::size_t before = started.size();
-    link_.Publish(address_.Channel("start"), start);
+    link_.Publish(address_.Channel("start"), StartOf(task, name_, episode, lane));
     while (started.size() == before) link_.Handle(0.1);
   }
 
@@ -214,6 +218,26 @@ TEST_F(PolicyServerTest, ImagesThatAreNotTheTasksAreAnErrorReply) {
   client.Send("image", broken);
   client.Send("image", client.Image(0, 1, 1, observation_.images[1]));
   EXPECT_THAT(client.NextChunk().error, testing::HasSubstr("4607 bytes, wanted 4608 for 48x32 RGB"));
+}
+
+TEST_F(PolicyServerTest, WhatWaitsBehindAStopIsNotAnswered) {
+  struct OnceOnly final : wire::ProbePolicy {
+    void Reset(SceneId scene, const Task& task, std::uint64_t seed) override {
+      ProbePolicy::Reset(scene, task, seed);
+      server->Stop();
+    }
+    PolicyServer* server = nullptr;
+  } policy;
+  const LcmAddress address = wire::OwnAddress();
+  PolicyServer server(policy, wire::ProbeSpec(), address);
+  policy.server = &server;
+  LcmLink link(address.url);
+  int heard = 0;
+  link.Subscribe(address.Channel("start"), [&](const std::string&, auto) { ++heard; });
+  for (const int lane : {0, 1, 2}) link.Publish(address.Channel("start"), StartOf(task_, "bare", lane, lane));
+  while (heard < 3) link.Handle(0.1);
+  server.Run();
+  EXPECT_EQ(Count(server.counters(), "resets"), 1);
 }
 
 TEST_F(PolicyServerTest, AServedPolicyLeavesOnSigtermWithExitCodeZero) {
