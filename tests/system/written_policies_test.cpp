@@ -33,7 +33,7 @@ std::string BlockOfPage(const std::string& language, const std::string& containi
 TEST(WrittenPolicies, TheOneInCppRuns) {  // the build made it of the page
   const TempFolder folder;
   const CommandResult result = RunCommand(RunWords(kFaults, folder / "run",
-                                                   {"policies.0={name: wander, checkpoint: v1, command: [wander]}",
+                                                   {"policies.0={name: wander, checkpoint: v1, command: [documented-wander]}",
                                                     "initial_states.count=1", "still={enabled: false}"}));
   EXPECT_EQ(result.exit_code, 0) << result.err;
   EXPECT_EQ(nlohmann::json::parse(List(folder / "run"))[0]["stop"], "max_chunks");
