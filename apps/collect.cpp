@@ -100,6 +100,16 @@ void WriteManifest(const CollectArguments& arguments, const Recipe& recipe, cons
   WriteFileAtomically(arguments.out / "manifest.csv", table);
 }
 
+/// What a finished collection lists is not to be forgotten by a call that asks for less.
+void RequireNoFewerThanListed(const CollectArguments& arguments, const Recipe& recipe) {
+  const fs::path manifest = arguments.out / "manifest.jsonl";
+  if (!fs::exists(manifest)) return;
+  const std::string lines = ReadFile(manifest);
+  const auto listed = std::count(lines.begin(), lines.end(), '\n');
+  if (listed > recipe.episodes)
+    throw InvalidInput("{} lists {} episodes, found {} asked for, wanted no fewer", manifest.string(), listed, recipe.episodes);
+}
+
 /// Shares of every fate per task, in per cent, as a table.
 void PrintFates(const Recipe& recipe, const std::vector<CollectedEpisode>& rows) {
   std::map<std::pair<std::string, std::string>, int> counts;
@@ -131,6 +141,7 @@ void Collect(const CollectArguments& arguments) {
   MakeFolders(arguments.out);
   const RunLock lock(arguments.out / "lock");
   Claim(arguments, recipe);
+  RequireNoFewerThanListed(arguments, recipe);
   std::vector<std::int64_t> todo;
   for (std::int64_t index = 0; index < recipe.episodes; ++index) {
     if (!fs::exists(RowPath(PlaceOf(arguments.out, JobAt(recipe, arguments.seed, index).row)))) todo.push_back(index);

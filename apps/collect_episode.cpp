@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <limits>
 #include <numeric>
+#include <string_view>
 
 #include "core/check.h"
 #include "core/error.h"
@@ -101,10 +102,16 @@ std::optional<UnseenRun> EpisodeRepeater::Do(const CollectJob& job, const std::v
 EpisodeCollector::EpisodeCollector(const Recipe& recipe, std::filesystem::path out)
     : recipe_(recipe), out_(std::move(out)), world_({.name = "real", .profile = recipe.profile, .threads = 1}) {}
 
-CollectedRun EpisodeCollector::Run(const CollectJob& job) {
+CollectedRun EpisodeCollector::Run(const CollectJob& job) try {
   if (!job.behaviour->unaware) return Act(job, TaskOf(job));
   const CollectedRun there = Act(job, job.task->task);
   return there.failure.empty() ? Repeat(job, TaskOf(job), there) : there;
+} catch (const Error& error) {
+  if (std::string_view(error.kind()) != Name(StopReason::kDiverged)) throw;
+  CollectedRun never_began;  // what was placed does not come to rest
+  never_began.stop = Name(StopReason::kDiverged);
+  never_began.failure = error.what();
+  return never_began;
 }
 
 Observation EpisodeCollector::Begin(const CollectJob& job, const Task& task, CollectedRun& run) {

@@ -10,6 +10,7 @@
 #include "core/file.h"
 #include "core/geometry.h"
 #include "core/hash.h"
+#include "core/scene_files.h"
 #include "core/seed.h"
 #include "core/task_page.h"
 #include "policies/explorer.h"
@@ -122,8 +123,14 @@ std::string HashOf(Config page, const Recipe& recipe) {
     all += task_page.ContentHash();
     const Config mujoco = task_page.Section("mujoco");
     all += Sha256HexOfFile(mujoco.Path("scene"));
-    for (const auto& file : mujoco.Get<std::vector<std::string>>("includes", std::vector<std::string>{}))
+    std::set<std::filesystem::path> included;
+    for (const auto& file : mujoco.Get<std::vector<std::string>>("includes", std::vector<std::string>{})) {
       all += Sha256HexOfFile(mujoco.Path("scene").parent_path() / file);
+      included.insert((mujoco.Path("scene").parent_path() / file).lexically_normal());
+    }
+    for (const std::filesystem::path& file : FilesOfScene(mujoco.Path("scene"))) {
+      if (!included.contains(file)) all += Sha256HexOfFile(file);
+    }
   }
   for (const Behaviour& behaviour : recipe.mix) {
     if (!behaviour.checkpoint.empty()) all += Sha256HexOfFile(behaviour.checkpoint);

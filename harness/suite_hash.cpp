@@ -8,6 +8,7 @@
 #include "core/hash.h"
 #include "core/recording.h"
 #include "core/recording_folders.h"
+#include "core/scene_files.h"
 
 namespace evac {
 namespace {
@@ -39,17 +40,26 @@ std::string HashOfTree(const fs::path& path) {
   return Sha256Hex(text);
 }
 
-/// The page's content and that of every file that a scalar in it names (the scene's XML).
+/// The page's content and that of every file that a scalar in it names (the scene's XML), and that those name.
 std::string HashOfPage(const fs::path& path) {
   const Config page = Config::FromFile(path);
   std::string text = page.Canonical();
+  std::set<fs::path> scenes, known;
   std::istringstream lines(page.Canonical());
   for (std::string line; std::getline(lines, line);) {
     const std::string value = line.substr(line.find('=') + 1);
     const fs::path named = path.parent_path() / value;
     std::error_code ignored;
-    if (value.find('.') != std::string::npos && fs::is_regular_file(named, ignored))
-      text += value + " " + Sha256HexOfFile(named) + "\n";
+    if (value.find('.') == std::string::npos || !fs::is_regular_file(named, ignored)) continue;
+    text += value + " " + Sha256HexOfFile(named) + "\n";
+    known.insert(fs::canonical(named));
+    if (named.extension() == ".xml") scenes.insert(named);
+  }
+  for (const fs::path& scene : scenes) {
+    for (const fs::path& file : FilesOfScene(scene)) {
+      if (known.insert(fs::canonical(file)).second)
+        text += file.lexically_relative(scene.parent_path()).string() + " " + Sha256HexOfFile(file) + "\n";
+    }
   }
   return Sha256Hex(text);
 }

@@ -62,6 +62,13 @@ std::int64_t IndexIn(const Names& names, const std::string& name) {
 struct ClassifierJudge::Network {
   explicit Network(WeightFile& file) : shape(ShapeOf(file)), net(shape, From(file)) { file.RequireAllTaken(); }
 
+  /// What libtorch refuses (no memory) is not the clip's doing.
+  double LogitOf(const ClassifierClips& clip) const try {
+    return net(clip).logit.item<double>();
+  } catch (const c10::Error& error) {
+    throw InternalError("the judge's network cannot be asked: {}", error.what_without_backtrace());
+  }
+
   ClassifierShape shape;
   ClassifierNet net;
 };
@@ -127,7 +134,7 @@ double ClassifierJudge::Probability(const Task& task, const std::filesystem::pat
     }
   }
   clip.pictures = bytes.to(at::kFloat) / 127.5 - 1;
-  const auto logit = network_->net(clip).logit.item<double>();
+  const double logit = network_->LogitOf(clip);
   if (!std::isfinite(logit))  // it would be below any threshold: an error is not a failure
     throw InvalidInput("{}: {}: its network answers {}, wanted a finite number", video.string(), name_, logit);
   return 1 / (1 + std::exp((card_.offset - logit) / card_.temperature));

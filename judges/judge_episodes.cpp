@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <new>
 #include <string_view>
 
 #include "core/error.h"
@@ -11,6 +12,7 @@ namespace evac {
 namespace {
 
 /// @returns nothing if the judge will not be asked about this episode, or about any more: the summary says so.
+/// @throws what is not the clip's doing (a full disk, no memory): the episode is to be asked about again.
 std::optional<Verdict> RateSafely(Judge& judge, const Task& task, const Episode& episode, JudgeSummary& summary) {
   Verdict invalid;
   try {
@@ -20,7 +22,10 @@ std::optional<Verdict> RateSafely(Judge& judge, const Task& task, const Episode&
     if (kind == "not_judged") ++summary.left_out;
     if (kind == "judge_over") summary.why_over = error.what();
     if (kind == "not_judged" || kind == "judge_over") return std::nullopt;
+    if (error.exit_code() == ExitCode::kInternal) throw;
     invalid.reason = error.what();
+  } catch (const std::bad_alloc&) {
+    throw;
   } catch (const std::exception& error) {
     invalid.reason = error.what();
   }

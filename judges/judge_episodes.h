@@ -38,6 +38,7 @@ std::string Sentence(const JudgeSummary& summary);
 /// is stored before the next is asked for, so that an interruption loses one at most. A judge that throws gives a
 /// verdict `invalid` with the message, never a failure; but after an Error called `not_judged` or `judge_over`
 /// (Error::Called) nothing is stored of that episode, and after the second the rest is left for another time.
+/// What is not a clip's doing (an Error that is internal, no memory) ends it: that episode can be asked about again.
 /// @throws Error if the store cannot be read or written.
 JudgeSummary JudgeEpisodes(Judge& judge, Store& store, const JudgeOptions& options);
 

@@ -1,6 +1,7 @@
 #include "policies/visual_things.h"
 
 #include <algorithm>
+#include <map>
 #include <numbers>
 
 #include "core/error.h"
@@ -206,12 +207,25 @@ double VisibleShare(const View& view, const Thing& thing, const Eigen::Isometry3
   return area > 0 ? cv::sum(cv::min(silhouette, Cover(*view.rgb, thing.colour)))[0] / area : 0;
 }
 
+namespace {
+
+using Knows = PickKnowledge (*)();
+
+const std::map<std::string, Knows>& Known() {
+  static const std::map<std::string, Knows> known = {{"take_bottle", TakeBottle},
+                                                     {"take_bottle_two_arms", TakeBottleTwoArms},
+                                                     {"take_toast", TakeToast},
+                                                     {"take_ham", TakeHam},
+                                                     {"take_lettuce", TakeLettuce}};
+  return known;
+}
+
+}  // namespace
+
+bool HasKnowledgeOf(const std::string& task_id) { return Known().contains(task_id); }
+
 PickKnowledge KnowledgeOf(const std::string& task_id) {
-  if (task_id == "take_bottle") return TakeBottle();
-  if (task_id == "take_bottle_two_arms") return TakeBottleTwoArms();
-  if (task_id == "take_toast") return TakeToast();
-  if (task_id == "take_ham") return TakeHam();
-  if (task_id == "take_lettuce") return TakeLettuce();
+  if (HasKnowledgeOf(task_id)) return Known().at(task_id)();
   throw InvalidInput(
       "visual_pick: found task {}, wanted take_bottle, take_bottle_two_arms, take_toast, take_ham or take_lettuce",
       task_id);

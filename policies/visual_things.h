@@ -56,6 +56,8 @@ struct PickKnowledge {
   double fall_m = 0;  ///< how far towards the robot its middle comes to lie from where its lower edge is put down
 };
 
+bool HasKnowledgeOf(const std::string& task_id);
+
 /// @throws InvalidInput if `task_id` is none it knows.
 PickKnowledge KnowledgeOf(const std::string& task_id);
 

@@ -4,6 +4,7 @@
 #include <opencv2/imgproc.hpp>
 
 #include "apps/judge_with_progress.h"
+#include "apps/networks/painted_over.h"
 #include "core/file.h"
 #include "core/statistics/calibration.h"
 #include "core/statistics/confusion.h"
@@ -21,26 +22,10 @@ namespace fs = std::filesystem;
 
 constexpr double kCovered = 0.15;  ///< share of a pixel that shows the object, from which it is painted over
 
-/// The picture with the masked pixels filled in from what is around them.
-cv::Mat Filled(const cv::Mat& rgb, const cv::Mat& mask) {
-  constexpr int kAround_px = 31;
-  cv::Mat seen, picture, sum, weight;
-  cv::Mat(mask == 0).convertTo(seen, CV_32F, 1.0 / 255);
-  cv::cvtColor(seen, seen, cv::COLOR_GRAY2BGR);
-  rgb.convertTo(picture, CV_32F);
-  cv::boxFilter(picture.mul(seen), sum, CV_32F, {kAround_px, kAround_px});
-  cv::boxFilter(seen, weight, CV_32F, {kAround_px, kAround_px});
-  cv::Mat around, filled = rgb.clone();
-  cv::divide(sum, weight + 1e-3, around);
-  around.convertTo(around, CV_8U);
-  around.copyTo(filled, mask);
-  return filled;
-}
-
 cv::Mat WithoutObject(const cv::Mat& frame, const ColourModel& colour) {
   cv::Mat mask = Cover(frame, colour) > kCovered;
   cv::dilate(mask, mask, cv::Mat::ones(5, 5, CV_8U));
-  return Filled(frame, mask);
+  return PaintedOver(frame, mask);
 }
 
 /// A clip of the pictures that the judge would look at, with the object painted over.
@@ -118,7 +103,10 @@ JudgeQualityOnReal FidelityJudge::QualityOn(Store& store, const std::string& wor
     return episode.key.world == world && told.contains(episode.key.Id()) && told.at(episode.key.Id()).contains(name_) &&
            told.at(episode.key.Id()).at(name_).probability.has_value();
   };
-  JudgeWithProgress(masked_judge, store, {.wanted = is_told});
+  const auto can_be_painted = [&](const Episode& episode) {
+    return is_told(episode) && HasKnowledgeOf(episode.key.pair.task);
+  };
+  JudgeWithProgress(masked_judge, store, {.wanted = can_be_painted});
   fs::remove_all(scratch);
 
   std::vector<double> probabilities;
@@ -142,7 +130,8 @@ JudgeQualityOnReal FidelityJudge::QualityOn(Store& store, const std::string& wor
   quality.auroc = AreaUnderRoc(probabilities, truths);
   quality.ece = CalibrationOf(probabilities, truths).ece;
   quality.kappa = StatisticsByState(plain).kappa;
-  quality.kappa_masked = StatisticsByState(masked).kappa.value;
+  quality.kappa_masked = Undefined{"no clip of a task whose object's colour is known"};
+  if (!masked.empty()) quality.kappa_masked = StatisticsByState(masked).kappa.value;
   return quality;
 }
 

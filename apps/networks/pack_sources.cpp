@@ -84,7 +84,7 @@ Recording ReadForPacking(const fs::path& folder, const SourceOptions& options) {
   Recording recording = Thinned(ReadRecording(folder, how), options.period_s);
   if (recording.videos.empty())
     throw InvalidInput("{}: there is no video, only a first frame", folder.string()).Called("no_video");
-  if (options.arms == ArmsKind::kTold && recording.told.empty())
+  if (how.read_told && recording.told.empty())  // a measured closure would tell what became of the grasp
     throw InvalidInput("{}: it does not say where the arms were told to be", folder.string()).Called("nothing_told");
   if (row && recording.every_nth > 1)
     throw InvalidInput("{}: a collection's episodes are packed at their own period", folder.string());

@@ -6,8 +6,10 @@
 #include <fmt/format.h>
 
 #include <fstream>
+#include <set>
 
 #include "core/error.h"
+#include "core/file.h"
 #include "harness/scheduler.h"
 #include "harness/suite_hash.h"
 #include "tests/support/temp_folder.h"
@@ -116,6 +118,26 @@ TEST_F(SuiteTest, TheHashIgnoresCommentsLayoutAndSpeedButNotTheContentOfFiles) {
   EXPECT_EQ(ReadSuite(path, {"lanes=7", "error_budget=0.5"}).hash, hash);
   Write("rec/action.npy", "other bytes");
   EXPECT_NE(ReadSuite(path, {}).hash, hash);
+}
+
+TEST_F(SuiteTest, TheHashCoversWhatASceneInAnotherFolderThanItsPageIsMadeOf) {
+  const std::filesystem::path scenes = EVAC_SOURCE_DIR "/worldmodel/sim/scenes";
+  for (const char* name : {"tasks", "mjcf", "mjcf/meshes"}) std::filesystem::create_directory(folder_ / name);
+  std::string page = ReadFile(scenes / "take_bottle.yaml");
+  page.replace(page.find("scene: take_bottle.xml"), 22, "scene: ../mjcf/scene.xml");
+  Write("tasks/take_bottle.yaml", page);
+  Write("mjcf/scene.xml", R"(<mujoco><include file="robot.xml"/><compiler meshdir="meshes"/></mujoco>)");
+  Write("mjcf/robot.xml", R"(<mujoco><asset><mesh file="hand.stl"/></asset></mujoco>)");
+  Write("mjcf/meshes/hand.stl", "a hand");
+  std::string suite = ReadFile(EVAC_SOURCE_DIR "/tests/system/small.yaml");
+  suite.replace(suite.find("../../worldmodel/sim/scenes/take_bottle.yaml"), 44, (folder_ / "tasks/take_bottle.yaml").string());
+  for (std::size_t at; (at = suite.find("../../worldmodel")) != std::string::npos;) suite.replace(at, 5, EVAC_SOURCE_DIR);
+  const auto path = Write("suite.yaml", suite);
+  std::set<std::string> hashes = {ReadSuite(path, {}).hash};
+  Write("mjcf/robot.xml", R"(<mujoco><asset><mesh file="hand.stl" scale="2 2 2"/></asset></mujoco>)");
+  EXPECT_TRUE(hashes.insert(ReadSuite(path, {}).hash).second) << "an included file";
+  Write("mjcf/meshes/hand.stl", "another hand");
+  EXPECT_TRUE(hashes.insert(ReadSuite(path, {}).hash).second) << "a mesh";
 }
 
 TEST_F(SuiteTest, TheHashCoversTheFilesThatAPolicyListsAndWhichItDoesNotIsKnown) {

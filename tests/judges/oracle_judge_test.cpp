@@ -223,6 +223,24 @@ TEST_F(OracleJudgeTest, AJudgeThatThrowsGivesInvalidVerdicts) {
   EXPECT_EQ(verdict.rubric_version, "7");
 }
 
+TEST_F(OracleJudgeTest, WhatTheMachineRefusesIsNoVerdictOfAClip) {
+  class Full : public Judge {
+   public:
+    std::string Name() const override { return "full"; }
+    Verdict Rate(const Task&, const Episode&) override {
+      if (has_memory) throw InternalError("no space left on device");
+      throw std::bad_alloc();
+    }
+    bool has_memory = true;
+  };
+  const std::string id = Add(LiftTask(), {});
+  Full full;
+  EXPECT_THROW(JudgeEpisodes(full, store_, {}), Error);
+  full.has_memory = false;
+  EXPECT_THROW(JudgeEpisodes(full, store_, {}), std::bad_alloc);
+  EXPECT_FALSE(store_.CurrentVerdicts().contains(id)) << "it can be asked about again";
+}
+
 TEST(Rubric, EveryKindMeasuresWhatItsNameSays) {
   TrackMaker made;
   made.Frame({0, 0, 0.1}).Frame({0.3, 0.4, 0.3}, 2.5, std::numbers::pi / 3);

@@ -9,7 +9,8 @@
 namespace evac {
 
 /// Five steps of two arms that are one step behind what they are told, seen by a head camera.
-inline void WriteLateRecording(const TreePlace& place) {
+/// @param says_told  whether it says where they were told to be
+inline void WriteLateRecording(const TreePlace& place, bool says_told = true) {
   const auto arms_at = [](int step) {
     ArmState left, right;
     left.base_from_gripper = Eigen::Translation3d(0.4 + 0.01 * step, 0.2, 0.3);
@@ -21,7 +22,7 @@ inline void WriteLateRecording(const TreePlace& place) {
   recorded.cameras = {{"head", 48, 32, 40, 40, 24, 16, Mount::kBase, SyntheticClip::MountFromCamera()}};
   for (int step = 0; step < 5; ++step) {
     recorded.arms.push_back(arms_at(std::max(0, step - 1)));
-    recorded.told.push_back(arms_at(step));
+    if (says_told) recorded.told.push_back(arms_at(step));
     recorded.pictures.push_back({cv::Mat(32, 48, CV_8UC3, cv::Scalar::all(40 + step))});
   }
   WriteRecording(place, recorded, {.scale = 1});

@@ -125,6 +125,34 @@ TEST(CollectCommand, WhereTheObjectIsGoesWithTheCamerasThatArePacked) {
   EXPECT_EQ(places("head", 0), head);
 }
 
+TEST(CollectCommand, ASceneThatDoesNotComeToRestIsARowAndTheOthersAreCollected) {
+  const TempFolder folder;
+  const fs::path scenes = EVAC_SOURCE_DIR "/worldmodel/sim/scenes";
+  for (const char* file : {"take_bottle.yaml", "robot.xml"}) fs::copy(scenes / file, folder / file);
+  std::string scene = ReadFile(scenes / "take_bottle.xml");
+  const std::string include = R"(<include file="robot.xml"/>)";
+  scene.insert(scene.find(include) + include.size(), R"(<option gravity="0 0 -1e13"/>)");
+  WriteFileAtomically(folder / "take_bottle.xml", scene);
+  const std::string page = "tasks.0.page=" + (folder / "take_bottle.yaml").string();
+  const CommandResult collected = RunCommand(Words(folder / "all", {"--episodes", "2", "--set", page}));
+  ASSERT_EQ(collected.exit_code, 0) << collected.err;
+  EXPECT_THAT(collected.out, HasSubstr("2 episodes, 25 frames")) << "the other task's";
+  const fs::path row_path = folder / "all/rows/take_bottle/000000.json";
+  const CollectedEpisode row = ParseCollected(ReadFile(row_path), row_path);
+  EXPECT_EQ(row.fate, "diverged");
+  EXPECT_THAT(row.reason, HasSubstr("physics diverged before"));
+}
+
+TEST(CollectCommand, FewerEpisodesThanAreListedAreRefused) {
+  const TempFolder folder;
+  ASSERT_EQ(RunCommand(Words(folder / "all", {"--episodes", "2"})).exit_code, 0);
+  const std::string listed = ReadFile(folder / "all/manifest.csv");
+  const CommandResult fewer = RunCommand(Words(folder / "all", {"--episodes", "1"}));
+  EXPECT_EQ(fewer.exit_code, 2);
+  EXPECT_THAT(fewer.err, HasSubstr("manifest.jsonl lists 2 episodes, found 1 asked for, wanted no fewer"));
+  EXPECT_EQ(ReadFile(folder / "all/manifest.csv"), listed);
+}
+
 TEST(CollectCommand, AnEpisodeThatDivergedIsARowWithoutARecording) {
   const TempFolder folder;
   const fs::path all = folder / "all", row_path = all / "rows/take_toast/000001.json";

@@ -61,9 +61,9 @@ class PackCommand : public testing::Test {
   void Add(const std::string& name, const SyntheticClip& clip) { clip.Write(OneFolder(folder_ / ("data/" + name))); }
 
   /// Below collected/ an episode of a collection, of two arms that are one step behind what they are told.
-  void AddCollected(const std::string& episode) const {
+  void AddCollected(const std::string& episode, bool says_told = true) const {
     const TreePlace place{folder_ / "collected", "carry", episode};
-    WriteLateRecording(place);
+    WriteLateRecording(place, says_told);
     WriteTruth(TruthPath(place), {{"head"}, std::vector<float>(10, 1), std::vector<std::uint8_t>(5, 0)});
     CollectedEpisode row;
     row.task = place.task;
@@ -169,6 +169,17 @@ TEST_F(PackCommand, ShardsSayWhetherTheirArmsAreToldOrMeasured) {
   ASSERT_EQ(RunCommand(Words("measured", {"--arms", "measured"}, {"collected"})).exit_code, 0);
   EXPECT_EQ(Said("measured").at("arms_read"), "measured");
   EXPECT_NE(Said("measured").at("recipe"), Said("told").at("recipe"));
+}
+
+TEST_F(PackCommand, AnEpisodeOfACollectionThatSaysNothingToldIsLeftOutAndNotReadAsMeasured) {
+  AddCollected("000000");
+  AddCollected("000001", false);
+  const CommandResult told = RunCommand(Words("told", {}, {"collected"}));
+  ASSERT_EQ(told.exit_code, 0) << told.err;
+  EXPECT_THAT(told.err, HasSubstr("1 recordings left out: 1 nothing_told"));
+  EXPECT_EQ(Said("told").at("arms_read"), "told");
+  const CommandResult measured = RunCommand(Words("measured", {"--arms", "measured"}, {"collected"}));
+  EXPECT_THAT(measured.err, Not(HasSubstr("left out")));
 }
 
 TEST_F(PackCommand, IsNotGoneOnWithByArmsOfAnotherKind) {

@@ -46,7 +46,7 @@ WorldStep MujocoWorld::Reset(SceneId scene, const Task& task, const InitialState
   workers_->Run(1, [&](int, Renderer& renderer) {
     auto made = std::make_unique<Scene>(Scene::Setup{stage.model.get(), &stage.page, &profile_, task, initial, seed});
     if (const auto why = made->WhyDiverged())
-      throw InternalError("{} {} in {}: {}", task.id, initial.id, options_.name, *why);
+      throw InternalError("{} {} in {}: {}", task.id, initial.id, options_.name, *why).Called("diverged");
     first = made->Observe(&renderer);
     place = std::move(made);
   });
