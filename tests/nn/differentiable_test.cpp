@@ -58,10 +58,10 @@ TEST(FastGradients, OfGroupNormAreThoseOfLibtorch) {
 }
 
 TEST(FloatMath, ExponentialStaysFiniteAboveAndNoNumberStaysNone) {
-  for (const float x : {-80.0F, -1.0F, 0.0F, 1.0F, 59.9F, 60.0F})
+  for (const float x : {-87.0F, -1.0F, 0.0F, 1.0F, 87.9F, 88.0F})
     EXPECT_NEAR(kernels::Exponential(x) / std::exp(static_cast<double>(x)), 1, 1e-6) << x;
-  for (const float x : {60.5F, 88.5F, 177.4F, 1e30F, HUGE_VALF})
-    EXPECT_EQ(kernels::Exponential(x), kernels::Exponential(60.0F)) << x;
+  for (const float x : {88.5F, 177.4F, 1e30F, HUGE_VALF})
+    EXPECT_EQ(kernels::Exponential(x), kernels::Exponential(88.0F)) << x;
   EXPECT_TRUE(std::isnan(kernels::Exponential(std::nanf(""))));
 }
 

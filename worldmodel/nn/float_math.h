@@ -8,13 +8,10 @@
 /// Functions of one float that a compiler can turn into vector code.
 namespace evac::nn::kernels {
 
-/// e^x to 2e-7, for x from -80 to 60. Below it stays that of -80, which is 0 for all that is done with it; above it
-/// stays that of 60, so that 1 / (1 + e^x) is 0 to 1e-26. What is no number stays none (hence the order of the arguments).
-///
-/// A compiler may go on with a bound for every number and choose afterwards. With bounds where floats end (-87, 88) what
-/// it goes on with is denormal, and each such number costs an Intel processor a hundred cycles (docs/performance.md).
-inline float Exponential(float x) {
-  const float bounded = std::min(std::max(x, -80.0F), 60.0F);
+/// e^x to 2e-7, for x between the bounds; beyond them it stays that of the bound. What is no number stays none (hence
+/// the order of the arguments).
+inline float ExponentialWithin(float least, float most, float x) {
+  const float bounded = std::min(std::max(x, least), most);
   const float shifted = bounded * 1.44269504F + 12582912.0F;  // rounds to a whole number in the low bits
   const float whole = shifted - 12582912.0F;
   const float rest = (bounded - whole * 0.693359375F) + whole * 2.12194440e-4F;
@@ -28,6 +25,15 @@ inline float Exponential(float x) {
   return power * std::bit_cast<float>((static_cast<std::int32_t>(whole) + 127) << 23);
 }
 
+/// From -87 to 88. Below it is 0 for all that is done with it; above it stays that of 88, so that 1 / (1 + e^x) is 0 to
+/// 1e-38.
+inline float Exponential(float x) { return ExponentialWithin(-87.0F, 88.0F, x); }
+
+/// From -80 to 60, for activations: 1 / (1 + e^x) is 0 to 1e-26. A compiler may go on with a bound for every number and
+/// choose afterwards; where floats end (-87, 88) what it goes on with is denormal, and each such number costs an Intel
+/// processor a hundred cycles (docs/performance.md).
+inline float MildExponential(float x) { return ExponentialWithin(-80.0F, 60.0F, x); }
+
 /// Error function to 1.5e-7 (Abramowitz and Stegun 7.1.26).
 inline float ErrorFunction(float x) {
   const float size = std::fabs(x);
@@ -37,7 +43,7 @@ inline float ErrorFunction(float x) {
   polynomial = polynomial * t + 1.421413741F;
   polynomial = polynomial * t - 0.284496736F;
   polynomial = polynomial * t + 0.254829592F;
-  const float value = 1.0F - polynomial * t * Exponential(-size * size);
+  const float value = 1.0F - polynomial * t * MildExponential(-size * size);
   return x < 0 ? -value : value;
 }
 

@@ -56,7 +56,7 @@ EVAC_EACH_PROCESSOR void NormaliseSilu(std::int64_t rows, std::int64_t channels,
 #pragma omp simd
     for (std::int64_t c = 0; c < channels; ++c) {
       const float value = (in[c] - affine.mean[c]) * affine.factor[c] + affine.bias[c];
-      out[c] = value / (1.0F + Exponential(-value));
+      out[c] = value / (1.0F + MildExponential(-value));
     }
   }
 }

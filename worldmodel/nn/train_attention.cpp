@@ -192,7 +192,7 @@ EVAC_EACH_PROCESSOR void GateBack(std::int64_t half, const float* x, const float
 #pragma omp simd
   for (std::int64_t c = 0; c < half; ++c) {
     const float gate = x[half + c], normal = 0.5F * (1.0F + ErrorFunction(gate * 0.70710678F));
-    const float density = 0.39894228F * Exponential(-0.5F * gate * gate);
+    const float density = 0.39894228F * MildExponential(-0.5F * gate * gate);
     dx[c] = gradient[c] * gate * normal;
     dx[half + c] = gradient[c] * x[c] * (normal + gate * density);
   }

@@ -45,7 +45,7 @@ EVAC_EACH_PROCESSOR void ApplySilu(std::int64_t rows, std::int64_t channels, con
 #pragma omp simd
     for (std::int64_t c = 0; c < channels; ++c) {
       const float z = (x[r * channels + c] - row.mean[c]) * row.factor[c] + row.bias[c];
-      y[r * channels + c] = z / (1.0F + Exponential(-z));
+      y[r * channels + c] = z / (1.0F + MildExponential(-z));
     }
   }
 }
@@ -57,7 +57,7 @@ EVAC_EACH_PROCESSOR void BeforeSilu(std::int64_t rows, std::int64_t channels, co
 #pragma omp simd
     for (std::int64_t c = 0; c < channels; ++c) {
       const float z = (x[r * channels + c] - row.mean[c]) * row.factor[c] + row.bias[c];
-      const float sigmoid = 1.0F / (1.0F + Exponential(-z));
+      const float sigmoid = 1.0F / (1.0F + MildExponential(-z));
       before[r * channels + c] = gradient[r * channels + c] * sigmoid * (1.0F + z * (1.0F - sigmoid));
     }
   }
