@@ -109,7 +109,7 @@ void AddCalibrate(CLI::App& judge, ExitCode& exit_code) {
   command->add_flag("--json", arguments->as_json, "for other programs");
   command->footer(
       "Exit code 0: a gate may count it; 1: it is not good enough; 2: one of the two has judged nothing; 3: too few "
-      "episodes to say.\n"
+      "episodes to say, or none of a world that it judged.\n"
       "Example:\n  evac judge calibrate out/demo --judge vlm:qwen3-vl-1a2b3c4d");
   command->callback([arguments, &exit_code] { exit_code = Calibrate(*arguments); });
 }

@@ -54,6 +54,15 @@ struct JudgedRun {
   RunSummary summary;
 };
 
+/// Before whatever is made of them says so in its own words.
+void Check(const ComparisonOptions& options) {
+  const auto require = [](const char* option, double found) {
+    if (!(found > 0 && found < 1)) throw InvalidInput("compare: --{} is {}, wanted between 0 and 1", option, found);
+  };
+  require("alpha", options.alpha);
+  require("power", options.power);
+}
+
 JudgedRun Read(const std::string& folder, const CompareArguments& arguments) {
   SummaryOptions options;
   options.judge = arguments.judge;
@@ -188,6 +197,7 @@ std::vector<BetState> Bet(const PolicyComparison& comparison, const std::string&
 }
 
 void Compare(const CompareArguments& arguments) {
+  Check(arguments.options);
   const PolicyPlace first = PlaceOf(arguments.first, arguments.run), second = PlaceOf(arguments.second, arguments.run);
   if (!arguments.run.empty() && first.run != arguments.run && second.run != arguments.run)
     throw InvalidInput("--run: found {}, but both policies name runs of their own: {} and {}", arguments.run, first.run,

@@ -150,6 +150,7 @@ void AddPin(CLI::App& gate, ExitCode& exit_code) {
   command->callback([arguments, &exit_code] {
     const PinnedResult pinned = PinRun(arguments->run, arguments->judge);
     DemandOutcomes(pinned, *arguments);
+    MakeFolders(fs::path(arguments->out).parent_path());
     WriteFileAtomically(arguments->out, PinnedJson(pinned));
     fmt::print("{}\n", pinned.sha256);
     exit_code = ExitCode::kOk;

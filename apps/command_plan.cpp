@@ -1,14 +1,18 @@
 #include <fmt/format.h>
 
+#include <cstdint>
 #include <cstdio>
 #include <memory>
 #include <nlohmann/json.hpp>
 
 #include "apps/commands.h"
+#include "core/error.h"
 #include "reports/plan.h"
 
 namespace evac {
 namespace {
+
+constexpr std::int64_t kMostTrials = 100'000;  // the power of each is a sum over as many flips
 
 struct PlanArguments {
   PlanOptions options;
@@ -41,6 +45,8 @@ void AddPlan(CLI::App& app, ExitCode& exit_code) {
       "  evac plan --rate 0.28 --difference 0.08 --trials 25\n"
       "  evac plan --rate 0.9 --flips 0.15 --trials 100 --imagined 2000 --json");
   command->callback([arguments, &exit_code] {
+    const std::int64_t trials = arguments->options.trials;
+    if (trials > kMostTrials) throw InvalidInput("plan: --trials is {}, wanted at most {}", trials, kMostTrials);
     const Plan plan = MakePlan(arguments->options);
     arguments->json ? fmt::print("{}\n", PlanJson(plan).dump(2)) : fmt::print("{}", PlanText(plan));
     exit_code = ExitCode::kOk;

@@ -173,8 +173,10 @@ void AddNew(CLI::App& rate, const std::shared_ptr<RateArguments>& shared, ExitCo
   command->add_option("--name", a.make.name, "of the study; else its folder's");
   command->add_option("--states", a.make.states, "so many initial states per task, drawn by the seed; 0: all")
       ->capture_default_str();
-  command->add_option("--height", a.make.height_px, "of the first view as raters see it, pixels")
-      ->capture_default_str();
+  command
+      ->add_option("--height", a.make.height_px,
+                   "of the first view as raters see it, pixels; of a study that is there, what it began with")
+      ->default_str(std::to_string(kStudyHeight_px));
   command->add_option("--vae-roundtrip", a.round_trip,
                       "weights of a world model: clips that it did not imagine are shown as its codec gives them back");
   command->add_option("--config", a.config, "that world model's page");

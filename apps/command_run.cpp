@@ -2,7 +2,7 @@
 
 #include <algorithm>
 #include <cctype>
-#include <cstdio>
+#include <charconv>
 #include <memory>
 #include <string_view>
 
@@ -39,8 +39,12 @@ struct ResumeArguments {
 /// "2/4": the second of four.
 Shard ShardNamed(const std::string& text) {
   Shard shard;
-  int read = 0;
-  const bool is_read = std::sscanf(text.c_str(), "%d/%d%n", &shard.number, &shard.of, &read) == 2 && read == static_cast<int>(text.size());
+  const std::size_t slash = std::min(text.find('/'), text.size());
+  const auto reads = [&](std::size_t from, std::size_t to, int& number) {
+    const auto [end, error] = std::from_chars(text.data() + std::min(from, to), text.data() + to, number);
+    return error == std::errc() && end == text.data() + to;
+  };
+  const bool is_read = reads(0, slash, shard.number) && reads(slash + 1, text.size(), shard.of);
   if (is_read && shard.number >= 1 && shard.number <= shard.of) return shard;
   throw InvalidInput("--shard: found '{}', wanted which of how many, such as 2/4", text);
 }

@@ -6,6 +6,7 @@
 #include <cstdio>
 #include <memory>
 #include <set>
+#include <utility>
 
 #include "apps/factory.h"
 #include "apps/interrupts.h"
@@ -50,7 +51,17 @@ std::vector<Job> JobsOf(const Suite& suite, const Shard& shard, const SuiteWorld
   return jobs;
 }
 
-Plan MakePlan(const Suite& suite, const Shard& shard, const Store& store) {
+/// The shard's failed episodes that are stored.
+std::set<EpisodeKey> FailedOf(const Shard& shard, const Store& store) {
+  std::set<EpisodeKey> failed;
+  for (const Episode& episode : store.Episodes()) {
+    if (IsFailure(episode.stop) && shard.Holds(episode.key.pair)) failed.insert(episode.key);
+  }
+  return failed;
+}
+
+/// @param again  failed episodes that are to run again: still to do, and not failed yet
+Plan MakePlan(const Suite& suite, const Shard& shard, const Store& store, const std::set<EpisodeKey>& again = {}) {
   Plan plan;
   for (const SuiteWorld& world : suite.worlds) {
     for (const SuitePolicy& policy : suite.policies) {
@@ -59,8 +70,9 @@ Plan MakePlan(const Suite& suite, const Shard& shard, const Store& store) {
       plan.missing += static_cast<int>(MissingJobs(jobs, store).size());
     }
   }
-  for (const Episode& episode : store.Episodes()) plan.failed += IsFailure(episode.stop) && shard.Holds(episode.key.pair);
-  plan.allowed = static_cast<int>(suite.error_budget * plan.total);
+  plan.missing += static_cast<int>(again.size());
+  plan.failed = static_cast<int>(FailedOf(shard, store).size() - again.size());
+  plan.allowed = AllowedFailures(suite, plan.total);
   return plan;
 }
 
@@ -84,29 +96,16 @@ void EndIfInterrupted() {
   if (IsInterrupted()) throw InternalError("interrupted");
 }
 
-/// Makes room for failed episodes to be run again. Their reasons are lost with them: not before their policies were greeted.
-void RetryFailed(const Suite& suite, const Shard& shard, Store& store) {
-  std::vector<EpisodeKey> failed;
-  for (const Episode& episode : store.Episodes()) {
-    if (IsFailure(episode.stop) && shard.Holds(episode.key.pair)) failed.push_back(episode.key);
-  }
-  for (const SuitePolicy& policy : suite.policies) {
-    const auto is_its = [&](const EpisodeKey& key) {
-      return key.pair.policy == policy.name && key.pair.checkpoint == policy.checkpoint;
-    };
-    if (std::ranges::none_of(failed, is_its)) continue;
-    EndIfInterrupted();
-    const RunningPolicy greeted(policy, suite, store.folder(), IsInterrupted);
-  }
-  for (const EpisodeKey& key : failed) store.RemoveFailed(key);
-  store.RemoveOrphans();
-}
-
 /// One run's state while it goes from pairing to pairing.
 class Evaluation {
  public:
-  Evaluation(const Suite& suite, const Shard& shard, Store& store)
-      : suite_(suite), shard_(shard), store_(store), plan_(MakePlan(suite, shard, store)), display_(plan_.total, plan_.total - plan_.missing, stderr) {}
+  Evaluation(const Suite& suite, const EvaluateOptions& options, Store& store)
+      : suite_(suite),
+        shard_(options.shard),
+        store_(store),
+        to_retry_(options.retry_failed ? FailedOf(shard_, store) : std::set<EpisodeKey>()),
+        plan_(MakePlan(suite, shard_, store, to_retry_)),
+        display_(plan_.total, plan_.total - plan_.missing, stderr) {}
 
   /// A policy that cannot be started or does not fit ends the run before its first episode: the suite that is mended is
   /// another one, and begins anew. Whoever runs first is greeted then, before any episode too.
@@ -125,13 +124,15 @@ class Evaluation {
   bool RunWorld(const SuiteWorld& suite_world) {
     std::unique_ptr<World> world;
     for (const SuitePolicy& suite_policy : suite_.policies) {
-      JobQueue jobs(MissingJobs(JobsOf(suite_, shard_, suite_world, suite_policy), store_));
-      if (jobs.size() == 0) continue;
+      const std::vector<Job> to_run = JobsToRun(suite_world, suite_policy);
+      if (to_run.empty()) continue;
       if (!world) world = MakeCheckedWorld(suite_world, suite_policy);
       display_.Begin(fmt::format("{} · {}@{}", suite_world.name, suite_policy.name, suite_policy.checkpoint));
       RunningPolicy policy(suite_policy, suite_, store_.folder(), IsInterrupted);
       store_.AddPolicy({suite_policy.name, suite_policy.checkpoint, policy.declaration()});
       Probe(policy, *world, suite_world, suite_policy);
+      MakeRoom(to_run);
+      JobQueue jobs(to_run);
       const Summary summary = RunEpisodes(policy.policy(), *world, jobs, store_, Options(suite_world, policy));
       store_.Count(suite_policy.name + "@" + suite_policy.checkpoint, policy.counters());
       const std::string wire = Sentence(policy.counters());
@@ -147,13 +148,53 @@ class Evaluation {
   const Plan& plan() const { return plan_; }
 
  private:
+  /// What the store does not have yet, and what failed where that is to run again.
+  std::vector<Job> JobsToRun(const SuiteWorld& world, const SuitePolicy& policy) const {
+    std::vector<Job> jobs = JobsOf(suite_, shard_, world, policy);
+    std::erase_if(jobs, [&](const Job& job) { return store_.Has(job.key) && !to_retry_.contains(job.key); });
+    return jobs;
+  }
+
+  /// For failed episodes to be run again. Their reasons are lost with them: not before world and policy were tried.
+  void MakeRoom(const std::vector<Job>& jobs) {
+    bool is_any = false;
+    for (const Job& job : jobs) {
+      if (!to_retry_.contains(job.key)) continue;
+      store_.RemoveFailed(job.key);
+      is_any = true;
+    }
+    if (is_any) store_.RemoveOrphans();
+  }
+
+  /// On what a world, or a policy in it, is tried: each task's first job of the suite, whatever the shard and whatever is
+  /// done, so that a run that goes on ends where one that was never interrupted does, and what cannot begin later is its own
+  /// episode's failure in both. What imagines is tried where this run has seen a beginning.
+  /// @param is_its  of an episode: its task was tried before it
+  template <typename IsIts>
+  std::vector<Job> FirstJobs(const SuiteWorld& world, const SuitePolicy& policy, const IsIts& is_its) const {
+    std::set<std::string> tried;
+    for (const Episode& episode : store_.Episodes()) {
+      if (is_its(episode.key) && !to_retry_.contains(episode.key)) tried.insert(episode.key.pair.task);
+    }
+    std::set<std::pair<std::string, std::string>> seen;
+    for (const PairKey& pair : store_.InitialScenes()) seen.insert({pair.task, pair.initial_state});
+    const bool begins_as_seen = world.evac && !suite_.recording;
+    std::vector<Job> jobs;
+    for (const Job& job : AllJobs(suite_, world, policy)) {
+      const PairKey& pair = job.key.pair;
+      if (begins_as_seen && !seen.contains({pair.task, pair.initial_state})) continue;
+      if (tried.insert(pair.task).second) jobs.push_back(job);
+    }
+    return jobs;
+  }
+
   /// Those with an episode to do, whose turn comes first at the front.
   std::vector<const SuitePolicy*> PoliciesToRun() const {
     std::vector<const SuitePolicy*> policies;
     for (const SuiteWorld& world : RealFirst(suite_.worlds)) {
       for (const SuitePolicy& policy : suite_.policies) {
         const bool is_there = std::ranges::find(policies, &policy) != policies.end();
-        if (!is_there && !MissingJobs(JobsOf(suite_, shard_, world, policy), store_).empty()) policies.push_back(&policy);
+        if (!is_there && !JobsToRun(world, policy).empty()) policies.push_back(&policy);
       }
     }
     return policies;
@@ -162,9 +203,8 @@ class Evaluation {
   /// A task page that the world cannot start from ends the run here, once, and not in every episode.
   std::unique_ptr<World> MakeCheckedWorld(const SuiteWorld& suite_world, const SuitePolicy& policy) {
     std::unique_ptr<World> world = MakeWorld(suite_world, suite_, &store_);
-    std::set<std::string> seen;
-    for (const Job& job : MissingJobs(JobsOf(suite_, shard_, suite_world, policy), store_)) {
-      if (!seen.insert(job.key.pair.task).second) continue;
+    const auto is_its = [&](const EpisodeKey& key) { return key.world == suite_world.name; };
+    for (const Job& job : FirstJobs(suite_world, policy, is_its)) {
       EndIfInterrupted();
       CheckStart(*world, *job.task, job.initial);
     }
@@ -174,9 +214,11 @@ class Evaluation {
   /// A policy that keeps to other conventions than it declared ends the run here, not in a hundred odd episodes.
   void Probe(RunningPolicy& policy, World& world, const SuiteWorld& suite_world, const SuitePolicy& suite_policy) {
     if (suite_.start_probe == StartProbe::kOff) return;
-    std::set<std::string> seen;
-    for (const Job& job : MissingJobs(JobsOf(suite_, shard_, suite_world, suite_policy), store_)) {
-      if (!seen.insert(job.key.pair.task).second) continue;
+    const auto is_its = [&](const EpisodeKey& key) {
+      return key.world == suite_world.name && key.pair.policy == suite_policy.name &&
+             key.pair.checkpoint == suite_policy.checkpoint;
+    };
+    for (const Job& job : FirstJobs(suite_world, suite_policy, is_its)) {
       EndIfInterrupted();
       std::string certain;
       for (const Suspicion& suspicion : ProbeStart(policy.policy(), world, job)) {
@@ -217,6 +259,7 @@ class Evaluation {
   const Suite& suite_;
   Shard shard_;
   Store& store_;
+  const std::set<EpisodeKey> to_retry_;  ///< failed when this began
   Plan plan_;
   ProgressDisplay display_;
   std::string why_ended_;
@@ -231,8 +274,7 @@ void RunJudges(const Suite& suite, Store& store) {
 
 /// @returns why it ended before its last episode, or nothing.
 std::string RunWorlds(const Suite& suite, const EvaluateOptions& options, Store& store) try {
-  if (options.retry_failed) RetryFailed(suite, options.shard, store);
-  Evaluation evaluation(suite, options.shard, store);
+  Evaluation evaluation(suite, options, store);
   evaluation.GreetPolicies();
   for (const SuiteWorld& world : RealFirst(suite.worlds)) {
     if (!evaluation.RunWorld(world)) break;
@@ -241,7 +283,8 @@ std::string RunWorlds(const Suite& suite, const EvaluateOptions& options, Store&
 } catch (const Error& error) {
   if (IsInterrupted()) return "interrupted";
   if (error.exit_code() != ExitCode::kInternal) throw;
-  throw InternalError("{}\n      what was stored is intact; once that is mended, go on with: {}", error.what(), GoOn(options, store, false));
+  throw InternalError("{}\n      what was stored is intact; once that is mended, go on with: {}", error.what(),
+                      GoOn(options, store, options.retry_failed));
 }
 
 }  // namespace

@@ -6,6 +6,7 @@
 #include "apps/program_beside.h"
 #include "core/error.h"
 #include "core/recording.h"
+#include "core/types.h"
 #include "core/version.h"
 #include "policies/hold_policy.h"
 #include "policies/policy_server.h"
@@ -18,7 +19,7 @@ namespace {
 /// What every policy is asked for; the harness sets the environment of the policies it starts.
 struct Common {
   LcmAddress address;
-  std::string checkpoint = "default";
+  std::string checkpoint = kDefaultCheckpoint;
   int chunk_size = 16;
   double period_s = 0;
 

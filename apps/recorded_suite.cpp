@@ -57,13 +57,6 @@ std::string WhatDiffers(const Recording& recording, const Task& task) {
   return std::ranges::equal(recording.cameras, task.cameras, same) ? "" : "other cameras, or of another size";
 }
 
-/// The task of a tree's or collection's recording, else what their folder is called.
-std::string TaskName(const fs::path& folder, const std::optional<CollectedEpisode>& row, const fs::path& all) {
-  if (row) return SafeName(row->task);
-  const std::optional<TreePlace> place = PlaceOf(folder);
-  return SafeName(place ? place->task : fs::canonical(all).filename().string());
-}
-
 /// Takes recording after recording into the suite.
 class RecordedStates {
  public:
@@ -71,7 +64,7 @@ class RecordedStates {
 
   void Take(const fs::path& folder) {
     const std::optional<CollectedEpisode> row = RowOf(folder);
-    CheckTask(folder, TaskName(folder, row, *suite_.recording));
+    CheckTask(folder, TaskNameOf(folder, row, *suite_.recording));
     const bool is_enough = suite_.recorded_states > 0 && std::ssize(suite_.initial_states) >= suite_.recorded_states;
     if (is_enough || (row && suite_.recordings.contains(row->initial_state))) return;  // or it began alike
     try {

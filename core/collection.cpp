@@ -226,7 +226,8 @@ std::optional<TreePlace> PlaceOf(const fs::path& folder) {
 
 std::optional<CollectedEpisode> RowOf(const fs::path& folder) {
   const std::optional<TreePlace> place = PlaceOf(folder);
-  if (!place || !fs::exists(RowPath(*place))) return std::nullopt;
+  std::error_code error;
+  if (!place || (!fs::exists(RowPath(*place), error) && !error)) return std::nullopt;
   return ParseCollected(ReadFile(RowPath(*place)), RowPath(*place).string());
 }
 

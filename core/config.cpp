@@ -129,20 +129,30 @@ void DemandWritable(const YAML::Node& scalar, const std::filesystem::path& file)
 }
 
 constexpr int kMaxDepth = 100, kMaxValues = 250'000;
+constexpr std::size_t kMaxBytes = std::size_t{64} << 20;
 
 /// Where the check of a page stands. A value that is named within itself ("a: &x [*x]") has no end, and ten lines of
-/// aliases stand for more values than anybody waits for.
+/// aliases stand for more values than anybody waits for, or one long text of them for more bytes.
 struct Walk {
   const std::filesystem::path& file;
   int depth = 0, values = 0;
+  std::size_t above = 0, bytes = 0;  ///< of the keys that lead here; of all values, each with those (see WriteCanonical)
 };
+
+void DemandBounded(const YAML::Node& node, Walk& walk) {
+  if (walk.depth > kMaxDepth || ++walk.values > kMaxValues)
+    throw InvalidInput("{}:{}: found more than {} values, or some more than {} deep: an alias within what it names?",
+                       walk.file.string(), node.Mark().line + 1, kMaxValues, kMaxDepth);
+  walk.bytes += walk.above + (node.IsScalar() ? node.Scalar().size() : 0);
+  if (walk.bytes > kMaxBytes)
+    throw InvalidInput("{}:{}: found more than {} MB of values: a long text that many aliases name?",
+                       walk.file.string(), node.Mark().line + 1, kMaxBytes >> 20);
+}
 
 /// YAML allows keys that are lists; its parser lets the first of two equal keys win. Neither can be meant.
 void DemandPlain(const YAML::Node& node, Walk& walk) {
   const std::filesystem::path& file = walk.file;
-  if (walk.depth > kMaxDepth || ++walk.values > kMaxValues)
-    throw InvalidInput("{}:{}: found more than {} values, or some more than {} deep: an alias within what it names?",
-                       file.string(), node.Mark().line + 1, kMaxValues, kMaxDepth);
+  DemandBounded(node, walk);
   std::set<std::string> keys;
   DemandWritable(node, file);
   ++walk.depth;
@@ -157,7 +167,9 @@ void DemandPlain(const YAML::Node& node, Walk& walk) {
     DemandWritable(item.first, file);
     if (!keys.insert(item.first.Scalar()).second)
       throw InvalidInput("{}:{}: field {} is given twice", file.string(), line, item.first.Scalar());
+    walk.above += item.first.Scalar().size();
     DemandPlain(item.second, walk);
+    walk.above -= item.first.Scalar().size();
   }
   --walk.depth;
 }
@@ -198,6 +210,28 @@ YAML::Node Step(const YAML::Node& node, const std::string& key) {
   return YAML::Node(YAML::NodeType::Undefined);
 }
 
+/// The fields below `field` that are that very node: several where aliases name it, or what it lies in.
+void AddPlaces(const YAML::Node& wanted, const YAML::Node& node, const std::string& field,
+               std::vector<std::string>& places) {
+  if (node.is(wanted)) places.push_back(field);
+  const std::string above = field.empty() ? "" : field + ".";
+  if (node.IsMap()) {
+    for (const auto& item : node) AddPlaces(wanted, item.second, above + item.first.Scalar(), places);
+  } else if (node.IsSequence()) {
+    for (std::size_t i = 0; i < node.size(); ++i) AddPlaces(wanted, node[i], above + std::to_string(i), places);
+  }
+}
+
+/// The library keeps one node for all that name it: what is written to one is written to all.
+void DemandOnePlace(const YAML::Node& wanted, const YAML::Node& page, const std::string& assignment,
+                    const std::filesystem::path& file) {
+  std::vector<std::string> places;
+  AddPlaces(wanted, page, "", places);
+  if (places.size() > 1)
+    throw InvalidInput("--set {}: in {} fields {} and {} are one, by an alias (*): wanted each written out", assignment,
+                       file.string(), places[0], places[1]);
+}
+
 }  // namespace
 
 Config::Config(YAML::Node node, std::filesystem::path file, std::string field)
@@ -231,11 +265,12 @@ void Config::Set(const std::string& assignment) {
     throw InvalidInput("--set {}: the value is not YAML: {}", assignment, error.msg);
   }
   DemandPlain(value, "--set " + assignment);
+  YAML::Node item = Step(parent, keys.back());
+  DemandOnePlace(item.IsDefined() ? item : parent, node_, assignment, file_);
   if (parent.IsMap()) {
     parent[keys.back()] = value;
     return;
   }
-  YAML::Node item = Step(parent, keys.back());
   if (!item.IsDefined())
     throw InvalidInput("--set {}: {} has no field or item '{}'", assignment, file_.string(), keys.back());
   item = value;

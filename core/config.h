@@ -27,7 +27,7 @@ class Config {
   static Config FromText(const std::string& text, const std::filesystem::path& name);
 
   /// `--set path.to.field=VALUE`: VALUE is YAML; a number picks an item of a list ("policies.0.checkpoint=a").
-  /// @throws InvalidInput unless the parent exists.
+  /// @throws InvalidInput unless the parent exists, or if an alias in the file makes the field one with another.
   void Set(const std::string& assignment);
 
   bool Has(const std::string& key) const;

@@ -96,6 +96,7 @@ void SyncAndRename(const fs::path& from, const fs::path& to) {
 
 void MakeFolders(const fs::path& folder) {
   if (folder.empty() || fs::is_directory(folder)) return;
+  if (fs::exists(folder)) throw InvalidInput("{}: cannot be made: what is there is no folder", folder.string());
   MakeFolders(folder.parent_path());
   std::error_code error;
   fs::create_directory(folder, error);

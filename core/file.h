@@ -22,6 +22,7 @@ void LinkOrCopy(const std::filesystem::path& from, const std::filesystem::path& 
 void SyncAndRename(const std::filesystem::path& from, const std::filesystem::path& to);
 
 /// Makes a folder and those above it, as far as they are missing, each of them synced into the one above.
+/// @throws InvalidInput naming what is no folder where one is wanted; Error naming the folder that cannot be made.
 void MakeFolders(const std::filesystem::path& folder);
 
 }  // namespace evac

@@ -14,7 +14,8 @@ class Judge {
   virtual std::string Name() const = 0;
 
   /// @param episode  as loaded from the store: arms, commands, video path, no images, no privileged track.
-  /// @returns a verdict with the judge's name; what goes wrong is a verdict `invalid` with the reason, never a failure.
+  /// @returns a verdict with the judge's name; what is wrong with the episode is a verdict `invalid` with the reason.
+  /// @throws Error for what is not its doing (a full disk): it can be asked about again.
   virtual Verdict Rate(const Task& task, const Episode& episode) = 0;
 };
 

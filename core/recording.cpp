@@ -35,16 +35,28 @@ void CheckOptions(const RecordingOptions& options) {
     throw InvalidInput("recording: a camera is named twice");
 }
 
+/// Through links, or, where those cannot be followed, as it is.
+fs::path Followed(const fs::path& folder) {
+  std::error_code error;
+  const fs::path absolute = fs::weakly_canonical(folder, error);
+  return error ? folder : absolute;
+}
+
+bool IsThere(const fs::path& path) {
+  std::error_code ignored;
+  return fs::exists(path, ignored);
+}
+
 /// The tree's episode that the folder is, or is the videos of; empty: neither, or a folder that holds all itself.
 fs::path TreeEpisode(const fs::path& folder) {
-  if (fs::exists(folder / "action.npy") || fs::exists(folder / "proprio_stats.h5")) return {};
+  if (IsThere(folder / "action.npy") || IsThere(folder / "proprio_stats.h5")) return {};
   if (IsTreeEpisode(folder)) return folder;
   return folder.filename() == "videos" && IsTreeEpisode(folder.parent_path()) ? folder.parent_path() : fs::path();
 }
 
 Recording ReadLayout(const fs::path& folder, const RecordingOptions& options) {
-  if (fs::exists(folder / "action.npy")) return ReadExampleLayout(folder, options);
-  if (fs::exists(folder / "proprio_stats.h5")) {
+  if (IsFileThere(folder / "action.npy")) return ReadExampleLayout(folder, options);
+  if (IsFileThere(folder / "proprio_stats.h5")) {
     return ReadClipLayout({folder.filename().string(), folder, folder, folder / "proprio_stats.h5"}, options);
   }
   if (const fs::path episode = TreeEpisode(folder); !episode.empty())
@@ -61,12 +73,19 @@ Recording ReadRecording(const fs::path& folder, const RecordingOptions& options)
   CheckOptions(options);
   std::error_code error;
   const fs::path absolute = fs::canonical(folder, error);
-  if (error || !fs::is_directory(absolute)) throw InvalidInput("{}: no such folder", folder.string());
+  if (error || !fs::is_directory(absolute, error))
+    throw InvalidInput("{}: no such folder", folder.string()).Called("unreadable");
   Recording recording = ReadLayout(absolute, options);
-  recording.id = SafeName(recording.id);
+  recording.id = RecordingId(absolute);
   recording.every_nth = options.every_nth;
   recording.source += fmt::format(", {} steps of {:.4g} s", recording.arms.size(), recording.period_s);
   return recording;
+}
+
+std::string RecordingId(const fs::path& folder) {
+  const fs::path absolute = Followed(folder);
+  const fs::path episode = TreeEpisode(absolute);
+  return SafeName(episode.empty() ? absolute.filename().string() : TreeFolders(episode).id);
 }
 
 std::vector<Arms> ToldTrack(const Recording& recording) {
@@ -77,13 +96,13 @@ std::vector<Arms> ToldTrack(const Recording& recording) {
 }
 
 std::vector<fs::path> FoldersOf(const fs::path& folder) {
-  const fs::path absolute = fs::weakly_canonical(folder);
+  const fs::path absolute = Followed(folder);
   const fs::path episode = TreeEpisode(absolute);
   if (episode.empty()) return {absolute};
   const ClipFolders places = TreeFolders(episode);
   std::vector<fs::path> folders = {episode};
   for (const fs::path& part : {places.pages, places.proprio.parent_path()}) {
-    if (fs::is_directory(part)) folders.push_back(part);
+    if (std::error_code ignored; fs::is_directory(part, ignored)) folders.push_back(part);
   }
   return folders;
 }

@@ -49,6 +49,9 @@ struct Recording {
 ///   moves against its mount. `Error::kind` is one word for the reason (docs/formats/recording.md).
 Recording ReadRecording(const std::filesystem::path& folder, const RecordingOptions& options = {});
 
+/// What ReadRecording calls the recording in a folder, whatever is in it.
+std::string RecordingId(const std::filesystem::path& folder);
+
 /// What a model is told of the arms, [T]: where they were at step 0, then where they were told to be, or were if that was
 /// not recorded.
 std::vector<Arms> ToldTrack(const Recording& recording);

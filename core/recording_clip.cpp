@@ -64,12 +64,12 @@ fs::path ExtrinsicsOf(const ClipFolders& folders, const std::string& camera) {
 /// The cameras asked for, or all that have a video; head always.
 std::vector<std::string> ChooseCameras(const ClipFolders& folders, const RecordingOptions& options) {
   if (!options.cameras.empty()) return options.cameras;
-  const bool has_videos = fs::exists(VideoOf(folders, "head"));
+  const bool has_videos = IsFileThere(VideoOf(folders, "head"));
   std::vector<std::string> names = {"head"};
   for (const std::string name : {"hand_left", "hand_right"}) {
-    if (fs::exists(VideoOf(folders, name))) {
+    if (IsFileThere(VideoOf(folders, name))) {
       names.push_back(name);
-    } else if (has_videos && fs::exists(IntrinsicsOf(folders, name))) {
+    } else if (has_videos && IsFileThere(IntrinsicsOf(folders, name))) {
       throw InvalidInput("{}: there is a page for camera {}, but no video {}", folders.pages.string(), name,
                          VideoOf(folders, name).string())
           .Called("missing_camera");
@@ -122,7 +122,7 @@ void CheckVideo(const VideoFacts& facts, const fs::path& path, const Context& co
 /// Adds one camera that has a video. @returns the video's period, s, or 0 if it has one frame.
 double AddVideoCamera(const Context& context, const std::string& name, double period_s, Recording& recording) {
   const fs::path path = VideoOf(context.folders, name);
-  if (!fs::exists(path))
+  if (!IsFileThere(path))
     throw InvalidInput("{}: missing: camera {} has no video", path.string(), name).Called("missing_camera");
   const VideoFacts facts =
       Calling("broken_video", [&] { return LookThrough(path, context.options.count_video_frames); });
@@ -136,10 +136,10 @@ double AddVideoCamera(const Context& context, const std::string& name, double pe
 /// A clip without videos: its first frame is all there is to see.
 void AddStillCamera(const Context& context, const std::vector<std::string>& names, Recording& recording) {
   const fs::path frame = context.folders.images / "frame.png";
-  if (names != std::vector<std::string>{"head"} || !fs::exists(frame)) {
+  if (names != std::vector<std::string>{"head"} || !IsFileThere(frame)) {
     // The last of those without: the first one has none either, but its first frame could do.
     std::string missing = names.front();
-    for (const std::string& name : names) missing = fs::exists(VideoOf(context.folders, name)) ? missing : name;
+    for (const std::string& name : names) missing = IsFileThere(VideoOf(context.folders, name)) ? missing : name;
     throw InvalidInput("{}: missing: camera {} has no video", VideoOf(context.folders, missing).string(), missing)
         .Called("missing_camera");
   }
@@ -158,7 +158,7 @@ Recording ReadClipLayout(const ClipFolders& folders, const RecordingOptions& opt
   Recording recording;
   recording.id = folders.id;
   double video_period_s = 0;
-  if (fs::exists(VideoOf(folders, names.front()))) {
+  if (IsFileThere(VideoOf(folders, names.front()))) {
     for (const std::string& name : names) video_period_s = AddVideoCamera(context, name, video_period_s, recording);
   } else {
     AddStillCamera(context, names, recording);

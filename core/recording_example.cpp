@@ -44,6 +44,8 @@ void ReadIntrinsics(const fs::path& path, Camera& camera) {
 
 std::vector<Arms> ReadActions(const fs::path& path) {
   const NpyArray rows = ReadMatrix(path, 0, 2 * kArmColumns);
+  if (rows.shape[0] > kMaxRecordedSteps)
+    throw InvalidInput("{}: {} steps, wanted 1 … {}", path.string(), rows.shape[0], kMaxRecordedSteps);
   std::vector<Arms> steps;
   for (std::size_t step = 0; step < rows.shape[0]; ++step) {
     Arms arms;

@@ -3,41 +3,52 @@
 #include <algorithm>
 #include <cctype>
 
-#include "core/collection.h"
 #include "core/error.h"
+#include "core/recording.h"
 
 namespace evac {
 namespace {
 
 namespace fs = std::filesystem;
 
+/// Those that cannot be looked at too; one that cannot be listed is in its own list: who reads it says why.
 std::vector<fs::path> SubFolders(const fs::path& folder) {
   std::vector<fs::path> folders;
-  for (const fs::directory_entry& entry : fs::directory_iterator(folder)) {
-    if (entry.is_directory()) folders.push_back(entry.path());
+  std::error_code error, unknown;
+  for (fs::directory_iterator at(folder, error), end; !error && at != end; at.increment(error)) {
+    const fs::file_status found = at->status(unknown);
+    if (fs::is_directory(found) || !fs::status_known(found)) folders.push_back(at->path());
   }
+  if (error) folders.push_back(folder);
   std::sort(folders.begin(), folders.end());
   return folders;
 }
 
+/// Or cannot be known not to be.
+bool IsThere(const fs::path& path) {
+  std::error_code error;
+  return fs::exists(path, error) || error;
+}
+
 bool LooksLikeRecording(const fs::path& folder) {
-  return fs::exists(folder / "action.npy") || fs::exists(folder / "proprio_stats.h5") || PlaceOf(folder).has_value();
+  return IsThere(folder / "action.npy") || IsThere(folder / "proprio_stats.h5") || PlaceOf(folder).has_value();
 }
 
 }  // namespace
 
 bool IsRecording(const fs::path& folder) {
-  const fs::path absolute = fs::weakly_canonical(folder);
-  if (!fs::is_directory(absolute)) return false;
+  std::error_code error;
+  const fs::path absolute = fs::weakly_canonical(folder, error);
+  if (error || !fs::is_directory(absolute, error)) return false;
   return LooksLikeRecording(absolute) || (absolute.filename() == "videos" && PlaceOf(absolute.parent_path()));
 }
 
 std::vector<fs::path> FindRecordings(const fs::path& input) {
   std::error_code error;
   const fs::path root = fs::canonical(input, error);
-  if (error || !fs::is_directory(root)) throw InvalidInput("{}: no such folder", input.string());
+  if (error || !fs::is_directory(root, error)) throw InvalidInput("{}: no such folder", input.string());
   std::vector<fs::path> found;
-  if (fs::is_directory(root / "observations")) {
+  if (fs::is_directory(root / "observations", error)) {
     for (const fs::path& task : SubFolders(root / "observations")) {
       for (const fs::path& episode : SubFolders(task)) found.push_back(episode);
     }
@@ -53,6 +64,18 @@ std::vector<fs::path> FindRecordings(const fs::path& input) {
       "{}: no recordings; wanted an AgiBot World tree (observations/<task>/<episode>), a recording, or a folder of "
       "recordings (docs/formats/recording.md)",
       input.string());
+}
+
+std::string TaskNameOf(const fs::path& folder, const std::optional<CollectedEpisode>& row, const fs::path& all) {
+  if (row) return SafeName(row->task);
+  const std::optional<TreePlace> place = PlaceOf(folder);
+  return SafeName(place ? place->task : fs::canonical(all).filename().string());
+}
+
+std::string RecordedTaskName(const fs::path& recording) {
+  if (IsRecording(recording)) return RecordingId(recording);
+  const fs::path first = FindRecordings(recording).front();
+  return TaskNameOf(first, RowOf(first), recording);
 }
 
 std::string SafeName(std::string name) {

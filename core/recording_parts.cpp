@@ -89,6 +89,13 @@ cv::Mat ReadPng(const fs::path& path) {
   return image;
 }
 
+bool IsFileThere(const fs::path& path) {
+  std::error_code error;
+  if (fs::exists(path, error)) return true;
+  if (error) throw InvalidInput("{}: cannot be looked at: {}", path.string(), error.message()).Called("unreadable");
+  return false;
+}
+
 Eigen::Isometry3d FixedMount(const CameraTrack& track, const RecordingOptions& options, const std::string& file) {
   const auto& poses = track.base_from_camera;
   const std::size_t steps = track.arms.size();

@@ -14,6 +14,8 @@
 /// What the layouts of a recording have in common. Only core/recording*.cpp, their tests and fuzzers include this.
 namespace evac {
 
+inline constexpr std::size_t kMaxRecordedSteps = 1'000'000;  ///< nine hours at 30 Hz
+
 /// One arm at one step as AgiBot's files hold it.
 struct RawArm {
   Eigen::Vector3d xyz_m;
@@ -78,6 +80,10 @@ struct CameraTrack {
 /// @throws InvalidInput if it is not the same at all steps within the options' tolerance; names the first step that is
 /// off.
 Eigen::Isometry3d FixedMount(const CameraTrack& track, const RecordingOptions& options, const std::string& file);
+
+/// Whether there is such a file. @throws Error called unreadable where nobody can know: a folder without rights, a link
+/// to itself.
+bool IsFileThere(const std::filesystem::path& path);
 
 /// What `read` returns; an Error of it without a kind gets this one.
 template <typename Read>

@@ -15,7 +15,6 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr hsize_t kMaxSteps = 1'000'000;  // nine hours at 30 Hz
 constexpr std::size_t kMaxNumberBytes = 8;
 constexpr hsize_t kMaxChunkNumbers = hsize_t{1} << 24;  // the library allocates whole chunks
 constexpr int kArms = 2;
@@ -75,8 +74,8 @@ hsize_t StepsOf(const Handle& data, hsize_t width, const std::string& where) {
     throw InvalidInput("{}: its shape is not [T, 2{}]: one row per step, left and right arm", where,
                        width == 1 ? "" : fmt::format(", {}", width));
   }
-  if (shape[0] == 0 || shape[0] > kMaxSteps)
-    throw InvalidInput("{}: {} steps, wanted 1 … {}", where, shape[0], kMaxSteps);
+  if (shape[0] == 0 || shape[0] > kMaxRecordedSteps)
+    throw InvalidInput("{}: {} steps, wanted 1 … {}", where, shape[0], kMaxRecordedSteps);
   return shape[0];
 }
 

@@ -27,18 +27,22 @@ struct Store::Database {
       : folder(std::move(run_folder)), lock(std::move(run_lock)), is_writable(writable), connection(std::move(open)) {}
 
   template <typename Select>
-  auto Read(const Select& select) {
+  auto Read(const Select& select) try {
     const std::lock_guard guard(mutex);
     return select(connection);
+  } catch (const Error& error) {
+    throw error.Called(kStoreError);
   }
   /// In one transaction.
   template <typename Change>
-  void Write(const Change& change) {
+  void Write(const Change& change) try {
     const std::lock_guard guard(mutex);
     if (!is_writable) throw InternalError("{}: the run was opened for reading only", folder.string());
     sqlite::Transaction transaction(connection);
     change(connection);
     transaction.Commit();
+  } catch (const Error& error) {
+    throw error.Called(kStoreError);
   }
 };
 

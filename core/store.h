@@ -82,6 +82,9 @@ struct EndedEpisode {
 /// How often the wire misbehaved, by name ("repeats", "stale_replies", …): counts of effort, no part of a result.
 using Counters = std::map<std::string, std::int64_t>;
 
+/// The kind of every error of a run's database: whoever catches what an episode's world or policy throws lets it through.
+inline constexpr const char* kStoreError = "store";
+
 /// One run's truth: RUN/evac.sqlite and the files it names (docs/formats/run.md). Everything else is derived from it.
 /// WAL, synchronous=FULL, one writer process at a time (a lock file), any number of readers. Thread-safe.
 class Store {
@@ -90,7 +93,8 @@ class Store {
 
   /// Begins a run in `folder` (made if absent), or continues the one there if it has the same suite hash. One of another
   /// suite that never came to an episode makes room.
-  /// @throws InvalidInput if another run is there, another process writes it, or its schema is newer than this program.
+  /// @throws InvalidInput if another run is there, another process writes it, its schema is newer than this program, or
+  /// `folder` is a file or lies in one.
   static Store CreateOrContinue(const std::filesystem::path& folder, const RunInfo& run);
   /// @throws InvalidInput if there is no run in `folder`. Older schemas are migrated (kReadWrite) or read as they are.
   static Store Open(const std::filesystem::path& folder, Mode mode);

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cstring>
 #include <map>
+#include <set>
+#include <string_view>
 #include <utility>
 
 #include "core/tensor_file.h"
@@ -14,7 +16,7 @@ namespace {
 
 using Kind = PickleValue::Kind;
 
-constexpr std::size_t kMaxDimensions = 16;
+constexpr std::size_t kMaxDimensions = 16, kMaxNameBytes = 1024;
 constexpr std::string_view kZip = "PK\x03\x04", kDeepSpeedPrefix = "_forward_module.";
 
 struct StorageType {
@@ -47,9 +49,14 @@ class TorchReader {
   std::vector<Strided> Tensors() {
     const PickleValue& dict = ChooseDict();
     std::vector<Strided> tensors;
+    std::set<std::string_view> names;  // a pickle may recall a long key a thousand times, and each would be copied
     for (std::size_t i = 0; i + 1 < dict.items.size(); i += 2) {
       const PickleValue &key = Value(dict.items[i]), &value = Value(dict.items[i + 1]);
       if (key.kind != Kind::kText) throw Broken("a key that is no text");
+      if (key.text.size() > kMaxNameBytes)
+        throw Broken("a key of " + std::to_string(key.text.size()) + " bytes, wanted at most " +
+                     std::to_string(kMaxNameBytes));
+      if (!names.insert(key.text).second) throw Broken("tensor '" + key.text + "' is there twice");
       if (value.kind != Kind::kTensor)
         throw Broken("'" + key.text +
                      "' is no tensor; wanted a dict of tensors, or one under 'state_dict' or 'module'");

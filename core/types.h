@@ -142,6 +142,9 @@ struct Failure {
   std::string message;
 };
 
+/// The checkpoint of a policy that names none.
+inline constexpr const char* kDefaultCheckpoint = "default";
+
 /// The pair key: what must agree for two episodes in two worlds to be compared.
 struct PairKey {
   std::string task, initial_state, policy, checkpoint;

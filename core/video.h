@@ -51,7 +51,8 @@ class VideoWriter {
   std::unique_ptr<Background> background_;
 };
 
-/// Decodes a video front to back. Bytes come from outside: broken files end in an Error that names the file.
+/// Decodes a video front to back. Bytes come from outside: broken files end in an Error that names the file, and so do
+/// those that a player would turn, mirror or stretch.
 class VideoReader {
  public:
   explicit VideoReader(const std::filesystem::path& path);

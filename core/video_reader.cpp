@@ -1,4 +1,6 @@
+#include <array>
 #include <cstdint>
+#include <cstring>
 #include <utility>
 
 #include "core/error.h"
@@ -44,6 +46,17 @@ av::Scaler NewToRgb(const AVFrame& frame) {
   return scaler;
 }
 
+/// Whether a player turns, mirrors or stretches what is stored. Where on the screen it puts it (6 and 7) is no matter.
+bool IsTurned(const AVStream& stream) {
+  std::array<std::int32_t, 9> matrix{};
+  std::size_t bytes = 0;
+  const std::uint8_t* found = av_stream_get_side_data(&stream, AV_PKT_DATA_DISPLAYMATRIX, &bytes);
+  if (!found || bytes < sizeof matrix) return false;
+  std::memcpy(matrix.data(), found, sizeof matrix);
+  matrix[6] = matrix[7] = 0;
+  return matrix != std::array<std::int32_t, 9>{1 << 16, 0, 0, 0, 1 << 16, 0, 0, 0, 1 << 30};  // 16.16, 2.30 fixed point
+}
+
 }  // namespace
 
 struct VideoReader::Decoder {
@@ -52,6 +65,7 @@ struct VideoReader::Decoder {
   bool Decode();
 
   void OpenFile();
+  void DemandUpright() const;
   void OpenCodec();
   bool Feed();
   cv::Mat Rgb();
@@ -94,6 +108,19 @@ void VideoReader::Decoder::OpenFile() {
   Demand(avformat_find_stream_info(input, nullptr), "cannot be read as a video");
   stream_ = av_find_best_stream(input, AVMEDIA_TYPE_VIDEO, -1, -1, nullptr, 0);
   Demand(stream_, "has no video stream");
+  DemandUpright();
+}
+
+/// Frames are read as they are stored, and a camera's page is of what people were shown, or of that: nobody can tell.
+void VideoReader::Decoder::DemandUpright() const {
+  AVStream* stream = input_->streams[stream_];
+  if (IsTurned(*stream))
+    throw InvalidInput("{}: it says that it is to be turned or mirrored when shown, wanted one that is stored upright: "
+                       "encode it again (ffmpeg does so by itself)", name_);
+  const AVRational pixel = av_guess_sample_aspect_ratio(input_.get(), stream, nullptr);
+  if (pixel.num > 0 && pixel.num != pixel.den)
+    throw InvalidInput("{}: its pixels are {}:{}, wanted square ones: encode it again, and take a camera's page of that "
+                       "size (ffmpeg -vf scale=iw*sar:ih,setsar=1)", name_, pixel.num, pixel.den);
 }
 
 void VideoReader::Decoder::OpenCodec() {

@@ -4,6 +4,7 @@
 
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
+#include <string_view>
 
 #include "core/check.h"
 #include "core/error.h"
@@ -24,6 +25,12 @@ cv::Mat Enlarged(const cv::Mat& image, int scale) {
   cv::Mat large;
   cv::resize(image, large, {}, scale, scale, cv::INTER_NEAREST);
   return large;
+}
+
+/// A world that imagines reads there where the episode begins: what the disk refuses then is no failure of its.
+bool IsOfStore(const std::exception& error) {
+  const auto* ours = dynamic_cast<const Error*>(&error);
+  return ours != nullptr && std::string_view(ours->kind()) == kStoreError;
 }
 
 }  // namespace
@@ -49,6 +56,7 @@ std::optional<WorldStep> Lane::ResetWorld(World& world) try {
   if (const auto wrong = WhatIsWrong(first.observation, *job_.task)) throw InternalError("{}", *wrong);
   return first;
 } catch (const std::exception& error) {
+  if (IsOfStore(error)) throw;
   Fail({StopReason::kWorldError, error.what()});
   return std::nullopt;
 }

@@ -230,6 +230,46 @@ fs::path WithoutSlash(const fs::path& folder) {
   return normal.has_filename() ? normal : normal.parent_path();
 }
 
+/// A folder, made first where a merged run is made and removed last: what holds it is a merge's that was broken off.
+constexpr const char* kMark = "merging";
+
+bool LiesIn(const fs::path& path, const fs::path& folder) {
+  const fs::path from_folder = fs::weakly_canonical(path).lexically_relative(fs::weakly_canonical(folder));
+  return !from_folder.empty() && *from_folder.begin() != "..";
+}
+
+/// @throws InvalidInput where to make the run in `part` would take away what no merge left there
+void RequireRoom(const fs::path& part, const fs::path& out, const std::vector<fs::path>& shards) {
+  const fs::file_status found = fs::symlink_status(part);
+  if (found.type() == fs::file_type::not_found) return;
+  for (const fs::path& shard : shards) {
+    if (LiesIn(shard, part))
+      throw InvalidInput("{}: lies where {} would be made, wanted another name for the merged run", shard.string(), out.string());
+  }
+  const bool is_left = fs::is_directory(found) && (fs::is_empty(part) || fs::is_directory(part / kMark));
+  if (!is_left)
+    throw InvalidInput("{}: is where {} would be made, and was not left there by a merge that was broken off: wanted another "
+                       "name for the merged run, or that one free", part.string(), out.string());
+}
+
+/// All but the mark: who is killed meanwhile leaves it.
+void Empty(const fs::path& part) {
+  for (const fs::directory_entry& left : fs::directory_iterator(part)) {
+    if (left.path().filename() != kMark) fs::remove_all(left.path());
+  }
+}
+
+/// What was chosen of all, in the folder where it is made.
+void Fill(const fs::path& part, const std::vector<Store>& stores, const Choice& choice) {
+  Store merged = Store::CreateOrContinue(part, stores.front().run());
+  for (std::size_t s = 0; s < stores.size(); ++s) {
+    CopyDeclarations(stores[s], merged);
+    CopyEpisodes(choice.episodes[s], stores[s], merged);
+    CopyRealTrials(stores[s], merged);
+  }
+  for (std::size_t s = 0; s < stores.size(); ++s) AddWhatWasNotSaid(stores[s], choice.judged[s], merged);
+}
+
 }  // namespace
 
 MergeSummary MergeRuns(const std::vector<fs::path>& shards, const fs::path& wanted_out) {
@@ -241,21 +281,13 @@ MergeSummary MergeRuns(const std::vector<fs::path>& shards, const fs::path& want
   const Choice choice = Choose(stores, shards);
   RequireSameTrials(stores, shards);
   const fs::path part = out.string() + ".tmp";
-  for (const fs::path& shard : shards) {
-    if (fs::exists(part) && fs::equivalent(shard, part))
-      throw InvalidInput("{}: is where {} would be made, wanted another name for the merged run", shard.string(), out.string());
-  }
+  RequireRoom(part, out, shards);
+  MakeFolders(out.parent_path());
   const RunLock lock(out.string() + ".lock");
-  fs::remove_all(part);
-  {
-    Store merged = Store::CreateOrContinue(part, stores.front().run());
-    for (std::size_t s = 0; s < stores.size(); ++s) {
-      CopyDeclarations(stores[s], merged);
-      CopyEpisodes(choice.episodes[s], stores[s], merged);
-      CopyRealTrials(stores[s], merged);
-    }
-    for (std::size_t s = 0; s < stores.size(); ++s) AddWhatWasNotSaid(stores[s], choice.judged[s], merged);
-  }
+  MakeFolders(part / kMark);
+  Empty(part);
+  Fill(part, stores, choice);
+  fs::remove(part / kMark);
   fs::rename(part, out);
   fs::remove(out.string() + ".lock");
   std::size_t count = 0;

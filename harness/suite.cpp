@@ -7,6 +7,7 @@
 #include <cmath>
 #include <cstdlib>
 #include <set>
+#include <string_view>
 
 #include "core/config.h"
 #include "core/geometry.h"
@@ -18,6 +19,8 @@ namespace evac {
 namespace {
 
 namespace fs = std::filesystem;
+
+constexpr double kDay_s = 86400;
 
 /// Names become file names and parts of messages' channels.
 std::string NameField(const Config& page, const std::string& key) {
@@ -65,12 +68,13 @@ SuitePolicy ReadPolicy(const Config& page) {
   page.AllowOnly({"name", "checkpoint", "command", "join", "files"});
   SuitePolicy policy;
   policy.name = NameField(page, "name");
-  policy.checkpoint = page.Has("checkpoint") ? NameField(page, "checkpoint") : "default";
+  policy.checkpoint = page.Has("checkpoint") ? NameField(page, "checkpoint") : kDefaultCheckpoint;
   page.Require(page.Has("command") != page.Has("join"), "command",
                "either a command line (a list) or `join: {url, token}`");
   for (const std::string& file : page.Get<std::vector<std::string>>("files", {})) {
     policy.files.push_back((page.file().parent_path() / file).lexically_normal().string());
-    page.Require(!file.empty() && fs::exists(policy.files.back()), "files",
+    std::error_code ignored;
+    page.Require(!file.empty() && fs::exists(policy.files.back(), ignored), "files",
                  fmt::format("files or folders that are there, and '{}' is not", file));
   }
   if (page.Has("join")) {
@@ -135,9 +139,12 @@ Transport ReadTransport(const Config& suite) {
   transport.repeat_after_s = page.Get<double>("repeat_after_s", transport.repeat_after_s);
   transport.start_s = page.Get<double>("start_s", transport.start_s);
   transport.images = page.Get<std::string>("images", transport.images);
-  page.Require(transport.deadline_s > 0, "deadline_s", "more than 0 s");
-  page.Require(transport.repeat_after_s > 0, "repeat_after_s", "more than 0 s");
-  page.Require(transport.start_s > 0, "start_s", "more than 0 s");
+  const auto require_wait = [&](double wait_s, const char* field) {  // a clock counts nanoseconds, for 292 years
+    page.Require(wait_s > 0 && wait_s <= kDay_s, field, "more than 0 s, at most 86400 s (a day)");
+  };
+  require_wait(transport.deadline_s, "deadline_s");
+  require_wait(transport.repeat_after_s, "repeat_after_s");
+  require_wait(transport.start_s, "start_s");
   page.Require(transport.images == "jpeg" || transport.images == "raw", "images", "jpeg or raw");
   return transport;
 }
@@ -306,31 +313,57 @@ Suite Build(const Config& page) {
   return suite;
 }
 
-std::string FromWorkingDirectory(const std::string& path) { return fs::absolute(path).lexically_normal().string(); }
+bool IsPath(const std::string& field) {
+  const std::string last = field.substr(field.rfind('.') + 1);
+  return last == "recording" || last == "profile" || last == "weights" || last == "config" || last == "statistics" ||
+         last == "folder" || field.starts_with("tasks.") || field.find(".files.") != std::string::npos;
+}
+
+/// `field=VALUE` of a path from the working directory, quoted: in YAML " #" would begin a comment, ": " a mapping.
+std::string PathFromHere(const std::string& field, const std::string& path) {
+  std::string quoted = field + "=\"";
+  for (const char letter : fs::absolute(path).lexically_normal().string()) {
+    if (letter == '"' || letter == '\\') quoted += '\\';
+    quoted += letter == '\n' ? std::string("\\n") : std::string(1, letter);
+  }
+  return quoted + "\"";
+}
+
+/// The paths in what was set, each as an assignment of its own.
+void AddPaths(const YAML::Node& value, const std::string& field, std::vector<std::string>& assignments) {
+  if (value.IsMap()) {
+    for (const auto& item : value) AddPaths(item.second, field + "." + item.first.Scalar(), assignments);
+  } else if (value.IsSequence()) {
+    for (std::size_t i = 0; i < value.size(); ++i) AddPaths(value[i], field + "." + std::to_string(i), assignments);
+  } else if (value.IsScalar() && !value.Scalar().empty() && IsPath(field)) {
+    assignments.push_back(PathFromHere(field, value.Scalar()));
+  }
+}
 
 /// A path given on the command line is relative to where the user stands; one in the file to the file.
-std::string WithPathsFromHere(const std::string& assignment) {
+void SetFromHere(const std::string& assignment, Config& page) {
   const std::size_t equals = assignment.find('=');
-  if (equals == std::string::npos || equals + 1 == assignment.size()) return assignment;
-  const std::string field = assignment.substr(0, equals), value = assignment.substr(equals + 1);
-  const std::string last = field.substr(field.rfind('.') + 1);
-  if ((field == "tasks" || last == "files") && value.starts_with('[')) {
-    std::vector<std::string> paths =
-        Config::FromText("paths: " + value, "--set " + assignment).Get<std::vector<std::string>>("paths");
-    if (paths.empty()) return assignment;
-    for (std::string& path : paths) path = FromWorkingDirectory(path);
-    return fmt::format("{}=[\"{}\"]", field, fmt::join(paths, "\", \""));
-  }
-  const bool is_path = last == "recording" || last == "profile" || last == "weights" || last == "config" ||
-                       last == "statistics" || last == "folder" || field.starts_with("tasks.") ||
-                       field.find(".files.") != std::string::npos;
-  return is_path ? field + "=" + FromWorkingDirectory(value) : assignment;
+  const std::string field = assignment.substr(0, equals);
+  const std::string value = equals == std::string::npos ? "" : assignment.substr(equals + 1);
+  const bool is_yaml = YAML::IsNullString(value) || std::string_view("[{\"'").find(value.front()) != std::string::npos;
+  if (IsPath(field) && !is_yaml) return page.Set(PathFromHere(field, value));
+  page.Set(assignment);
+  Config alone = Config::FromText("value:", "--set");
+  alone.Set("value=" + value);
+  std::vector<std::string> paths;
+  AddPaths(alone.node()["value"], field, paths);
+  for (const std::string& path : paths) page.Set(path);
 }
 
 }  // namespace
 
 bool HasNetwork(const Suite& suite) {
   return std::ranges::any_of(suite.worlds, [](const SuiteWorld& world) { return world.evac.has_value(); });
+}
+
+int AllowedFailures(const Suite& suite, int episodes) {
+  constexpr double kRounding = 1e-9;  // .29 of 100 is 28.999999999999996
+  return static_cast<int>(suite.error_budget * episodes + kRounding);
 }
 
 std::span<const InitialState> StatesOf(const Suite& suite, const SuiteWorld& world) {
@@ -342,7 +375,7 @@ std::span<const InitialState> StatesOf(const Suite& suite, const SuiteWorld& wor
 
 Suite ReadSuite(const fs::path& path, const std::vector<std::string>& assignments) {
   Config page = Config::FromFile(path);
-  for (const std::string& assignment : assignments) page.Set(WithPathsFromHere(assignment));
+  for (const std::string& assignment : assignments) SetFromHere(assignment, page);
   return Build(page);
 }
 

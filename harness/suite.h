@@ -84,6 +84,9 @@ struct Suite {
 /// Whether a world of the suite is imagined by a network.
 bool HasNetwork(const Suite& suite);
 
+/// How many of so many episodes may fail before a run gives up: the suite's share of them, rounded down.
+int AllowedFailures(const Suite& suite, int episodes);
+
 /// The initial states that a world tries.
 std::span<const InitialState> StatesOf(const Suite& suite, const SuiteWorld& world);
 

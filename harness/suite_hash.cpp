@@ -5,6 +5,7 @@
 #include <sstream>
 #include <vector>
 
+#include "core/collection.h"
 #include "core/hash.h"
 #include "core/recording.h"
 #include "core/recording_folders.h"
@@ -22,18 +23,22 @@ bool StartsWithAny(const std::string& line, std::initializer_list<const char*> p
 /// A line for each file below a folder, through links too. @param above  folders that this one lies in: a link back to one is not followed
 void AddFilesBelow(const fs::path& folder, const std::string& name, std::set<fs::path> above, std::vector<std::string>& lines) {
   if (!above.insert(fs::canonical(folder)).second) return;
-  for (const auto& entry : fs::directory_iterator(folder)) {
-    const std::string own = name + entry.path().filename().string();
-    if (entry.is_directory()) AddFilesBelow(entry.path(), own + "/", above, lines);
-    if (entry.is_regular_file()) lines.push_back(own + " " + Sha256HexOfFile(entry.path()));
+  std::error_code error, ignored;
+  for (fs::directory_iterator at(folder, error), end; !error && at != end; at.increment(error)) {
+    const std::string own = name + at->path().filename().string();
+    if (at->is_directory(ignored)) AddFilesBelow(at->path(), own + "/", above, lines);
+    if (at->is_regular_file(ignored)) lines.push_back(own + " " + Sha256HexOfFile(at->path()));
   }
+  if (error) throw InvalidInput("{}: cannot be read: {}", folder.string(), error.message());
 }
 
 /// The files below a folder by name and content, in name order; or the one file.
-std::string HashOfTree(const fs::path& path) {
-  if (!fs::is_directory(path)) return Sha256HexOfFile(path);
+/// @param but  a file of the folder that is none of them
+std::string HashOfTree(const fs::path& path, const std::string& but = "") {
+  if (std::error_code ignored; !fs::is_directory(path, ignored)) return Sha256HexOfFile(path);
   std::vector<std::string> lines;
   AddFilesBelow(path, "", {}, lines);
+  std::erase_if(lines, [&](const std::string& line) { return line.substr(0, line.rfind(' ')) == but; });
   std::sort(lines.begin(), lines.end());
   std::string text;
   for (const std::string& line : lines) text += line + "\n";
@@ -77,17 +82,21 @@ bool IsOfPolicies(const std::string& line) { return line.starts_with(".policies.
 /// An initial state is named by its seed and its number: how many there are changes none of them.
 bool SaysHowManyStates(const std::string& line) { return line.starts_with(".initial_states.count="); }
 
-/// All folders that hold files of a recording, or of a folder of several: of one task of a tree some lie beside it.
-std::vector<fs::path> FoldersWith(const fs::path& recording) {
-  std::vector<fs::path> folders = FoldersOf(recording);
-  if (IsRecording(recording)) return folders;
+/// All that holds files of a recording, or of a folder of several: of one task of a tree some lie beside it, and of a
+/// collection the rows that say what its states are.
+std::vector<fs::path> PlacesOf(const fs::path& recording) {
+  std::vector<fs::path> places = FoldersOf(recording);
+  if (IsRecording(recording)) return places;
   for (const fs::path& one : FindRecordings(recording)) {
-    for (const fs::path& part : FoldersOf(one)) {
-      const fs::path from_first = part.lexically_relative(folders.front());
-      if (from_first.empty() || *from_first.begin() == "..") folders.push_back(part);
+    std::vector<fs::path> parts = FoldersOf(one);
+    std::error_code ignored;
+    if (const auto place = PlaceOf(one); place && fs::exists(RowPath(*place), ignored)) parts.push_back(RowPath(*place));
+    for (const fs::path& part : parts) {
+      const fs::path from_first = part.lexically_relative(places.front());
+      if (from_first.empty() || *from_first.begin() == "..") places.push_back(part);
     }
   }
-  return folders;
+  return places;
 }
 
 std::string FilesOf(const SuitePolicy& policy) {
@@ -119,7 +128,9 @@ std::string HashOf(const Config& page, const Suite& suite, bool whole) {
     if (whole) text << FilesOf(policy);
   }
   if (suite.recording) {
-    for (const fs::path& folder : FoldersWith(*suite.recording)) text << "recording " << HashOfTree(folder) << "\n";
+    text << "recorded task " << RecordedTaskName(*suite.recording) << "\n";  // it is filled in later
+    for (const fs::path& place : PlacesOf(*suite.recording))
+      text << "recording " << HashOfTree(place, "lock") << "\n";  // a collection's says which process wrote it last
   }
   return Sha256Hex(text.str());
 }

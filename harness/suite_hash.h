@@ -9,8 +9,8 @@
 namespace evac {
 
 /// SHA-256 of everything in a suite that can change a result, wherever its files lie: fields by value, files by
-/// content. Left out: lanes, threads, error_budget and the transport's times, which change how fast and how patiently,
-/// not what.
+/// content, a recording also by what its task is called, from which seeds are drawn. Left out: lanes, threads,
+/// error_budget and the transport's times, which change how fast and how patiently, not what; a collection's `lock`.
 std::string SuiteHash(const Config& page, const Suite& suite);
 
 /// The same without the worlds of type evac, the policies and how many initial states there are: suites that differ in

@@ -2,10 +2,13 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 #include <set>
+#include <string_view>
 
 #include "core/statistics/rates.h"
+#include "judges/vlm_judge.h"
 
 namespace evac {
 namespace {
@@ -43,6 +46,30 @@ std::vector<std::string> Missing(const std::vector<JudgedItem>& items, const Jud
   if (kappa.value && *kappa.value < 1 && !kappa.interval)  // a judge that never erred has no spread to see
     missing.push_back(fmt::format("how far kappa can be believed: {}", kappa.interval.reason()));
   return missing;
+}
+
+/// Worlds where a gate would count what the judge told, and nobody knows how far it is right.
+std::vector<std::string> Unmeasured(const Store& store, const std::string& judge,
+                                    const std::vector<JudgedItem>& items) {
+  std::map<std::string, std::int64_t> told;  // successes and failures, by world
+  const std::map<std::string, Verdicts> current = store.CurrentVerdicts();
+  for (const Episode& episode : store.Episodes()) {
+    const auto verdicts = current.find(episode.key.Id());
+    if (verdicts == current.end()) continue;
+    const auto own = verdicts->second.find(judge);
+    if (own != verdicts->second.end() && IsDecided(own->second.label)) ++told[episode.key.world];
+  }
+  std::vector<std::string> sentences;
+  for (const auto& [world, count] : told) {
+    const bool is_measured = std::ranges::any_of(items, [&](const JudgedItem& item) {
+      return item.world == world && IsDecided(item.judge) && IsDecided(item.truth);
+    });
+    if (!is_measured)
+      sentences.push_back(fmt::format("world {}: the truth tells success or failure of none of the {} episodes where "
+                                      "the judge does",
+                                      world, count));
+  }
+  return sentences;
 }
 
 void RefuseUnless(bool holds, const std::string& sentence, std::vector<std::string>& refusals) {
@@ -89,6 +116,13 @@ std::vector<std::string> Refusals(const std::vector<JudgedItem>& items, const Ju
   return refusals;
 }
 
+/// As VlmJudge gives it: of "vlm:x:small" it is "vlm:x:flip:small".
+std::string NameOfProbe(const std::string& judge, const std::string& probe) {
+  const std::string_view small = kVlmSmall;
+  if (!judge.ends_with(small)) return judge + ":" + probe;
+  return judge.substr(0, judge.size() - small.size()) + ":" + probe + kVlmSmall;
+}
+
 /// A probe says the same where its label is the judge's; where either decided nothing, it is not counted.
 std::map<std::string, ProbeAgreement> ProbesOf(const Store& store, const std::string& judge) {
   const std::map<std::string, Verdicts> current = store.CurrentVerdicts();
@@ -99,7 +133,7 @@ std::map<std::string, ProbeAgreement> ProbesOf(const Store& store, const std::st
     const auto own = verdicts->second.find(judge);
     if (own == verdicts->second.end() || !IsDecided(own->second.label)) continue;
     for (const char* probe : {"flip", "retest"}) {
-      const auto other = verdicts->second.find(judge + ":" + probe);
+      const auto other = verdicts->second.find(NameOfProbe(judge, probe));
       if (other == verdicts->second.end() || !IsDecided(other->second.label)) continue;
       Count& count = counts[probe][{episode.key.pair.task, episode.key.pair.initial_state}];
       ++count.trials;
@@ -210,6 +244,7 @@ JudgeCalibrationReport CalibrateJudge(const Store& store, const std::string& jud
     for (JudgeQualityRow& row : RowsBy(items, kind, field)) report.rows.push_back(std::move(row));
   }
   report.missing = Missing(items, wanted);
+  for (std::string& sentence : Unmeasured(store, judge, items)) report.missing.push_back(std::move(sentence));
   report.refusals = Refusals(items, wanted);
   report.probes = ProbesOf(store, judge);
   return report;

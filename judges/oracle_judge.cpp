@@ -106,18 +106,14 @@ Verdict OracleJudge::Rate(const Task& task, const Episode& episode) {
     verdict.reason = std::move(reason);
     return verdict;
   };
-  try {
-    if (IsFailure(episode.stop))
-      return say(Label::kInvalid, fmt::format("a failed episode ({}) is not judged", evac::Name(episode.stop)));
-    if (task.rubric.stages.empty()) return say(Label::kCannotTell, "the task's rubric has no stages");
-    const PrivilegedTrack track = store_.LoadPrivileged(verdict.episode_id);
-    if (track.empty()) return say(Label::kCannotTell, "the world has no physics: there is no privileged track");
-    Verdict rated = RateTrack(task, track);
-    rated.episode_id = verdict.episode_id;
-    return rated;
-  } catch (const Error& error) {
-    return say(Label::kInvalid, error.what());
-  }
+  if (IsFailure(episode.stop))
+    return say(Label::kInvalid, fmt::format("a failed episode ({}) is not judged", evac::Name(episode.stop)));
+  if (task.rubric.stages.empty()) return say(Label::kCannotTell, "the task's rubric has no stages");
+  const PrivilegedTrack track = store_.LoadPrivileged(verdict.episode_id);
+  if (track.empty()) return say(Label::kCannotTell, "the world has no physics: there is no privileged track");
+  Verdict rated = RateTrack(task, track);
+  rated.episode_id = verdict.episode_id;
+  return rated;
 }
 
 }  // namespace evac

@@ -26,14 +26,17 @@ struct Candidate {
   fs::path video;
   Task task;
   bool is_imagined = false;
+  ClipLayout layout{};
 };
+
+constexpr int kLowest_px = 64;  // of a first view in which something can be seen
 
 void Check(const StudyOptions& options) {
   if (options.runs.empty()) throw InvalidInput("--run: wanted the folder of a run");
   if (options.raters_per_clip < 1 || options.raters_per_clip > 50)
     throw InvalidInput("--raters: found {}, wanted 1 … 50", options.raters_per_clip);
-  if (options.height_px < 64 || options.height_px > 1080)
-    throw InvalidInput("--height: found {}, wanted 64 … 1080", options.height_px);
+  if (options.height_px && (*options.height_px < kLowest_px || *options.height_px > 1080))
+    throw InvalidInput("--height: found {}, wanted {} … 1080", *options.height_px, kLowest_px);
   if (options.states < 0) throw InvalidInput("--states: found {}, wanted 0 (all) or more", options.states);
 }
 
@@ -53,12 +56,11 @@ StudyClip ClipOf(const Episode& episode, const fs::path& run, bool is_real, cons
   return clip;
 }
 
-/// The states of each task that are drawn; empty: all.
-std::map<std::string, std::set<std::string>> DrawnStates(const std::vector<Episode>& episodes,
+/// The states of each task that are drawn.
+std::map<std::string, std::set<std::string>> DrawnStates(const std::vector<Candidate>& candidates,
                                                          const StudyOptions& options) {
   std::map<std::string, std::set<std::string>> drawn;
-  if (options.states == 0) return drawn;
-  for (const Episode& episode : episodes) drawn[episode.key.pair.task].insert(episode.key.pair.initial_state);
+  for (const Candidate& candidate : candidates) drawn[candidate.clip.task].insert(candidate.clip.initial_state);
   for (auto& [task, all] : drawn) {
     std::vector<std::string> states(all.begin(), all.end());
     SplitMix64 draws(SeedFor(SeedFor(options.seed, "states"), task));
@@ -69,7 +71,14 @@ std::map<std::string, std::set<std::string>> DrawnStates(const std::vector<Episo
   return drawn;
 }
 
-/// Reads the runs: what can be rated, what is known of it, which rubrics there are.
+/// Once for all runs: drawn for each, pairs that lie in two of them would break.
+void LeaveOutWhatIsNotDrawn(std::vector<Candidate>& candidates, const StudyOptions& options) {
+  if (options.states == 0) return;
+  const auto drawn = DrawnStates(candidates, options);
+  std::erase_if(candidates, [&](const Candidate& c) { return !drawn.at(c.clip.task).contains(c.clip.initial_state); });
+}
+
+/// Reads the runs: what can be rated, and what is known of it.
 class Collector {
  public:
   explicit Collector(const StudyOptions& options) : options_(options) {}
@@ -79,19 +88,15 @@ class Collector {
     std::map<std::string, Task> tasks;
     for (const Task& task : store.Tasks()) tasks[task.id] = task;
     for (const WorldInfo& world : store.Worlds()) worlds_[world.name] = world;
-    const std::vector<Episode> episodes = store.Episodes();
-    const auto drawn = DrawnStates(episodes, options_);
     const auto verdicts = store.CurrentVerdicts();
     int without_video = 0, failed = 0;
-    for (const Episode& episode : episodes) {
-      const PairKey& pair = episode.key.pair;
-      if (!drawn.empty() && !drawn.at(pair.task).contains(pair.initial_state)) continue;
+    for (const Episode& episode : store.Episodes()) {
       if (IsFailure(episode.stop))
         ++failed;
       else if (episode.video.empty())
         ++without_video;
       else
-        Add(episode, run, tasks.at(pair.task), verdicts);
+        Add(episode, run, tasks.at(episode.key.pair.task), verdicts);
     }
     if (failed > 0)
       left_out.push_back(fmt::format("{}: {} failed episodes: there is nothing to rate", run.string(), failed));
@@ -100,16 +105,13 @@ class Collector {
   }
 
   std::vector<Candidate> candidates;
-  std::map<std::string, StudyRubric> rubrics;
   std::vector<std::string> left_out;
 
  private:
   void Add(const Episode& episode, const fs::path& run, const Task& task,
            const std::map<std::string, std::map<std::string, Verdict>>& verdicts) {
-    const StudyRubric rubric = RubricOf(task);
-    rubrics[rubric.hash] = rubric;
     const WorldInfo& world = worlds_[episode.key.world];
-    Candidate candidate{ClipOf(episode, run, world.is_real, rubric.hash), run / episode.video, task,
+    Candidate candidate{ClipOf(episode, run, world.is_real, RubricOf(task).hash), run / episode.video, task,
                         world.type == "evac"};
     const auto of_episode = verdicts.find(episode.key.Id());
     if (!options_.gold_from.empty() && of_episode != verdicts.end()) {
@@ -170,18 +172,32 @@ struct Encoded {
   std::uintmax_t longest = 0;
 };
 
-Encoded EncodeAll(std::vector<Candidate>& candidates, const StudyInfo& info, int height_px,
-                  const ClipRoundTrip& round_trip, const fs::path& folder,
-                  const std::function<void(std::size_t, std::size_t)>& progress) {
+/// As high as the study's picture, or lower where the views would be wider than it: of study and task alone, so that no
+/// wave's clips of a task can be told from another's.
+void LayOut(std::vector<Candidate>& candidates, const StudyInfo& info, const fs::path& folder) {
+  for (Candidate& candidate : candidates) {
+    const std::vector<Camera>& cameras = candidate.task.cameras;
+    int height_px = info.height_px;
+    candidate.layout = LayoutOf(cameras, height_px);
+    while (candidate.layout.width_px > info.width_px && height_px > kLowest_px)
+      candidate.layout = LayoutOf(cameras, height_px -= 2);
+    if (candidate.layout.width_px > info.width_px)
+      throw InvalidInput("{}: task {}: its views are {} px wide if they are {} px high, wanted at most {}, as wide as "
+                         "the study's clips are",
+                         folder.string(), candidate.task.id, candidate.layout.width_px, height_px, info.width_px);
+  }
+}
+
+Encoded EncodeAll(std::vector<Candidate>& candidates, const StudyInfo& info, const ClipRoundTrip& round_trip,
+                  const fs::path& folder, const std::function<void(std::size_t, std::size_t)>& progress) {
   MakeFolders(folder / "clips");
   Encoded encoded;
   const ClipFormat format{info.width_px, info.height_px, info.period_s};
   for (Candidate& candidate : candidates) {
-    const ClipLayout layout = LayoutOf(candidate.task.cameras, height_px);
     StudyClip clip = candidate.clip;
     clip.file = "clips/" + NewSecret() + ".mp4";
-    clip.views = ViewsJson(layout, info.width_px, info.height_px);
-    clip.frames = EncodeClip(candidate.video, candidate.task, layout, format,
+    clip.views = ViewsJson(candidate.layout, info.width_px, info.height_px);
+    clip.frames = EncodeClip(candidate.video, candidate.task, candidate.layout, format,
                              candidate.is_imagined ? ClipRoundTrip{} : round_trip, folder / clip.file);
     encoded.longest = std::max(encoded.longest, fs::file_size(folder / clip.file));
     encoded.clips.push_back(std::move(clip));
@@ -199,12 +215,19 @@ StudyInfo InfoFor(const std::vector<Candidate>& candidates, const StudyOptions& 
   info.evac_version = options.evac_version;
   info.period_s = 1;
   for (const Candidate& candidate : candidates) {
-    const ClipLayout layout = LayoutOf(candidate.task.cameras, options.height_px);
+    const ClipLayout layout = LayoutOf(candidate.task.cameras, options.height_px.value_or(kStudyHeight_px));
     info.width_px = std::max(info.width_px, layout.width_px);
     info.height_px = std::max(info.height_px, layout.height_px);
     info.period_s = std::min(info.period_s, candidate.task.period_s);
   }
   return info;
+}
+
+/// A smaller clip would be known for one that came later. Sides are even: 65 px are shown as 66.
+void CheckSameHeight(const StudyInfo& began, const StudyOptions& options, const fs::path& folder) {
+  if (!options.height_px || *options.height_px + *options.height_px % 2 == began.height_px) return;
+  throw InvalidInput("--height: found {}, but {} was begun with {}, and a wave cannot change that", *options.height_px,
+                     folder.string(), began.height_px);
 }
 
 void CheckSameRoundTrip(const StudyStore& store, const ClipRoundTrip& round_trip, const fs::path& folder) {
@@ -220,6 +243,14 @@ void LeaveOutWhatIsThere(std::vector<Candidate>& candidates, const StudyStore& s
   std::set<std::string> there;
   for (const StudyClip& clip : store.Clips()) there.insert(clip.run + "\n" + clip.episode);
   std::erase_if(candidates, [&](const Candidate& c) { return there.contains(c.clip.run + "\n" + c.clip.episode); });
+}
+
+std::vector<StudyRubric> RubricsOf(const std::vector<Candidate>& candidates) {
+  std::map<std::string, StudyRubric> by_hash;
+  for (const Candidate& candidate : candidates) by_hash[candidate.clip.rubric_hash] = RubricOf(candidate.task);
+  std::vector<StudyRubric> rubrics;
+  for (const auto& [hash, rubric] : by_hash) rubrics.push_back(rubric);
+  return rubrics;
 }
 
 }  // namespace
@@ -243,19 +274,21 @@ StudyMade MakeStudy(const fs::path& folder, const StudyOptions& options,
   for (const fs::path& run : options.runs) collector.Read(fs::absolute(run).lexically_normal());
   std::vector<Candidate>& candidates = collector.candidates;
   if (candidates.empty()) throw InvalidInput("{}: no episode with a video to rate", options.runs.front().string());
+  LeaveOutWhatIsNotDrawn(candidates, options);
   if (!options.gold_from.empty()) ChooseKnown(candidates, options);
 
   const bool is_new = !StudyStore::IsIn(folder);
   std::optional<StudyStore> store;
   if (!is_new) {
     store = StudyStore::Open(folder, StudyStore::Mode::kReadWrite);
+    CheckSameHeight(store->info(), options, folder);
     LeaveOutWhatIsThere(candidates, *store);
     if (candidates.empty()) throw InvalidInput("{}: every clip of these runs is in it already", folder.string());
     CheckSameRoundTrip(*store, options.round_trip, folder);
   }
   const StudyInfo info = is_new ? InfoFor(candidates, options, folder) : store->info();
-  Encoded encoded =
-      EncodeAll(candidates, info, std::min(options.height_px, info.height_px), options.round_trip, folder, progress);
+  LayOut(candidates, info, folder);
+  Encoded encoded = EncodeAll(candidates, info, options.round_trip, folder, progress);
   constexpr std::uintmax_t kRound = 1 << 16;  // of one wave all are of one length, of several nearly
   const std::uintmax_t bytes = (encoded.longest + 8 + kRound - 1) / kRound * kRound;
   StudyMade made;
@@ -267,10 +300,8 @@ StudyMade MakeStudy(const fs::path& folder, const StudyOptions& options,
        : clip.use == Showing::kExample  ? made.examples
                                         : made.clips);
   }
-  std::vector<StudyRubric> rubrics;
-  for (const auto& [hash, rubric] : collector.rubrics) rubrics.push_back(rubric);
   if (is_new) store = StudyStore::Create(folder, info);
-  made.list_hash = store->AddWave(encoded.clips, rubrics, options.round_trip.codec_sha256);
+  made.list_hash = store->AddWave(encoded.clips, RubricsOf(candidates), options.round_trip.codec_sha256);
   made.left_out = collector.left_out;
   return made;
 }

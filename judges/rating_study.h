@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <functional>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -11,13 +12,17 @@
 
 namespace evac {
 
+inline constexpr int kStudyHeight_px = 512;
+
 struct StudyOptions {
   std::vector<std::filesystem::path> runs = {};
   std::string name = {};  ///< empty: the folder's
   std::uint64_t seed = 1;
   int raters_per_clip = 3;
-  int height_px = 512;  ///< of the first view, 64 … 1080
-  int states = 0;       ///< so many initial states per task, drawn by the seed, with all their clips; 0: all
+  std::optional<int> height_px = {};  ///< of the first view, 64 … 1080; nothing: kStudyHeight_px, of a study that is
+                                      ///< there what it was begun with
+  int states = 0;  ///< so many initial states per task of those that have a clip, drawn by the seed once for all runs,
+                   ///< with all their clips; 0: all
   std::string gold_from =
       {};                    ///< a judge of the runs whose verdicts are known to be right; empty: no gold, no practice
   int examples = 4;          ///< clips shown with their label before the session, if there is gold; rated by nobody
@@ -35,10 +40,12 @@ struct StudyMade {
 };
 
 /// Freezes the episodes of runs that have a video into a study: encodes every clip anew (rating_clip.h), gives it a
-/// name that says nothing, and writes the list. A study that is there gets another wave with what it does not hold yet.
+/// name that says nothing, and writes the list. A study that is there gets another wave with what it does not hold yet,
+/// as high as the first; views of a task that would be wider than its clips are made smaller.
 /// @param progress  called after every clip with how many are done, of how many.
 /// @throws InvalidInput if a run is not there, no episode has a video, an option is out of range, or earlier waves were
-/// put through another codec, or through none.
+/// put through another codec, or through none, or are of another height than is asked for; or if a task's views do not
+/// fit into the study's clips even 64 px high.
 StudyMade MakeStudy(const std::filesystem::path& folder, const StudyOptions& options,
                     const std::function<void(std::size_t, std::size_t)>& progress);
 

@@ -64,6 +64,8 @@ void RatingTally::Take(StudyStore::Ballot ballot) {
                                        [&](const StudyStore::Ballot& said) { return said.id == ballot.supersedes; });
     if (replaced != own.rend()) {  // a "retracted" row was taken away when it came
       ballot.since_ms = replaced->since_ms;
+      ballot.rt_ms = std::max(ballot.rt_ms, replaced->rt_ms);  // who corrects an answer has seen the clip before
+      ballot.max_speed = std::max(ballot.max_speed, replaced->max_speed);
       Discount(*replaced);
       own.erase(std::next(replaced).base());
     }

@@ -23,7 +23,8 @@ class RatingTally {
   const std::vector<RatedClip>& rated() const { return rated_; }
   /// Every clip, by id.
   const std::unordered_map<std::int64_t, StudyClip>& clips() const { return clips_; }
-  /// What a rater says now, counted or not, oldest first. What replaced something is since when that was said.
+  /// What a rater says now, counted or not, oldest first. What replaced something is since when that was said,
+  /// with its time and speed if they are greater.
   const std::vector<StudyStore::Ballot>& By(std::int64_t rater) const;
   /// Ids of clips that an adjudicator is asked for, ascending: what StudyStore::Disputes finds.
   std::vector<std::int64_t> Disputes() const;

@@ -36,7 +36,10 @@ Number DawidSkeneRate(std::span<const RatedClip* const> clips) {
       if (category < 2) of_rater.push_back({static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(category)});
     }
   }
-  if (said.empty()) return Undefined{"no votes"};
+  std::int64_t most_votes = 0;
+  for (const RatedClip* clip : clips) most_votes = std::max(most_votes, clip->resolution.majority.valid);
+  if (most_votes == 0) return Undefined{"no votes"};
+  if (most_votes == 1) return Undefined{"no clip has two votes"};  // of one each, no rater can be told from chance
   RaterCounts counts{.items = static_cast<Eigen::Index>(clips.size()), .labels = 2};
   for (auto& [rater, of_rater] : said) counts.of_rater.push_back(std::move(of_rater));
   const DawidSkene fit = FitDawidSkene(counts, {.smoothing = 0.5, .max_iterations = 200, .tolerance = 1e-6});
@@ -47,7 +50,7 @@ Number DawidSkeneRate(std::span<const RatedClip* const> clips) {
     rate += fit.posterior(static_cast<Eigen::Index>(i), 1);
     ++with_votes;
   }
-  return with_votes == 0 ? Number(Undefined{"no votes"}) : Number(rate / static_cast<double>(with_votes));
+  return rate / static_cast<double>(with_votes);
 }
 
 Number Share(std::int64_t part, std::int64_t whole, const char* reason) {

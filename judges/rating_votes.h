@@ -44,7 +44,7 @@ struct LabelRates {
   Number majority = Undefined{"no clip is decided"};                 ///< of the decided ones
   Number soft = Undefined{"no votes"};                               ///< mean share of success votes
   Number unanimous = Undefined{"no clip is unanimous"};              ///< of those where all agree
-  Number dawid_skene = Undefined{"no votes"};                        ///< smoothing .5
+  Number dawid_skene = Undefined{"no votes"};                        ///< smoothing .5; where some clip has two votes
   Number low = Undefined{"no clips"}, high = Undefined{"no clips"};  ///< if all undecided were failures, successes
   bool far_apart = false;                                            ///< the first four differ by more than 3 points
 };

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <atomic>
+#include <cctype>
 #include <chrono>
 #include <future>
 
@@ -20,8 +21,10 @@ using Clock = std::chrono::steady_clock;
 constexpr long kFewestTokensPerFrame = 60;
 constexpr VlmClipOptions kSmall{.frames = 8, .tail_frames = 0, .long_side_px = 336};
 
-/// What a server says of a request that holds more than it takes.
-bool IsAboutSize(const std::string& message) {
+/// What a server says of a request that holds more than it takes, in capitals or not. vLLM: "At most 8 image(s) may be
+/// provided in one prompt."
+bool IsAboutSize(std::string message) {
+  for (char& c : message) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
   for (const char* words : {"context length", "context window", "maximum context", "too many images", "too large",
                             "at most", "limit-mm-per-prompt", "status 413"}) {
     if (message.find(words) != std::string::npos) return true;
@@ -105,6 +108,7 @@ std::string VlmJudge::Name() const {
 }
 
 Verdict VlmJudge::Rate(const Task& task, const Episode& episode) {
+  if (episode.video.empty()) throw InvalidInput("{}: it has no clip", episode.key.Id()).Called("not_judged");
   std::string name = Name();
   const std::filesystem::path video = options_.run_folder / episode.video;
   std::vector<VlmAnswer> answers;

@@ -11,7 +11,8 @@
 
 namespace evac {
 
-/// Behind the name of a judge that was shown fewer, smaller images, because the server takes no more.
+/// Behind the name of a judge that was shown fewer, smaller images, because the server takes no more; of a probe
+/// ("NAME:flip:small") too.
 inline constexpr const char* kVlmSmall = ":small";
 
 /// Judges that are not the verdict of record but tell how far it can be trusted; each is a judge of its own name.
@@ -35,8 +36,8 @@ struct VlmJudgeOptions {
 ///
 /// A server that finds the images too many or too large is asked with 8 frames of 336 px, and the verdict is given in
 /// the name "NAME:small": another judge, whose verdict says all the same that the episode was asked about.
-/// Rate throws an Error called `not_judged` (nothing in the cache) or `judge_over` (VlmClient::WhyOver): JudgeEpisodes
-/// stores nothing then.
+/// Rate throws an Error called `not_judged` (no clip, or nothing in the cache) or `judge_over` (VlmClient::WhyOver):
+/// JudgeEpisodes stores nothing then.
 class VlmJudge : public Judge {
  public:
   /// @param client, cache  outlive this.

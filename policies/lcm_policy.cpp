@@ -25,16 +25,19 @@ constexpr double kLongestWait_s = 0.1;  ///< between two looks at the deadlines
 constexpr double kLongestRepeat =
     8;  ///< of repeat_after_s: on a bad network a request needs many sendings, not few late ones
 
+constexpr double kDay_s = 86400;  ///< the clock counts nanoseconds, for 292 years
+
 Clock::time_point After(Clock::time_point from, double seconds) {
   return from + std::chrono::duration_cast<Clock::duration>(Seconds(seconds));
 }
 
 void CheckOptions(const LcmPolicyOptions& options) {
-  if (!(options.deadline_s > 0))
-    throw InvalidInput("policy deadline_s is {}, wanted a positive number", options.deadline_s);
-  if (!(options.start_s >= 0)) throw InvalidInput("policy start_s is {}, wanted 0 or more", options.start_s);
-  if (!(options.repeat_after_s > 0))
-    throw InvalidInput("policy repeat_after_s is {}, wanted a positive number", options.repeat_after_s);
+  if (!(options.deadline_s > 0 && options.deadline_s <= kDay_s))
+    throw InvalidInput("policy deadline_s is {}, wanted more than 0, at most {}", options.deadline_s, kDay_s);
+  if (!(options.start_s >= 0 && options.start_s <= kDay_s))
+    throw InvalidInput("policy start_s is {}, wanted 0 … {}", options.start_s, kDay_s);
+  if (!(options.repeat_after_s > 0 && options.repeat_after_s <= kDay_s))
+    throw InvalidInput("policy repeat_after_s is {}, wanted more than 0, at most {}", options.repeat_after_s, kDay_s);
   if (options.jpeg_quality < 0 || options.jpeg_quality > 100) {
     throw InvalidInput("policy jpeg_quality is {}, wanted 0 … 100", options.jpeg_quality);
   }

@@ -87,6 +87,12 @@ int Rises(const CheckpointCurve& curve, std::size_t world) {
   return rises;
 }
 
+/// Where the digits begin that end before `end`; `end` where there are none.
+std::size_t DigitsBefore(const std::string& name, std::size_t end) {
+  while (end > 0 && name[end - 1] >= '0' && name[end - 1] <= '9') --end;
+  return end;
+}
+
 }  // namespace
 
 std::optional<double> StepOf(const std::string& checkpoint) {
@@ -96,8 +102,11 @@ std::optional<double> StepOf(const std::string& checkpoint) {
     unit = checkpoint[end - 1] == 'k' ? 1e3 : 1e6;
     --end;
   }
-  std::size_t begin = end;
-  while (begin > 0 && checkpoint[begin - 1] >= '0' && checkpoint[begin - 1] <= '9') --begin;
+  std::size_t begin = DigitsBefore(checkpoint, end);
+  if (unit > 1 && begin > 0 && begin < end && checkpoint[begin - 1] == '.') {
+    const std::size_t whole = DigitsBefore(checkpoint, begin - 1);
+    if (whole < begin - 1) begin = whole;
+  }
   double step = 0;
   const auto [stop, error] = std::from_chars(checkpoint.data() + begin, checkpoint.data() + end, step);
   if (begin == end || error != std::errc() || stop != checkpoint.data() + end) return std::nullopt;

@@ -33,7 +33,8 @@ std::vector<CheckpointCurve> CheckpointsOf(const RunSummary& summary);
 /// rise."
 std::string TrendInWords(const CheckpointCurve& curve, std::size_t world);
 
-/// The number at the end of a checkpoint's name: "step_20000" → 20000, "120k" → 120000, "good" → none.
+/// The number at the end of a checkpoint's name: "step_20000" → 20000, "120k" → 120000, "0.5M" → 500000, "good" → none.
+/// Without a unit what is before a point is a version's: "v1.10" → 10.
 std::optional<double> StepOf(const std::string& checkpoint);
 
 }  // namespace evac

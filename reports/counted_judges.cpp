@@ -18,13 +18,19 @@ std::vector<std::string> Names(const std::string& text) {
   return names;
 }
 
+/// Whether a judge was asked to learn what its answers are worth: "vlm:x:flip", "vlm:x:flip:small".
+bool IsProbe(const std::string& judge) {
+  const std::string parts = judge + ":";
+  return parts.find(":flip:") != std::string::npos || parts.find(":retest:") != std::string::npos;
+}
+
 std::string FullName(const std::string& name, const std::vector<std::string>& there) {
   std::vector<std::string> meant;
-  for (const std::string& judge : there) {  // in the order of names: "vlm:x" before its probe "vlm:x:flip"
+  for (const std::string& judge : there) {  // in the order of names: "vlm:x" before "vlm:x:small"
     if (judge == name) return name;
-    if (!judge.starts_with(name + ":")) continue;
-    const bool is_probe = std::ranges::any_of(meant, [&](const auto& other) { return judge.starts_with(other + ":"); });
-    if (!is_probe) meant.push_back(judge);
+    if (!judge.starts_with(name + ":") || IsProbe(judge)) continue;
+    const bool is_of_one = std::ranges::any_of(meant, [&](const auto& other) { return judge.starts_with(other + ":"); });
+    if (!is_of_one) meant.push_back(judge);
   }
   if (meant.size() > 1)
     throw InvalidInput("judge '{}': stands for {}, wanted the name of one", name, fmt::join(meant, " and "));

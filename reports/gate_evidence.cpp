@@ -6,20 +6,20 @@
 #include <cmath>
 
 #include "core/error.h"
+#include "core/statistics/inverted_interval.h"
 #include "core/statistics/planning.h"
 #include "core/statistics/sequential.h"
 #include "core/statistics/sequential_planning.h"
 #include "core/statistics/special.h"
-#include "core/statistics/two_by_two.h"
+#include "core/statistics/two_samples.h"
 #include "reports/gate_quality.h"
 #include "reports/wording.h"
 
 namespace evac {
 namespace {
 
-constexpr double kPower = 0.8;                   // of the sizes that "more" promises
-constexpr double kShownConfidence = 0.95;        // of the two rates
-constexpr std::int64_t kMostExactTrials = 1000;  // above, Newcombe's interval says nearly the same and at once
+constexpr double kPower = 0.8;             // of the sizes that "more" promises
+constexpr double kShownConfidence = 0.95;  // of the two rates
 
 std::string Margin(const GateRule& rule) { return fmt::format("{:g} points", 100 * rule.margin); }
 
@@ -182,22 +182,20 @@ void CompareUnpaired(const GateRule& rule, const GateSides& sides, Evidence& evi
   };
   const Trials here(candidate), there(baseline);
   Describe(rule, difference(PassConfidence(rule)), here.all.trials, evidence);
-  const Count &one = here.effective, &two = there.effective;
-  const bool by_margin = rule.test == GateTest::kNonInferiority, is_large = one.trials + two.trials > kMostExactTrials;
-  const auto interval = [&](double confidence) { return difference(confidence).interval; };
-  if (one.trials == 0 || two.trials == 0) {
+  const bool by_margin = rule.test == GateTest::kNonInferiority;
+  std::string method = by_margin ? "Newcombe" : "Boschloo";
+  if (here.all.trials == 0 || there.all.trials == 0) {
     decision.p = Undefined{"one of the two has no episode that counts"};
   } else if (by_margin) {
-    decision.p = PBelow(interval, -rule.margin);
-  } else if (is_large) {
-    decision.p = std::min(1.0, 2 * PBelow(interval, 0));
+    decision.p = PBelow([&](double confidence) { return difference(confidence).interval; }, -rule.margin);
   } else {
-    decision.p = std::min(1.0, 2 * BoschlooExact(one, two).less);
+    const TwoSampleTest test = BoschlooOrNewcombe(candidate, baseline);
+    decision.p = std::min(1.0, 2 * test.less);
+    method = test.method;
   }
-  decision.statement += fmt::format(
-      "{} and {} episodes, {} ({})", here.all.trials, there.all.trials,
-      decision.p ? PValue(*decision.p) : decision.p.reason(),
-      OnEpisodes(by_margin || is_large ? "Newcombe" : "Boschloo", here.Number(), there.Number()));
+  decision.statement += fmt::format("{} and {} episodes, {} ({})", here.all.trials, there.all.trials,
+                                    decision.p ? PValue(*decision.p) : decision.p.reason(),
+                                    OnEpisodes(method, here.Number(), there.Number()));
   evidence.more = MoreTrials(rule, here, there);
 }
 
@@ -215,32 +213,7 @@ void Block(const GateRule& rule, const GateSides& sides, Evidence& evidence) {
   }
 }
 
-/// Bisection over log alpha; the interval shrinks as alpha grows.
-template <typename IsBeyond>
-double SmallestAlpha(const IntervalAt& interval, IsBeyond is_beyond) {
-  const auto holds = [&](double alpha) {
-    const Defined<Interval> at = interval(1 - 2 * alpha);
-    return at && is_beyond(*at);
-  };
-  double yes = 0.4999, no = 1e-9;
-  if (!holds(yes)) return 1;
-  if (holds(no)) return no;
-  for (int halving = 0; halving < 40; ++halving) {
-    const double middle = std::sqrt(yes * no);
-    (holds(middle) ? yes : no) = middle;
-  }
-  return yes;
-}
-
 }  // namespace
-
-double PBelow(const IntervalAt& interval, double threshold) {
-  return SmallestAlpha(interval, [threshold](const Interval& at) { return at.high < threshold; });
-}
-
-double PAbove(const IntervalAt& interval, double threshold) {
-  return SmallestAlpha(interval, [threshold](const Interval& at) { return at.low > threshold; });
-}
 
 Evidence Examine(const GateRule& rule, const GateInput& input) {
   const GateSides sides = SidesOf(rule, input.data);

@@ -1,6 +1,5 @@
 #pragma once
 
-#include <functional>
 #include <optional>
 #include <string>
 #include <vector>
@@ -33,13 +32,5 @@ struct Evidence {
 
 /// @throws InvalidInput as SidesOf, and where a judge or a world is missing.
 Evidence Examine(const GateRule& rule, const GateInput& input);
-
-/// An interval at any confidence, two-sided.
-using IntervalAt = std::function<Defined<Interval>(double confidence)>;
-/// One-sided p of "the value is at least `threshold`": the smallest alpha at which the interval of confidence 1 - 2
-/// alpha ends below it; 1 where none of alpha < .5 does.
-double PBelow(const IntervalAt& interval, double threshold);
-/// The same of "at most".
-double PAbove(const IntervalAt& interval, double threshold);
 
 }  // namespace evac

@@ -8,6 +8,7 @@
 
 #include "core/error.h"
 #include "core/statistics/confusion.h"
+#include "core/statistics/inverted_interval.h"
 #include "core/statistics/special.h"
 #include "reports/wording.h"
 

@@ -81,8 +81,9 @@ Headline Worse(const ReportData& report) {
 HeadlineItem LossesAt(const ReportData& report, const std::string& task) {
   std::vector<std::pair<double, std::string>> found;
   for (const Candidate& candidate : report.candidates) {
-    for (const ComparisonRow& row : candidate.comparison.tasks) {
-      if (row.task != task || !IsDecided(row.p_holm) || !row.difference.value) continue;
+    for (std::size_t i = 0; i < candidate.comparison.tasks.size(); ++i) {
+      const ComparisonRow& row = candidate.comparison.tasks[i];
+      if (row.task != task || !IsDecided(candidate.task_p_holm[i]) || !row.difference.value) continue;
       found.emplace_back(*row.difference.value, candidate.comparison.first + " " + PointsWithInterval(row.difference));
     }
   }

@@ -9,7 +9,7 @@
 #include "core/statistics/many_comparisons.h"
 #include "core/statistics/mcnemar.h"
 #include "core/statistics/rate_difference.h"
-#include "core/statistics/two_by_two.h"
+#include "core/statistics/two_samples.h"
 #include "reports/summary.h"
 
 namespace evac {
@@ -31,7 +31,7 @@ struct Contestant {
 struct Contest {
   std::size_t first = 0, second = 0;
   double p = 1;
-  bool is_paired = true;
+  std::string unpaired_test;  ///< empty: paired
 };
 
 /// The pairs of each initial state, so that its repeats do not count as if they were new.
@@ -54,14 +54,14 @@ std::vector<PairedOutcomes> PairsByState(const Outcomes& a, const Outcomes& b) {
   return states;
 }
 
-Count EffectiveCountOf(const Outcomes& outcomes) {
+std::vector<Count> TrialsByState(const Outcomes& outcomes) {
   std::vector<Count> states;
   for (auto one = outcomes.begin(); one != outcomes.end(); ++one) {
     if (one == outcomes.begin() || one->first.first != std::prev(one)->first.first) states.emplace_back();
     ++states.back().trials;
     states.back().successes += one->second;
   }
-  return EffectiveCount(states);
+  return states;
 }
 
 Contest ContestOf(const std::vector<Contestant>& contestants, std::size_t first, std::size_t second) {
@@ -70,8 +70,9 @@ Contest ContestOf(const std::vector<Contestant>& contestants, std::size_t first,
   std::int64_t shared = 0;
   for (const PairedOutcomes& state : states) shared += state.pairs;
   if (static_cast<double>(shared) >= kPairedFrom * static_cast<double>(std::max(a.size(), b.size())))
-    return {first, second, McNemarExact(EffectivePairs(states).flips).p_exact, true};
-  return {first, second, BoschlooExact(EffectiveCountOf(a), EffectiveCountOf(b)).two_sided, false};
+    return {first, second, McNemarExact(EffectivePairs(states).flips).p_exact, ""};
+  const TwoSampleTest test = BoschlooOrNewcombe(TrialsByState(a), TrialsByState(b));
+  return {first, second, test.two_sided, test.method};
 }
 
 std::map<Place, std::vector<Contestant>> ContestantsOf(const std::vector<JudgedEpisode>& episodes,
@@ -134,7 +135,7 @@ LetterTests GiveLetters(const std::vector<JudgedEpisode>& episodes, double alpha
     for (const auto& [task, contests] : tasks) {
       for (const Contest& contest : contests) {
         p_values.push_back(contest.p);
-        tests.has_unpaired |= !contest.is_paired;
+        if (!contest.unpaired_test.empty()) tests.unpaired_tests.insert(contest.unpaired_test);
       }
     }
     const std::vector<double> adjusted = HolmAdjusted(p_values);

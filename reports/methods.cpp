@@ -1,6 +1,7 @@
 #include "reports/methods.h"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <set>
@@ -64,6 +65,7 @@ bool HasRepeats(const RunSummary& summary) {
 std::string Policies(const ReportData& report) {
   if (report.candidates.empty()) return "";
   std::set<std::string> tests, intervals;
+  std::int64_t task_tests = 0;
   bool paired = false;
   for (const Candidate& candidate : report.candidates) {
     const ComparisonRow& all = candidate.comparison.all;
@@ -72,24 +74,27 @@ std::string Policies(const ReportData& report) {
     if (all.difference.interval) intervals.insert(all.difference.method);
     for (const ComparisonRow& row : candidate.comparison.tasks) {
       if (row.p) tests.insert(row.test);
+      task_tests += row.p ? 1 : 0;
       if (row.difference.interval) intervals.insert(row.difference.method);
     }
   }
   if (tests.empty()) return "";
   std::string letters;
-  if (report.letters.pairs > 0) {
+  if (const std::set<std::string>& unpaired = report.letters.unpaired_tests; report.letters.pairs > 0) {
     letters = fmt::format(
         "Letters join policies whose difference on a task in a world is not significant (exact McNemar over shared "
         "states and seeds{}{}; Holm over the {} of a world; Piepho 2004). ",
-        report.letters.has_unpaired ? ", Boschloo where fewer than 80 % are shared" : "",
+        unpaired.empty() ? "" : fmt::format(", {} where fewer than 80 % are shared", fmt::join(unpaired, " or ")),
         HasRepeats(report.summary) ? ", on effective pairs and episodes" : "",
         Counted(report.letters.pairs, "pair"));
   }
+  const std::int64_t comparisons = Size(report.candidates.size());
   return fmt::format(
-      "Policies were compared with {} in {}{} ({}; two-sided), with intervals of the difference by {}; p-values are "
-      "Holm-adjusted over tasks within a comparison and over the {}. ",
-      report.baseline, report.world, paired ? ", paired by initial state and seed" : "", Joined(tests),
-      Joined(intervals), Counted(Size(report.candidates.size()), "comparison")) +
+             "Policies were compared with {} in {}{} ({}; two-sided), with intervals of the difference by {}; p-values "
+             "are Holm-adjusted over the {}{}. ",
+             report.baseline, report.world, paired ? ", paired by initial state and seed" : "", Joined(tests),
+             Joined(intervals), Counted(comparisons, "comparison"),
+             task_tests > comparisons ? fmt::format(", those of single tasks over all {} of them", task_tests) : "") +
          letters;
 }
 

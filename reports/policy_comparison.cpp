@@ -11,7 +11,7 @@
 #include "core/statistics/rate_difference.h"
 #include "core/statistics/special.h"
 #include "core/statistics/stratified.h"
-#include "core/statistics/two_by_two.h"
+#include "core/statistics/two_samples.h"
 #include "reports/comparison.h"
 #include "reports/wording.h"
 
@@ -156,19 +156,20 @@ void ComparePaired(const Side& first, const Side& second, const ComparisonOption
 }
 
 void CompareUnpaired(const Side& first, const Side& second, const ComparisonOptions& options, ComparisonRow& row) {
-  const Count one = EffectiveCount(StatesOf(first)), two = EffectiveCount(StatesOf(second));
+  const std::vector<Count> one = StatesOf(first), two = StatesOf(second);
+  const TwoSampleTest test = BoschlooOrNewcombe(one, two);
   row.first = RateOfSide(first, options.confidence());
   row.second = RateOfSide(second, options.confidence());
-  row.first_trials = {row.first_episodes, one.trials};
-  row.second_trials = {row.second_episodes, two.trials};
+  row.first_trials = {row.first_episodes, EffectiveCount(one).trials};
+  row.second_trials = {row.second_episodes, EffectiveCount(two).trials};
   row.difference = NewcombeOfRates(row.first, row.second);
   row.difference.method = OnEpisodes("Newcombe", row.first_trials, row.second_trials);
-  row.test = OnEpisodes("Boschloo", row.first_trials, row.second_trials);
-  if (one.trials > 0 && two.trials > 0) row.p = BoschlooExact(one, two).two_sided;
+  row.test = OnEpisodes(test.method, row.first_trials, row.second_trials);
+  if (!one.empty() && !two.empty()) row.p = test.two_sided;
 }
 
-ComparisonRow CompareTask(const std::string& task, const Side& first, const Side& second,
-                          const ComparisonOptions& options) {
+/// What there is to compare, and whether as pairs.
+ComparisonRow CountedRow(const std::string& task, const Side& first, const Side& second) {
   ComparisonRow row;
   row.task = task;
   row.first_episodes = static_cast<std::int64_t>(first.counted.size());
@@ -179,6 +180,12 @@ ComparisonRow CompareTask(const std::string& task, const Side& first, const Side
   row.flips = FlipsOf(first, second);
   const double most = static_cast<double>(std::max(row.first_episodes, row.second_episodes));
   row.is_paired = row.shared > 0 && static_cast<double>(row.shared) >= kPairedFrom * most;
+  return row;
+}
+
+ComparisonRow CompareTask(const std::string& task, const Side& first, const Side& second,
+                          const ComparisonOptions& options) {
+  ComparisonRow row = CountedRow(task, first, second);
   row.is_paired ? ComparePaired(first, second, options, row) : CompareUnpaired(first, second, options, row);
   return row;
 }
@@ -205,7 +212,7 @@ Side AllTasks(const std::map<std::string, Side>& sides) {
   return all;
 }
 
-/// A task is a stratum, of its effective trials: one weighting makes the difference and its interval.
+/// A task is a stratum, of its effective trials: one weighting makes the difference and its interval. Rates are pooled.
 void Stratify(const std::map<std::string, Side>& first, const std::map<std::string, Side>& second,
               const ComparisonOptions& options, ComparisonRow& row) {
   std::vector<Stratum> strata;
@@ -215,8 +222,10 @@ void Stratify(const std::map<std::string, Side>& first, const std::map<std::stri
     one += strata.back().first.trials;
     two += strata.back().second.trials;
   }
-  row.first_trials.effective = std::llround(one);
-  row.second_trials.effective = std::llround(two);
+  row.first = RateOfSide(AllTasks(first), options.confidence());
+  row.second = RateOfSide(AllTasks(second), options.confidence());
+  row.first_trials = {row.first_episodes, std::llround(one)};
+  row.second_trials = {row.second_episodes, std::llround(two)};
   const StratifiedTest test = MantelHaenszel(strata, options.confidence());
   row.difference = test.risk_difference;
   row.difference.method = OnEpisodes(row.difference.method, row.first_trials, row.second_trials);
@@ -242,8 +251,15 @@ std::vector<std::string> LeaveOut(std::map<std::string, Side>& first, std::map<s
 /// @param first, second  of the same tasks, each with episodes that count.
 ComparisonRow CompareAll(const std::map<std::string, Side>& first, const std::map<std::string, Side>& second,
                          const ComparisonOptions& options) {
-  ComparisonRow row = CompareTask("", AllTasks(first), AllTasks(second), options);
-  if (!row.is_paired && first.size() > 1) Stratify(first, second, options, row);
+  const Side one = AllTasks(first), two = AllTasks(second);
+  ComparisonRow row = CountedRow("", one, two);
+  if (row.is_paired) {
+    ComparePaired(one, two, options, row);
+  } else if (first.size() > 1) {
+    Stratify(first, second, options, row);
+  } else {
+    CompareUnpaired(one, two, options, row);
+  }
   row.p_holm = row.p;
   Decide(options, 1, row);
   return row;

@@ -42,7 +42,8 @@ struct ComparisonRow {
   Flips flips;          ///< of the shared pairs
   Estimate difference;  ///< first - second
   Number stratified_se = Undefined{"not stratified"};  ///< of the difference, where tasks are strata
-  std::string test;     ///< "exact McNemar", "Boschloo on 4 and 6 effective episodes", "Cochran-Mantel-Haenszel"
+  std::string test;     ///< "exact McNemar", "Boschloo on 4 and 6 effective episodes", "Newcombe" (of many:
+                        ///< two_samples.h), "Cochran-Mantel-Haenszel"
   Number p = Undefined{"no episodes to compare"};
   Number p_holm = Undefined{"no episodes to compare"};  ///< over the tasks shown; of all tasks: p itself
   Winner winner = Winner::kNotDecided;

@@ -49,6 +49,22 @@ void AdjustForCandidates(double alpha, std::vector<Candidate>& candidates) {
   }
 }
 
+/// Over all that is shown together, not over the tasks of one comparison.
+void AdjustTasks(std::vector<Candidate>& candidates) {
+  std::vector<double> p_values;
+  for (const Candidate& candidate : candidates) {
+    for (const ComparisonRow& row : candidate.comparison.tasks) {
+      if (row.p) p_values.push_back(*row.p);
+    }
+  }
+  const std::vector<double> adjusted = HolmAdjusted(p_values);
+  auto next = adjusted.begin();
+  for (Candidate& candidate : candidates) {
+    for (const ComparisonRow& row : candidate.comparison.tasks)
+      candidate.task_p_holm.push_back(row.p ? Number(*next++) : row.p);
+  }
+}
+
 std::vector<Candidate> CandidatesOf(const RunSummary& summary, const std::string& baseline, const std::string& world) {
   std::map<std::string, ComparedPolicy> policies = EpisodesByPolicy(summary, world);
   std::vector<Candidate> candidates;
@@ -59,6 +75,7 @@ std::vector<Candidate> CandidatesOf(const RunSummary& summary, const std::string
         {ComparePolicies(policies[policy], policies[baseline], {.alpha = 1 - summary.options.confidence})});
   }
   AdjustForCandidates(kAlpha, candidates);
+  AdjustTasks(candidates);
   return candidates;
 }
 

@@ -24,6 +24,7 @@ struct ReportOptions {
 struct Candidate {
   PolicyComparison comparison;                          ///< first: the candidate; second: the baseline
   Number p_holm = Undefined{"no episodes to compare"};  ///< of all tasks together, over all candidates
+  std::vector<Number> task_p_holm = {};                 ///< [comparison.tasks] over all candidates and their tasks
   Defined<std::int64_t> more = Undefined{"no episodes to compare"};  ///< of all tasks, as MoreToDecide says it at this
                                                                      ///< candidate's share of alpha
 };

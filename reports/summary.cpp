@@ -38,8 +38,10 @@ std::vector<std::string> JudgesOf(const RunData& data) {
 /// does not name come last. A suite that cannot be read changes nothing.
 void OrderAsInSuite(RunData& data) try {
   std::map<std::pair<std::string, std::string>, std::size_t> places;
-  for (const Config& policy : Config::FromText(data.run.suite_text, "suite").List("policies"))
-    places.try_emplace({policy.Get<std::string>("name", ""), policy.Get<std::string>("checkpoint", "")}, places.size());
+  for (const Config& policy : Config::FromText(data.run.suite_text, "suite").List("policies")) {
+    const auto checkpoint = policy.Get<std::string>("checkpoint", kDefaultCheckpoint);
+    places.try_emplace({policy.Get<std::string>("name", ""), checkpoint}, places.size());
+  }
   const auto place = [&places](const PolicyInfo& policy) {
     const auto found = places.find({policy.name, policy.checkpoint});
     return found == places.end() ? places.size() : found->second;

@@ -104,6 +104,11 @@ std::vector<std::uint8_t> BytesOf(const Pictures& pictures) {
   return bytes;
 }
 
+/// Where a side is 0 there are no bytes, and any number of frames: who counts those has no end.
+bool IsEmpty(const TensorView& tensor) {
+  return std::any_of(tensor.shape.begin(), tensor.shape.end(), [](std::int64_t side) { return side <= 0; });
+}
+
 /// @throws TensorError, also where an entry was changed after it was written.
 CachedChunk Read(const fs::path& path) {
   const TensorFile file = TensorFile::Open(path);
@@ -112,7 +117,8 @@ CachedChunk Read(const fs::path& path) {
   const bool is_whole = format != file.metadata().end() && format->second == kFormat && hash != file.metadata().end() &&
                         latents.type == TensorType::kF32 && latents.shape.size() == 2 &&
                         pictures.type == TensorType::kU8 && pictures.shape.size() == 5 && pictures.shape[4] == 3 &&
-                        pictures.shape[0] == latents.shape[0] && hash->second == HashOf(latents.bytes, pictures.bytes);
+                        pictures.shape[0] == latents.shape[0] && !IsEmpty(latents) && !IsEmpty(pictures) &&
+                        hash->second == HashOf(latents.bytes, pictures.bytes);
   if (!is_whole) throw TensorError(path.string() + ": not what was written there");
   CachedChunk chunk;
   const auto values = static_cast<std::size_t>(latents.shape[1]);

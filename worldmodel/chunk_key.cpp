@@ -30,7 +30,7 @@ class Collected {
 };
 
 /// One more whenever the same weights give other bits.
-constexpr int kArithmetic = 3;
+constexpr int kArithmetic = 4;
 
 /// The deltas and maps say what statistics, stride and sizes of discs do, so those are not listed.
 std::string Settings(const ImaginerOptions& options) {

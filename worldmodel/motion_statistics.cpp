@@ -3,7 +3,10 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cctype>
 #include <cmath>
+#include <nlohmann/json.hpp>
+#include <string>
 
 #include "worldmodel/action_delta.h"
 
@@ -16,6 +19,14 @@ std::string List(const std::array<double, 12>& values) {
   std::string text;
   for (const double value : values) text += fmt::format("{}{}", text.empty() ? "" : ", ", value);
   return "[" + text + "]";
+}
+
+/// As YAML takes it for that text: in quotes where it is not a plain word.
+std::string Scalar(const std::string& text) {
+  const auto is_plain = [](unsigned char c) { return std::isalnum(c) != 0 || c == '_' || c == '-' || c == '.'; };
+  const bool is_word = !text.empty() && std::isalpha(static_cast<unsigned char>(text.front())) != 0;
+  if (is_word && std::ranges::all_of(text, is_plain)) return text;
+  return nlohmann::json(text).dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
 }
 
 }  // namespace
@@ -71,7 +82,7 @@ std::string StatisticsPage(const ActionStatistics& statistics) {
   return fmt::format(
       "# Motion per frame of 30 Hz: left x, y, z (metres), roll, pitch, yaw (radians), then right. An arm that never "
       "moved: 0 and 1.\nrobot: {}\nmean: {}\ndeviation: {}\n",
-      statistics.robot, List(statistics.mean), List(statistics.deviation));
+      Scalar(statistics.robot), List(statistics.mean), List(statistics.deviation));
 }
 
 }  // namespace evac

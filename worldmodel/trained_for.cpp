@@ -84,7 +84,7 @@ void TrainedFor::CheckStatistics(const ActionStatistics& asked, const std::strin
 
 void TrainedFor::CheckPeriod(double asked_period_s, const std::string& who) const {
   if (!period_s || std::abs(*period_s - asked_period_s) <= kPeriodTolerance_s) return;
-  throw InvalidInput("{}: frames {:.4g} s apart are asked for, {} was trained with frames {:.4g} s apart", who,
+  throw InvalidInput("{}: frames {:.7g} s apart are asked for, {} was trained with frames {:.7g} s apart", who,
                      asked_period_s, weights, *period_s);
 }
 

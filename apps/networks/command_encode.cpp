@@ -12,6 +12,7 @@
 #include "apps/commands.h"
 #include "apps/network_parts.h"
 #include "apps/networks/codec_identity.h"
+#include "core/config.h"
 #include "core/error.h"
 #include "core/file.h"
 #include "core/hash.h"
@@ -86,13 +87,15 @@ void LinkInto(const std::filesystem::path& folder, const std::filesystem::path& 
 }
 
 /// @throws InvalidInput, TensorError where the shards are not what the world model learned from: what differs
-void CheckLearnedFrom(const train::ShardSet& set, const TrainedFor& trained, const EncodeArguments& arguments) {
+void CheckLearnedFrom(const train::ShardSet& set, const TrainedFor& trained, const nn::ModelConfig& config,
+                      const EncodeArguments& arguments) {
   const std::string& who = arguments.shards;
   const TrainedFor shards = TrainedFor::Of(who, set.metadata());  // the same words: weights have them from shards
   if (shards.period_s) trained.CheckPeriod(*shards.period_s, who);
   trained.CheckCameras(shards.cameras, who);
   trained.CheckArms(shards.arms, who);
   trained.CheckPoseMap(shards.pose_map, who);
+  trained.CheckPoseMap(config.pose_map.Words(config.image_height_px), arguments.config);
   if (shards.statistics) trained.CheckStatistics(*shards.statistics, who);
 }
 
@@ -107,15 +110,16 @@ ExitCode Imagine(const EncodeArguments& arguments) {
   const nn::EvacModel model = nn::LoadModel(arguments.codec, config, options);
   const std::string codec = CodecSha256(arguments.codec);
   const TrainedFor trained = TrainedFor::Read(arguments.codec);
-  const std::string products = fmt::format("{}, imagined by {} in {} steps", ProductsOf(arguments),
-                                           Sha256HexOfFile(arguments.codec), arguments.steps);
+  const std::string products =
+      fmt::format("{}, imagined by {} in {} steps with page {}", ProductsOf(arguments), Sha256HexOfFile(arguments.codec),
+                  arguments.steps, Config::FromFile(arguments.config).ContentHash());
   MakeFolders(to);
   std::size_t shards = 0;
   std::atomic<std::size_t> imagined = 0;
   for (const train::Split split : {train::Split::kTrain, train::Split::kHoldout}) {
     if (!train::HasSplit(from, split)) continue;
     train::ShardSet set(from, split);
-    CheckLearnedFrom(set, trained, arguments);
+    CheckLearnedFrom(set, trained, config, arguments);
     set.OpenLatents(config.vae.z_channels, config.vae.Stride(), config.vae.scale_factor);
     if (set.codec() != codec)
       throw TensorError(arguments.codec + " did not make the shards' latents: wanted `evac encode` with it first");

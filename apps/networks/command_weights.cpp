@@ -79,8 +79,12 @@ struct Inspection {
   std::size_t bytes = 0, numbers = 0;
   std::map<std::string, std::size_t> numbers_by_part, bytes_by_type;
   std::optional<nn::KeyFit> fit;
-  std::string schedule;  ///< why the file's is put aside
+  std::string schedule;  ///< why the file's is put aside, or is not the page's
+  bool is_of_schedule = true;
   std::optional<double> touched_s;
+
+  /// @pre a page was given
+  bool Fits() const { return fit->Fits() && is_of_schedule; }
 };
 
 /// "model.diffusion_model", "first_stage_model", …
@@ -107,6 +111,14 @@ double Touch(const TensorFile& file) {
   return Seconds(Clock::now() - start);
 }
 
+/// Of weights whose keys fit: whether their noise is the page's too.
+void AskSchedule(const WeightsArguments& arguments, Inspection& found) try {
+  found.schedule = nn::FileWeights(arguments.in, ConfigOf(arguments)).report().schedule;
+} catch (const TensorError& error) {
+  found.schedule = error.what();
+  found.is_of_schedule = false;
+}
+
 Inspection Inspect(const TensorFile& file, const WeightsArguments& arguments) {
   Inspection found;
   for (const TensorView& tensor : file.tensors()) {
@@ -117,7 +129,7 @@ Inspection Inspect(const TensorFile& file, const WeightsArguments& arguments) {
   }
   if (!arguments.config.empty()) {
     found.fit = nn::CompareKeys(file, ConfigOf(arguments));
-    if (found.fit->Fits()) found.schedule = nn::FileWeights(arguments.in, ConfigOf(arguments)).report().schedule;
+    if (found.fit->Fits()) AskSchedule(arguments, found);
   }
   if (arguments.touch) found.touched_s = Touch(file);
   return found;
@@ -132,7 +144,7 @@ Json AsJson(const TensorFile& file, const Inspection& found) {
                {"numbers_by_part", found.numbers_by_part},
                {"bytes_by_type", found.bytes_by_type}};
   if (found.fit) {
-    json["fits"] = found.fit->Fits();
+    json["fits"] = found.Fits();
     json["missing"] = found.fit->missing;
     json["extra"] = found.fit->extra;
     json["misshapen"] = found.fit->misshapen;
@@ -160,10 +172,10 @@ void PrintText(const TensorFile& file, const Inspection& found, bool list) {
     fmt::print("every page touched in {:.2f} s: {:.0f} MB/s\n", *found.touched_s,
                static_cast<double>(found.bytes) / 1e6 / *found.touched_s);
   if (!found.fit) return;
-  fmt::print("{}\n", found.fit->Fits()
-                         ? fmt::format("fits; {} of its keys are read by nothing", found.fit->unread.size())
-                         : "does not fit: " + found.fit->Complaint());
-  if (!found.schedule.empty()) fmt::print("{}\n", found.schedule);
+  const std::string complaint = found.is_of_schedule ? found.fit->Complaint() : found.schedule;
+  fmt::print("{}\n", found.Fits() ? fmt::format("fits; {} of its keys are read by nothing", found.fit->unread.size())
+                                  : "does not fit: " + complaint);
+  if (found.is_of_schedule && !found.schedule.empty()) fmt::print("{}\n", found.schedule);
 }
 
 ExitCode RunInspect(const WeightsArguments& arguments) {
@@ -174,7 +186,7 @@ ExitCode RunInspect(const WeightsArguments& arguments) {
   } else {
     PrintText(file, found, arguments.list);
   }
-  return !found.fit || found.fit->Fits() ? ExitCode::kOk : ExitCode::kNo;
+  return !found.fit || found.Fits() ? ExitCode::kOk : ExitCode::kNo;
 }
 
 void DemandNew(const std::string& out) {
@@ -250,6 +262,7 @@ ExitCode RunConvert(const WeightsArguments& arguments) {
   }
   if (!ConfigOf(arguments).object_forecast)
     throw InvalidInput("--forecast {}: the page of sizes has object_forecast: false, wanted true", arguments.forecast);
+  train::CheckForecastFor(arguments.forecast, options.metadata);
   train::CheckpointWeights forecast(arguments.forecast);
   train::RoutedWeights routed({{nn::kForecastPrefix, &forecast}, {"", &source}});
   std::erase_if(options.without, [](const std::string& key) { return key.starts_with(nn::kForecastPrefix); });

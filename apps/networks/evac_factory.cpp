@@ -94,6 +94,13 @@ void CheckTrainedFor(const SuiteEvac& evac, const nn::ModelConfig& config, const
   }
 }
 
+/// The sampler takes no more steps than the page's schedule has.
+void CheckSteps(const SuiteEvac& evac, const nn::ModelConfig& config, const std::string& name) {
+  if (evac.steps > config.schedule.steps)
+    throw InvalidInput("world {}: field steps: found {}, wanted at most {}, as many as schedule.steps of {}", name, evac.steps,
+                       config.schedule.steps, evac.config.string());
+}
+
 /// How a network was trained to see recordings.
 struct Sight {
   double period_s;
@@ -137,6 +144,7 @@ Recording ReadAsTrained(const Suite& suite, const std::filesystem::path& folder)
 
 void CheckNetwork(const SuiteWorld& world, const std::vector<Task>& tasks) try {
   const nn::ModelConfig config = ReadEvacConfig(world.evac->config);
+  CheckSteps(*world.evac, config, world.name);
   nn::FileWeights(world.evac->weights, config);
   CheckTrainedFor(*world.evac, config, world.name, tasks);
 } catch (const TensorError& error) {

@@ -90,7 +90,7 @@ class Measuring {
       AddDrift(replay, truth.Clip(real), imagined.Clip(model), drift);
     }
     input_.open_loop = {drift.object_px(), drift.Chunks()};
-    input_.parts.push_back(EpisodesOf("open", store));
+    input_.parts.push_back(EpisodesOf("open", store, replays));
   }
 
   /// What policies chose in the model, done in reality: whether the model is wrong about what it is told, or policies are
@@ -105,7 +105,7 @@ class Measuring {
       input_.rows.push_back({"executed", replay.pair, truth.Truth(really), std::nullopt, imagined.Said(model),
                              truth.Clip(really), imagined.Clip(model)});
     }
-    input_.parts.push_back(EpisodesOf("executed", store));
+    input_.parts.push_back(EpisodesOf("executed", store, replays));
   }
 
   void Counterfactual() {
@@ -124,7 +124,7 @@ class Measuring {
         input_.rows.push_back({"counterfactual:" + kind.name, replay.pair, found.Truth(real), std::nullopt,
                                found.Said(model), found.Clip(real), found.Clip(model)});
       }
-      input_.parts.push_back(EpisodesOf("counterfactual_" + kind.name, store));
+      input_.parts.push_back(EpisodesOf("counterfactual_" + kind.name, store, kind.replays));
     }
   }
 
@@ -139,7 +139,7 @@ class Measuring {
     for (const Replay& replay : replays)
       AddDrift(replay, found.Clip({replay.pair, worlds_.real.name}), found.Clip({replay.pair, worlds_.model.name}), drift);
     input_.horizon = drift.Chunks();
-    input_.parts.push_back(EpisodesOf("horizon", store));
+    input_.parts.push_back(EpisodesOf("horizon", store, replays));
   }
 
   /// Measured anew every time.

@@ -89,6 +89,8 @@ Number SecondsPerChunk(World& world, std::span<const Replay> replays, int chunk)
 
 /// How many episodes a part has, and how many of them failed.
 PartEpisodes EpisodesOf(const std::string& part, const Store& store);
+/// The same of these replays alone: those of a call that asked for more stay in the store, and are in no number of this one.
+PartEpisodes EpisodesOf(const std::string& part, const Store& store, const std::vector<Replay>& replays);
 
 /// What an OUT is about, by SHA-256: two that are about one reality hold the same episodes of every policy that both have.
 struct FidelitySubject {

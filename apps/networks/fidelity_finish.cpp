@@ -18,6 +18,13 @@ std::string FailureAmong(const std::vector<Advanced>& answers) {
   return "";
 }
 
+void CountIn(const Episode& episode, PartEpisodes& counted) {
+  ++counted.episodes;
+  if (!IsFailure(episode.stop)) return;
+  ++counted.failed;
+  counted.last_failure = episode.key.Id() + ": " + episode.failure;
+}
+
 }  // namespace
 
 Number SecondsPerChunk(World& world, std::span<const Replay> replays, int chunk) try {
@@ -52,11 +59,16 @@ Number SecondsPerChunk(const SuiteWorld& model, const Suite& suite, const Store&
 
 PartEpisodes EpisodesOf(const std::string& part, const Store& store) {
   PartEpisodes counted{.part = part};
+  for (const Episode& episode : store.Episodes()) CountIn(episode, counted);
+  return counted;
+}
+
+PartEpisodes EpisodesOf(const std::string& part, const Store& store, const std::vector<Replay>& replays) {
+  std::set<PairKey> pairs;
+  for (const Replay& replay : replays) pairs.insert(replay.pair);
+  PartEpisodes counted{.part = part};
   for (const Episode& episode : store.Episodes()) {
-    ++counted.episodes;
-    if (!IsFailure(episode.stop)) continue;
-    ++counted.failed;
-    counted.last_failure = episode.key.Id() + ": " + episode.failure;
+    if (pairs.contains(episode.key.pair)) CountIn(episode, counted);
   }
   return counted;
 }

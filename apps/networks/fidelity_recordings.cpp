@@ -67,10 +67,16 @@ std::vector<Recording> ReadAll(const fs::path& folder, const SuiteWorld& model, 
   std::vector<LeftOut> left_out;
   for (const fs::path& one : folders) {
     Looked looked = LookAt(one, how);
-    if (looked.source) {
-      recordings.push_back(ReadForPacking(one, how));
-    } else {
+    if (!looked.source) {
       left_out.push_back(std::move(looked.left_out));
+      continue;
+    }
+    Recording recording = ReadForPacking(one, how);
+    try {
+      trained.CheckArms(recording.arm_names, one.string());
+      recordings.push_back(std::move(recording));
+    } catch (const Error& error) {
+      left_out.push_back({one, "other_robot", error.what()});
     }
   }
   for (std::size_t i = 0; i < std::min<std::size_t>(left_out.size(), 5); ++i)
@@ -127,7 +133,7 @@ ExitCode RunRecordedFidelity(const FidelityArguments& arguments, const Suite& gi
   const Store store = RunReplays(run, replays);
 
   FidelityInput input;
-  input.parts = {EpisodesOf("open", store)};
+  input.parts = {EpisodesOf("open", store, replays)};
   input.suite_hash = suite.hash;
   input.model_hash = model.evac->hash;
   const OutcomesOf found(store, "");

@@ -12,7 +12,7 @@
 namespace evac {
 namespace {
 
-constexpr double kPeriodTolerance = 0.02;  // as of a recording that is thinned
+constexpr double kPeriodTolerance = 0.02;  // as of a recording that is thinned (core/recording.h)
 
 void CheckNamed(const ImagineInputs& inputs) {
   const std::pair<const char*, const std::filesystem::path*> files[] = {{"--frame", &inputs.files.frame},
@@ -88,7 +88,9 @@ ImagineStart ReadImagineStart(const ImagineInputs& inputs, std::size_t views) {
                        track.size(), start.stride);
   }
   start.period_s = recording.period_s * start.stride;
-  if (inputs.stride == 0 && std::abs(start.period_s / inputs.period_s - 1) > kPeriodTolerance)
+  const bool is_expected = std::abs(start.period_s / inputs.period_s - 1) <= kPeriodTolerance;
+  if (is_expected) start.period_s = inputs.period_s;  // as of a recording that is packed
+  if (inputs.stride == 0 && !is_expected)
     fmt::print(stderr,
                "evac: warning: {}: its steps are {:.4g} s apart: every {} taken, {:.4g} s apart, where the network expects {:.4g} s\n",
                recording.source, recording.period_s, start.stride, start.period_s, inputs.period_s);

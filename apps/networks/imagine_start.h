@@ -25,7 +25,7 @@ struct ImagineStart {
   InitialScene scene;      ///< of V cameras
   std::vector<Arms> arms;  ///< [T], T >= 2: where they begin, then one target per frame to imagine
   std::vector<std::string> arm_names;  ///< the recording's
-  double period_s = 0;     ///< between them
+  double period_s = 0;     ///< between them; the asked one where they are within 2 % of it
   int stride = 1;          ///< recorded steps per frame
   std::string source;      ///< one sentence
   std::vector<std::filesystem::path> files;

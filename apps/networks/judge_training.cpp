@@ -5,11 +5,14 @@
 
 #include "core/error.h"
 #include "core/seed.h"
+#include "worldmodel/train/option_limits.h"
 
 namespace evac {
 namespace {
 
 enum Stream : std::uint32_t { kPick = 11, kChange = 12, kMove = 13 };
+
+constexpr const char* kTraining = "judge training";
 
 /// Rows of the pictures between first and last, each moved on its own.
 std::vector<std::int64_t> JitteredRows(const PackedClip& clip, const JudgeTrainingOptions& options, train::Dice& dice) {
@@ -117,8 +120,14 @@ JudgeTraining::JudgeTraining(const JudgeClipSource& source, const JudgeClips& fi
   if (options.batch < 1) throw InvalidInput("judge training: batch is {}, wanted at least 1", options.batch);
   if (options.looks < 1 || options.looks > 16) throw InvalidInput("judge training: looks is {}, wanted 1 … 16", options.looks);
   if (!(options.longest >= 1)) throw InvalidInput("judge training: longest is {}, wanted at least 1", options.longest);
-  if (options.changes.blur_times < 1)
-    throw InvalidInput("judge training: blur_times is {}, wanted at least 1", options.changes.blur_times);
+  train::RequireShares(kTraining, {{"calibration", options.calibration},
+                                   {"drop_view", options.drop_view},
+                                   {"jitter", options.jitter},
+                                   {"mirror_share", options.mirror_share},
+                                   {"reconstructed_share", options.reconstructed_share},
+                                   {"unsure", options.unsure}});
+  train::RequireWeights(kTraining, {{"object_weight", options.object_weight}});
+  CheckChanges(kTraining, options.changes);
   if (options.shift_px < 0) throw InvalidInput("judge training: shift_px is {}, wanted at least 0", options.shift_px);
 }
 

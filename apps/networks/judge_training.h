@@ -55,6 +55,7 @@ ClassifierClips ForNetwork(const at::Tensor& bytes, const JudgeClips& clips);
 class JudgeTraining {
  public:
   /// @param source, fit  outlive this; fit are clips of the source
+  /// @throws InvalidInput, TensorError naming an option that is out of range.
   JudgeTraining(const JudgeClipSource& source, const JudgeClips& fit, const JudgeTrainingOptions& options);
   at::Tensor Loss(const ClassifierNet& net, const train::StepPlace& place) const;
 

@@ -175,6 +175,12 @@ void Shuffle(std::vector<T>& items, SplitMix64 random) {
   for (std::size_t i = items.size(); i > 1; --i) std::swap(items[i - 1], items[random.Below(i)]);
 }
 
+/// Of its pictures and maps.
+double Megabytes(const PlannedClip& clip, const Packing& packing) {
+  const double pictures = static_cast<double>(packing.sources[clip.source].frames * packing.how.cameras.size() * 2);
+  return pictures * packing.clip.picture_px.area() * 3 / 1e6;
+}
+
 void PlanShards(const PackArguments& arguments, Packing& packing) {
   for (const bool holds_out : {false, true}) {
     std::vector<PlannedClip> clips;
@@ -183,11 +189,18 @@ void PlanShards(const PackArguments& arguments, Packing& packing) {
       for (int crop = 0; crop < (holds_out ? 1 : arguments.crops); ++crop) clips.push_back({i, crop});
     }
     Shuffle(clips, SplitMix64(SeedFor(SeedFor(arguments.seed, "order of clips"), holds_out ? 1 : 0)));
-    const auto size = static_cast<std::size_t>(arguments.clips_per_shard);
-    for (std::size_t begin = 0; begin < clips.size(); begin += size) {
-      const auto first = clips.begin() + static_cast<std::ptrdiff_t>(begin);
-      const auto last = clips.begin() + static_cast<std::ptrdiff_t>(std::min(begin + size, clips.size()));
-      packing.shards.push_back({holds_out, {first, last}});
+    double megabytes = 0;
+    std::size_t room = 0;  // for so many clips more
+    for (const PlannedClip& clip : clips) {
+      const double own = Megabytes(clip, packing);
+      if (room == 0 || megabytes + own > arguments.shard_mb) {
+        packing.shards.push_back({holds_out, {}});
+        room = static_cast<std::size_t>(arguments.clips_per_shard);
+        megabytes = 0;
+      }
+      packing.shards.back().clips.push_back(clip);
+      --room;
+      megabytes += own;
     }
   }
 }
@@ -198,6 +211,7 @@ std::string RecipeOf(const PackArguments& arguments, const Packing& packing) {
                   arguments.seed, arguments.crops, arguments.hold_out, arguments.clips_per_shard, arguments.period_s,
                   packing.clip.picture_px.width, packing.clip.picture_px.height, PoseMapWords(packing.clip.pose_map),
                   packing.arms_read);
+  if (arguments.shard_mb != kShardMb) all += fmt::format(" shard MB {}", arguments.shard_mb);
   for (const std::string& camera : packing.how.cameras) all += " " + camera;
   for (const PackSource& source : packing.sources) all += "\n" + source.name + " " + source.sha256;
   return Sha256Hex(all + "\n" + StatisticsPage(packing.clip.statistics));

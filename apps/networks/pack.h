@@ -9,6 +9,8 @@
 
 namespace evac {
 
+inline constexpr double kShardMb = 2000;
+
 struct PackArguments {
   std::vector<std::filesystem::path> inputs;
   std::filesystem::path out, config;
@@ -18,7 +20,8 @@ struct PackArguments {
   double period_s = 0.1;
   int crops = 1;            ///< clips per recording: the whole picture, then random crops
   double hold_out = 0.05;   ///< share of initial states whose recordings are kept for testing
-  int clips_per_shard = 64;
+  int clips_per_shard = 64;  ///< at most
+  double shard_mb = kShardMb;  ///< of pictures and maps, at most: a shard lies in memory while it is made. One clip may have more
   std::uint64_t seed = 1;   ///< of crops, split and order
   int jobs = 0;             ///< shards made at the same time; 0: one per core. Changes no byte
 };

@@ -3,6 +3,7 @@
 #include <vector>
 
 #include "worldmodel/nn/pictures.h"
+#include "worldmodel/train/option_limits.h"
 
 namespace evac {
 namespace {
@@ -19,6 +20,13 @@ at::Tensor Blurred(const at::Tensor& pictures) {
 }
 
 }  // namespace
+
+void CheckChanges(const char* training, const PictureChanges& changes) {
+  train::RequireShares(training, {{"light", changes.light}, {"blur_share", changes.blur_share}});
+  train::RequireWeights(training, {{"offset", changes.offset}});
+  if (changes.blur_times < 1)
+    train::RefuseOption(training, {"blur_times", static_cast<double>(changes.blur_times)}, "at least 1");
+}
 
 at::Tensor Changed(const at::Tensor& pictures, const PictureChanges& changes, train::Dice& dice) {
   std::vector<at::Tensor> samples;

@@ -13,6 +13,10 @@ struct PictureChanges {
   std::int64_t blur_times = 1;  ///< of those, the mean is taken once to so many times, each as often
 };
 
+/// @param training  whose they are, for the message
+/// @throws TensorError naming the option that is out of range, what was found and what was wanted
+void CheckChanges(const char* training, const PictureChanges& changes);
+
 /// @param pictures  [B, …, H, W, 3] in [-1, 1]; all pictures of a sample change alike
 at::Tensor Changed(const at::Tensor& pictures, const PictureChanges& changes, train::Dice& dice);
 

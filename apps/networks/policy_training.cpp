@@ -10,12 +10,14 @@
 #include "core/geometry.h"
 #include "core/names.h"
 #include "policies/learned_input.h"
+#include "worldmodel/train/option_limits.h"
 
 namespace evac {
 namespace {
 
 enum Stream : std::uint32_t { kPick = 21, kChange = 22, kArms = 23 };
 
+constexpr const char* kTraining = "policy training";
 constexpr double kGrasps = 0.5;
 constexpr double kNear_m = 0.05;  // an error of position that weighs as much as a hand that does not close
 
@@ -128,8 +130,10 @@ std::vector<std::string> ArmsOf(const PackedSet& set) { return NamesIn(set.shard
 PolicyTraining::PolicyTraining(const PackedSet& set, const PolicyOptions& options, const ShardCodec* codec)
     : set_(set), options_(options), codec_(codec), arms_(ArmsOf(set)) {
   if (options.batch < 1) throw InvalidInput("policy training: batch is {}, wanted at least 1", options.batch);
-  if (options.changes.blur_times < 1)
-    throw InvalidInput("policy training: blur_times is {}, wanted at least 1", options.changes.blur_times);
+  train::RequireShares(kTraining, {{"contact_share", options.contact_share},
+                                   {"reconstructed_share", options.reconstructed_share}});
+  train::RequireWeights(kTraining, {{"arm_noise_m", options.arm_noise_m}, {"object_weight", options.object_weight}});
+  CheckChanges(kTraining, options.changes);
   const std::vector<std::string> names = NamesIn(options.behaviours);
   const std::set<std::string> wanted(names.begin(), names.end());
   for (const train::Shard& shard : set.shards.shards()) actions_.push_back(ActionsOf(shard.path));

@@ -240,5 +240,16 @@ TEST_F(Replays, ThatFailedAreSaidAndCountedAndTriedAgainByTheNextCall) {
   EXPECT_THAT(Ends(store), Each(std::pair<std::size_t, StopReason>(4, StopReason::kRecordingEnd)));
 }
 
+TEST_F(Replays, OfACallThatAskedForMoreAreNotCountedByTheNext) {
+  std::vector<Replay> replays = Of(MovesThenRests(4, 0));
+  replays.push_back(replays.front());
+  replays.back().pair.checkpoint = "2";
+  RunReplays(Run("run", kToTheLastAction), replays);
+  replays.pop_back();
+  const Store store = RunReplays(Run("run", kToTheLastAction), replays);
+  EXPECT_EQ(EpisodesOf("horizon", store).episodes, 4);
+  EXPECT_EQ(EpisodesOf("horizon", store, replays).episodes, 2);
+}
+
 }  // namespace
 }  // namespace evac

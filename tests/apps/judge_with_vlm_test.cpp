@@ -32,7 +32,7 @@ ScriptedAnswer Cramped(const SeenRequest& request) {
     return Saying({{"numbers", MakeSightTest({.model = "gloom"}).numbers}});
   int images = 0;
   for (const json& part : asked["messages"][1]["content"]) images += part["type"] == "image_url";
-  if (images > 8) return Answer(400, R"({"error": {"message": "At most 8 images: too many images"}})");
+  if (images > 8) return Answer(400, R"({"error": {"message": "At most 8 image(s) may be provided in one prompt."}})");
   return Saying({{"observations", "nothing moves"},
                  {"stages", json::array()},
                  {"verdict", "failure"},

@@ -317,6 +317,21 @@ TEST(Moved, TheObjectStaysWhereThePicturesShowIt) {
   }
 }
 
+/// They counted as 1, or as 0, and hours later nobody saw it.
+TEST_F(TrainJudgeTest, OptionsOutOfRangeAreRefusedByName) {
+  const std::pair<std::string, double> wrong[] = {
+      {"drop_view", 50}, {"jitter", -0.1}, {"mirror_share", 2}, {"reconstructed_share", -1}, {"object_weight", -1},
+      {"unsure", std::nan("")}, {"light", 2}, {"offset", -0.1}, {"blur_share", 25}};
+  for (const auto& [name, value] : wrong) {
+    JudgeTrainingOptions options = Quick(2);
+    for (const train::Setting& setting : SettingsOf(options)) {
+      if (setting.name == name) *std::get<double*>(setting.field) = value;
+    }
+    EXPECT_THAT([&] { Train(Place("wrong"), options); },
+                ThrowsMessage<TensorError>(HasSubstr("judge training: " + name + " is "))) << name;
+  }
+}
+
 TEST_F(TrainJudgeTest, MovedAndMirroredClipsAreOtherClips) {
   const auto weights = [&](const std::string& out, std::int64_t shift_px, double mirror_share) {
     JudgeTrainingOptions options = Quick(2);

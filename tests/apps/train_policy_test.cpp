@@ -96,6 +96,23 @@ TEST_F(TrainPolicyTest, OnlySuccessesOfTheWantedBehavioursAreImitated) {
               ThrowsMessage<Error>(HasSubstr("none of 24 clips is a success of behaviours 'push,roam'")));
 }
 
+/// They counted as 1, or as 0, and hours later nobody saw it.
+TEST_F(TrainPolicyTest, OptionsOutOfRangeAreRefusedByName) {
+  const PackedSet set({folder_ / "shards"}, train::Split::kTrain);
+  const std::pair<std::string, double> wrong[] = {{"contact_share", 50},       {"arm_noise_m", std::nan("")},
+                                                  {"object_weight", -1},       {"reconstructed_share", -1},
+                                                  {"light", 2},                {"offset", -0.1},
+                                                  {"blur_share", 25}};
+  for (const auto& [name, value] : wrong) {
+    PolicyOptions options = Quick(1);
+    for (const train::Setting& setting : SettingsOf(options)) {
+      if (setting.name == name) *std::get<double*>(setting.field) = value;
+    }
+    EXPECT_THAT([&] { PolicyTraining(set, options, nullptr); },
+                ThrowsMessage<TensorError>(HasSubstr("policy training: " + name + " is "))) << name;
+  }
+}
+
 /// Every outcome times this: failures stay failures.
 void MultiplyOutcomes(const std::filesystem::path& folder, int by) {
   for (const std::filesystem::path& shard : train::ShardPaths(folder)) {

@@ -130,6 +130,19 @@ TEST(Config, AliasesWithoutEndAreRefused) {
   EXPECT_THAT(page.Get<std::vector<double>>("b"), ElementsAre(1, 2));
 }
 
+/// A page of a megabyte stood for 220 gigabytes, and every reader walked through them.
+TEST(Config, ALongTextThatManyAliasesNameIsRefused) {
+  const std::string text(1 << 20, 'x');
+  std::string names;
+  for (int times = 0; times < 100; ++times) names += "*t, ";
+  EXPECT_THAT(MessageOf([&] { Config::FromText("t: &t " + text + "\nb: [" + names + "]\n", "p.yaml"); }),
+              AllOf(HasSubstr("p.yaml:1"), HasSubstr("more than 64 MB")));
+  EXPECT_THAT(MessageOf([&] { Config::FromText("t: &t {? '" + text + "' : 1}\nb: [" + names + "]\n", "p.yaml"); }),
+              HasSubstr("more than 64 MB"))
+      << "a key is written for every value below it";
+  EXPECT_TRUE(Config::FromText("t: &t " + text + "\nb: [*t, *t]\n", "p.yaml").Has("b"));
+}
+
 TEST(Config, BytesThatAreNoUtf8AreRefusedWithTheirLine) {
   EXPECT_THAT(MessageOf([] { Config::FromText("a: 1\nc\xEF mmand: 2\n", "p.yaml"); }),
               AllOf(HasSubstr("p.yaml:2"), HasSubstr("0xef"), HasSubstr("UTF-8")));
@@ -178,6 +191,31 @@ TEST(Config, AnAssignmentWithoutAPlaceOrAValueIsRefused) {
     EXPECT_THAT(MessageOf([&] { page.Set(assignment); }), HasSubstr(assignment));
     EXPECT_EQ(page.Canonical(), before);
   }
+}
+
+/// It was set for all that the alias names: a run compared a policy with itself.
+TEST(Config, AnAssignmentToAFieldThatAnAliasSharesIsRefused) {
+  const char* text = R"(policies:
+  - &p {name: a, command: &c [x, good]}
+  - {name: b, command: *c}
+  - *p
+)";
+  for (const auto& [assignment, fields] :
+       {std::pair("policies.0.command=[x, y]", "fields policies.0.command and policies.1.command are one"),
+        std::pair("policies.1.command=[x, y]", "fields policies.0.command and policies.1.command are one"),
+        std::pair("policies.1.command.1=y", "fields policies.0.command.1 and policies.1.command.1 are one"),
+        std::pair("policies.2.name=c", "fields policies.0.name and policies.2.name are one"),
+        std::pair("policies.2.new=c", "fields policies.0 and policies.2 are one")}) {
+    Config page = Config::FromText(text, "p.yaml");
+    const std::string before = page.Canonical();
+    EXPECT_THAT(MessageOf([&] { page.Set(assignment); }),
+                AllOf(HasSubstr(assignment), HasSubstr("p.yaml"), HasSubstr(fields)));
+    EXPECT_EQ(page.Canonical(), before) << assignment;
+  }
+  Config page = Config::FromText(text, "p.yaml");
+  page.Set("policies.1.name=c");
+  EXPECT_EQ(page.List("policies").at(1).Get<std::string>("name"), "c");
+  EXPECT_EQ(page.List("policies").at(2).Get<std::string>("name"), "a");
 }
 
 TEST(Config, AFieldFromTheCommandLineIsNotBlamedOnALineOfTheFile) {

@@ -125,5 +125,20 @@ TEST(File, FoldersAreMadeAsFarAsTheyAreMissing) {
   EXPECT_THAT(MessageOf([&] { MakeFolders(folder / "f/g"); }), HasSubstr((folder / "f").string()));
 }
 
+/// It ended commands with 4, as if the machine had refused.
+TEST(File, WhatIsNoFolderWhereOneIsWantedIsTheUsersToMove) {
+  const TempFolder folder;
+  WriteFileAtomically(folder / "f", "no folder");
+  for (const fs::path& wanted : {folder / "f", folder / "f/g/h"}) {
+    try {
+      MakeFolders(wanted);
+      ADD_FAILURE() << wanted;
+    } catch (const Error& error) {
+      EXPECT_EQ(error.exit_code(), ExitCode::kInvalidInput);
+      EXPECT_THAT(error.what(), HasSubstr((folder / "f").string() + ":"));
+    }
+  }
+}
+
 }  // namespace
 }  // namespace evac

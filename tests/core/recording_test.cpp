@@ -12,6 +12,7 @@
 #include "core/file.h"
 #include "core/geometry.h"
 #include "core/npy.h"
+#include "core/recording_folders.h"
 #include "tests/support/synthetic_recording.h"
 #include "tests/support/temp_folder.h"
 
@@ -149,11 +150,7 @@ TEST(Recording, ASecondFixedCameraOfARobotWithOneArmStaysWhereItIsWhileTheHandMo
   const TempFolder folder;
   SyntheticClip clip(6);
   clip.cameras = {"head", "hand_left", "hand_right"};
-  for (std::size_t step = 0; step < 6; ++step) {  // no left arm: at the base's origin, unturned, open
-    clip.grippers[2 * step] = 0;
-    std::fill_n(&clip.positions_m[6 * step], 3, 0.0);
-    std::copy_n(std::array{0.0, 0.0, 0.0, 1.0}.begin(), 4, &clip.quaternions_xyzw[8 * step]);
-  }
+  clip.LoseLeftArm();
   clip.Write(OneFolder(folder / "a"));
   const Recording recording = ReadRecording(folder / "a");
   EXPECT_THAT(recording.arm_names, testing::ElementsAre("right"));
@@ -260,6 +257,30 @@ TEST(Recording, WhatIsMissingIsNamed) {
   EXPECT_THAT(ErrorOf(clip), HasSubstr("head_color.mp4: missing: camera head")) << "the hand's video is there";
 }
 
+/// One such folder among many ended the command as if it were our fault, with nothing packed.
+TEST(Recording, AFolderThatCannotBeLookedIntoIsFoundAndRefused) {
+  const TempFolder folder;
+  const fs::path all = fs::canonical(folder.path()) / "all", tree = fs::canonical(folder.path()) / "tree";
+  fs::create_directories(tree / "observations");
+  WriteExample(all / "good", Actions(3));
+  for (const fs::path& loop : {all / "loop", tree / "observations/loop"}) {
+    fs::create_symlink("loop", loop);
+    EXPECT_THAT(ErrorOf(loop), HasSubstr("loop: no such folder"));
+    EXPECT_FALSE(IsRecording(loop));
+    EXPECT_EQ(RecordingId(loop), "loop");
+    EXPECT_THAT(FoldersOf(loop), testing::ElementsAre(loop));
+  }
+  EXPECT_THAT(FindRecordings(all), testing::ElementsAre(all / "good", all / "loop"));
+  EXPECT_THAT(FindRecordings(tree), testing::ElementsAre(tree / "observations/loop"));
+  const fs::path far_too_long = all / std::string(300, 'a');
+  EXPECT_THAT(ErrorOf(far_too_long), HasSubstr("no such folder"));
+  EXPECT_FALSE(IsRecording(far_too_long));
+  EXPECT_THROW(FindRecordings(far_too_long), Error);
+  SyntheticClip(4).Write(OneFolder(all / "clip"));
+  fs::create_symlink("hand_left_color.mp4", all / "clip/hand_left_color.mp4");
+  EXPECT_THAT(ErrorOf(all / "clip"), HasSubstr("hand_left_color.mp4: cannot be looked at"));
+}
+
 TEST(Recording, AClipWithOnlyAFirstFrameIsReadAtThirtyHertz) {
   const TempFolder folder;
   SyntheticClip(4).Write(OneFolder(folder / "a"));
@@ -331,6 +352,13 @@ TEST(Recording, CameraPagesAreCheckedFieldByField) {
                    R"([{"extrinsic": {"rotation_matrix": [[1,0,0],[0,1,0],[0,0,-1]], "translation_vector": [0,0,0]}}])",
                    "page.json"),
                Error);
+}
+
+/// Of an .h5 file they were refused, as the page on formats says.
+TEST(Recording, AnExampleOfMoreThanAMillionStepsIsRefused) {
+  const TempFolder folder;
+  WriteExample(folder / "long", {"|u1", {1'000'001, 16}, std::vector<double>(16'000'016, 0)});
+  EXPECT_THAT(ErrorOf(folder / "long"), HasSubstr("action.npy: 1000001 steps, wanted 1 … 1000000"));
 }
 
 TEST(Recording, FourFilesOfAnyNameAreReadAsTheFoldersThatHoldThem) {

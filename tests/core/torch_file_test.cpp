@@ -106,6 +106,43 @@ TEST(TorchFile, EveryRefusalSaysWhatAndWhere) {
   EXPECT_THAT(RefusalOf("not_there"), HasSubstr("cannot open"));
 }
 
+std::string Little(std::size_t number, std::size_t bytes) {
+  std::string text;
+  for (std::size_t i = 0; i < bytes; ++i) text += static_cast<char>(number >> (8 * i) & 0xff);
+  return text;
+}
+
+/// A zip of that pickle alone.
+std::string Zipped(const std::string& pickle) {
+  const std::string name = "a/data.pkl", size = Little(pickle.size(), 4);
+  const std::string local =
+      "PK\x03\x04" + Little(0, 14) + size + size + Little(name.size(), 2) + Little(0, 2) + name + pickle;
+  const std::string central = "PK\x01\x02" + Little(0, 16) + size + size + Little(name.size(), 2) + Little(0, 16) + name;
+  return local + central + "PK\x05\x06" + Little(0, 4) + Little(1, 2) + Little(1, 2) + Little(central.size(), 4) +
+         Little(local.size(), 4) + Little(0, 2);
+}
+
+/// A key of a megabyte that a pickle recalled for 20 000 tensors was copied for each before the first was refused.
+TEST(TorchFile, AKeyThatIsThereTwiceOrLongIsRefusedBeforeTheNextIsRead) {
+  std::string file = BytesOf(kFiles / "plain");
+  file.replace(file.find("turned"), 6, "halves");
+  file.replace(file.find("K\x05))"), 4, "K\x7f))");  // 'one' reaches beyond its storage
+  const auto refusal = [](const std::string& bytes) -> std::string {
+    try {
+      TensorFile::ParseTorch(bytes, "test");
+    } catch (const TensorError& error) {
+      return error.what();
+    }
+    return "nothing was thrown";
+  };
+  EXPECT_THAT(refusal(file), HasSubstr("tensor 'halves' is there twice"));
+  const auto with_key = [](std::size_t bytes) {
+    return Zipped("\x80\x02}X" + Little(bytes, 4) + std::string(bytes, 'k') + "Ns.");
+  };
+  EXPECT_THAT(refusal(with_key(1025)), HasSubstr("a key of 1025 bytes, wanted at most 1024"));
+  EXPECT_THAT(refusal(with_key(1024)), HasSubstr("is no tensor")) << "it is read";
+}
+
 TEST(TorchFile, CutOffAnywhereItEndsInAMessage) {
   const std::string whole = BytesOf(kFiles / "state_dict");
   for (std::size_t size = 0; size < whole.size(); ++size)

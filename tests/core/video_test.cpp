@@ -106,6 +106,44 @@ TEST(Video, ThePlayersIndexComesBeforeThePictures) {
   EXPECT_LT(bytes.find("moov"), bytes.find("mdat"));
 }
 
+/// Big-endian numbers of the file's track header, from its matrix on: nine of that, then width and height.
+void SetTrackHeader(const std::filesystem::path& path, std::size_t number, const std::vector<std::uint32_t>& values) {
+  constexpr std::size_t kFromName = 44;  // of a header of version 0
+  std::string bytes = ReadFile(path);
+  const std::size_t name = bytes.find("tkhd");
+  ASSERT_NE(name, std::string::npos);
+  ASSERT_EQ(bytes[name + 4], 0) << "the header's version";
+  for (std::size_t i = 0; i < values.size(); ++i) {
+    for (std::size_t byte = 0; byte < 4; ++byte)
+      bytes[name + kFromName + 4 * (number + i) + byte] = static_cast<char>(values[i] >> (24 - 8 * byte));
+  }
+  WriteFileAtomically(path, bytes);
+}
+
+/// Pictures were read as they are stored, whatever was to be done to them: they did not fit their camera's page.
+TEST(Video, OneThatIsToBeShownTurnedOrStretchedIsRefused) {
+  constexpr std::uint32_t kOne = 1 << 16, kMinus = ~kOne + 1;
+  const TempFolder folder;
+  const std::filesystem::path path = folder / "v.mp4";
+  const auto refusal = [&](std::size_t number, const std::vector<std::uint32_t>& values) -> std::string {
+    Write(path, Scenes(3));
+    SetTrackHeader(path, number, values);
+    try {
+      VideoReader reader(path);
+    } catch (const Error& error) {
+      EXPECT_EQ(error.exit_code(), ExitCode::kInvalidInput);
+      return error.what();
+    }
+    return "it was read";
+  };
+  EXPECT_EQ(refusal(0, {kOne, 0, 0, 0, kOne}), "it was read") << "as it was written";
+  EXPECT_EQ(refusal(6, {7 * kOne, 9 * kOne}), "it was read") << "elsewhere on the screen";
+  for (const std::vector<std::uint32_t>& turned :
+       {std::vector{0U, kOne, 0U, kMinus, 0U}, {kMinus, 0U, 0U, 0U, kMinus}, {kMinus, 0U, 0U, 0U, kOne}})
+    EXPECT_THAT(refusal(0, turned), testing::AllOf(HasSubstr("v.mp4"), HasSubstr("turned"), HasSubstr("upright")));
+  EXPECT_THAT(refusal(9, {192 * kOne, 64 * kOne}), testing::AllOf(HasSubstr("v.mp4"), HasSubstr("pixels are 2:1")));
+}
+
 TEST(Video, AnUnfinishedVideoLeavesNoFile) {
   const TempFolder folder;
   {

@@ -1,3 +1,4 @@
+#include <cstddef>
 #include <cstdint>
 #include <cstdlib>
 #include <span>
@@ -8,15 +9,17 @@
 
 namespace {
 
-/// A checkpoint of torch.save whose tensors fill their shapes, or a TensorError.
+/// A checkpoint of torch.save whose tensors fill their shapes and whose names are of the file's size, or a TensorError.
 void AsCheckpoint(const std::string& bytes) {
   const evac::TensorFile file = evac::TensorFile::ParseTorch(bytes, "fuzz");
   unsigned sum = 0;
+  std::size_t name_bytes = 0;
   for (const evac::TensorView& tensor : file.tensors()) {
     if (tensor.bytes.size() != tensor.ByteCount()) std::abort();
+    name_bytes += tensor.name.size();
     for (const std::byte byte : tensor.bytes) sum += static_cast<unsigned>(byte);
   }
-  if (sum == ~0U) std::abort();
+  if (sum == ~0U || name_bytes > 2 * bytes.size()) std::abort();
 }
 
 /// A pickle whose values hold values that are there, or a TensorError.

@@ -1,10 +1,13 @@
+#include <array>
 #include <cstdio>
+#include <span>
 
 #include "core/collection.h"
 #include "core/file.h"
 #include "core/npy.h"
 #include "core/store.h"
 #include "core/store_codec.h"
+#include "core/tensor_file.h"
 #include "tests/fuzz/small_shards.h"
 #include "tests/support/synthetic_recording.h"
 
@@ -52,7 +55,8 @@ void MakeStoreSeeds(const fs::path& folder) {
   seed("task", 3, evac::codec::EncodeTask(task));
   seed("database", 4, evac::ReadFile(run / "evac.sqlite"));
   fs::remove_all(run);
-  evac::WriteText(folder.parent_path() / "png_fuzz/small.png", evac::codec::EncodePng(image));
+  for (const char* target : {"png_fuzz", "recording_png_fuzz"})
+    evac::WriteText(folder.parent_path() / target / "small.png", evac::codec::EncodePng(image));
 }
 
 /// The project's own pages, each after the letter that says what it is (suite_fuzz.cpp).
@@ -82,6 +86,22 @@ void MakeShardSeeds(const fs::path& folder) {
   fs::remove_all(packing);
 }
 
+/// A small network's weights, a chunk of two frames of one view, and a sheet of verdicts.
+void MakeTensorSeeds(const fs::path& corpus) {
+  const std::array<float, 2> numbers = {1.5F, -2};
+  const std::array<std::uint8_t, 2 * 2 * 3 * 3> pixels{};
+  const evac::TensorView bias{{"out.bias", evac::TensorType::kF32, {2}}, std::as_bytes(std::span(numbers))};
+  const evac::TensorView chunk[] = {
+      {{"latents", evac::TensorType::kF32, {2, 1}}, std::as_bytes(std::span(numbers))},
+      {{"pictures", evac::TensorType::kU8, {2, 1, 2, 3, 3}}, std::as_bytes(std::span(pixels))}};
+  for (const char* target : {"weight_file_fuzz", "chunk_cache_fuzz"}) fs::create_directories(corpus / target);
+  evac::WriteTensorFile(corpus / "weight_file_fuzz/small", {&bias, 1},
+                        {{"format", "fuzz 1"}, {"tasks", "a,b"}, {"threshold", "0.25"}, {"frames", "4"}});
+  evac::WriteTensorFile(corpus / "chunk_cache_fuzz/small", chunk, {});
+  evac::WriteText(corpus / "rating_csv_fuzz/small.csv",
+                  "run,episode,rater,label,note\na,e,ann,S,\nb,e,ann,failure,\"slipped, late\"\na,f,bo,U,\n");
+}
+
 /// CORPUS/npy_fuzz: one array per type. CORPUS/recording_fuzz: a camera's pages and a collection's row, each after the
 /// letter that says which it is. CORPUS/proprio_fuzz and CORPUS/video_fuzz: a track and a video of four steps.
 void MakeCorpus(const fs::path& corpus) {
@@ -104,6 +124,7 @@ void MakeCorpus(const fs::path& corpus) {
   MakeStoreSeeds(corpus / "store_fuzz");
   MakePageSeeds(corpus / "suite_fuzz");
   MakeShardSeeds(corpus / "shards_fuzz");
+  MakeTensorSeeds(corpus);
   evac::WriteText(corpus / "weights_card_fuzz/desk",
                   "0.1\n" + evac::ReadFile(EVAC_SOURCE_DIR "/worldmodel/weights/desk/statistics.yaml"));
 }

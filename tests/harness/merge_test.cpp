@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include "core/error.h"
+#include "core/file.h"
 #include "tests/core/store_samples.h"
 #include "tests/support/temp_folder.h"
 
@@ -142,6 +143,50 @@ TEST_F(MergedRuns, DoNotRemoveAShardThatIsWhereTheyWouldBeMade) {
   Merge("all.tmp");
   EXPECT_THAT([&] { MergeRuns({folder_ / "all.tmp"}, folder_ / "all"); }, testing::ThrowsMessage<Error>(testing::HasSubstr("another name")));
   EXPECT_TRUE(std::filesystem::exists(folder_ / "all.tmp"));
+}
+
+TEST_F(MergedRuns, DoNotRemoveAShardThatLiesBelowWhereTheyWouldBeMade) {
+  a_.Add(samples::SomeEpisode(a_, key_));
+  Merge("all.tmp/a");
+  EXPECT_THAT([&] { MergeRuns({folder_ / "all.tmp/a"}, folder_ / "all"); },
+              testing::ThrowsMessage<Error>(testing::HasSubstr("another name")));
+  EXPECT_TRUE(Store::Open(folder_ / "all.tmp/a", Store::Mode::kReadOnly).Has(key_));
+}
+
+/// Somebody's own folder of that name went without a word.
+TEST_F(MergedRuns, DoNotRemoveWhatNoMergeLeftWhereTheyWouldBeMade) {
+  a_.Add(samples::SomeEpisode(a_, key_));
+  MakeFolders(folder_ / "merged.tmp");
+  WriteFileAtomically(folder_ / "merged.tmp/notes.txt", "mine");
+  EXPECT_THAT([&] { Merge(); }, testing::ThrowsMessage<Error>(testing::HasSubstr((folder_ / "merged.tmp").string())));
+  EXPECT_EQ(ReadFile(folder_ / "merged.tmp/notes.txt"), "mine");
+  EXPECT_FALSE(std::filesystem::exists(folder_ / "merged"));
+}
+
+TEST_F(MergedRuns, AreMadeOverWhatAMergeLeftThatWasBrokenOff) {
+  a_.Add(samples::SomeEpisode(a_, key_));
+  const std::filesystem::path video = a_.folder() / a_.Episodes().at(0).video;
+  const std::string bytes = ReadFile(video);
+  WriteFileAtomically(video, "other bytes");
+  EXPECT_THROW(Merge(), Error);
+  ASSERT_TRUE(std::filesystem::exists(folder_ / "merged.tmp"));
+  WriteFileAtomically(video, bytes);
+  EXPECT_EQ(Merge().episodes, 1);
+  EXPECT_FALSE(std::filesystem::exists(folder_ / "merged.tmp"));
+  EXPECT_FALSE(std::filesystem::exists(folder_ / "merged/merging"));
+}
+
+TEST_F(MergedRuns, AreMadeWithTheFoldersAboveThem) {
+  a_.Add(samples::SomeEpisode(a_, key_));
+  EXPECT_EQ(Merge("new/folder/merged").episodes, 1);
+  WriteFileAtomically(folder_ / "file", "no folder");
+  try {
+    Merge("file/merged");
+    ADD_FAILURE() << "it was made in a file";
+  } catch (const Error& error) {
+    EXPECT_EQ(error.exit_code(), ExitCode::kInvalidInput);
+    EXPECT_THAT(error.what(), testing::HasSubstr((folder_ / "file").string() + ":"));
+  }
 }
 
 TEST_F(MergedRuns, TakenEpisodesBringTheirVerdictsAlsoAfterACallThatWasKilledBeforeThem) {

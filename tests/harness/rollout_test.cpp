@@ -11,6 +11,7 @@
 #include "core/hash.h"
 #include "core/recording.h"
 #include "core/seed.h"
+#include "core/store_sqlite.h"
 #include "tests/support/temp_folder.h"
 #include "worldmodel/echo_world.h"
 
@@ -92,6 +93,19 @@ class CountedWorld : public World {
 
  private:
   World& world_;
+};
+
+/// One that asks the store where its episodes begin, as an imagining world does.
+class SeeingWorld : public CountedWorld {
+ public:
+  SeeingWorld(World& world, const Store& store) : CountedWorld(world), store_(store) {}
+  WorldStep Reset(SceneId scene, const Task& task, const InitialState& initial, std::uint64_t seed) override {
+    store_.LoadInitialScene(task.id, initial.id);
+    return CountedWorld::Reset(scene, task, initial, seed);
+  }
+
+ private:
+  const Store& store_;
 };
 
 class Rollout : public ::testing::Test {
@@ -303,6 +317,19 @@ TEST_F(Rollout, WhatTheDiskRefusesEndsTheRunAndIsNoEpisodesFailure) {
   std::vector<Job> rest = Jobs(3);
   rest.erase(rest.begin());
   EXPECT_THROW(Run(policy, rest, store), Error);
+  EXPECT_EQ(store.Episodes().size(), 1u);
+}
+
+TEST_F(Rollout, WhatTheStoreRefusesWhereAnEpisodeBeginsIsNoFailureOfItsWorld) {
+  WalkingPolicy policy;
+  Store store = NewDeclaredStore("unreadable");
+  SeeingWorld world(world_, store);
+  JobQueue first(Jobs(1)), others(Jobs(3));
+  EXPECT_EQ(RunEpisodes(policy, world, first, store, options_).failed, 0);
+  others.Next();
+  sqlite::Connection::OpenReadWrite(store.folder() / "evac.sqlite").Run("DROP TABLE initial_scenes");
+  EXPECT_THAT([&] { RunEpisodes(policy, world, others, store, options_); },
+              testing::ThrowsMessage<Error>(HasSubstr("initial_scenes")));
   EXPECT_EQ(store.Episodes().size(), 1u);
 }
 

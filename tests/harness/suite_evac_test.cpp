@@ -174,8 +174,28 @@ TEST_F(EvacSuite, WhatIsWrongIsNamedWithItsField) {
   EXPECT_THAT(Complaint({"worlds.0.quirks=[nonsense]"}), HasSubstr("memory_not_scaled"));
   EXPECT_THAT(Complaint({"worlds.0.cache={folder: x, limit_gb: 0}"}), HasSubstr("limit_gb"));
   EXPECT_THAT(Complaint({"worlds.0.role=real"}), HasSubstr("what is imagined is no reference"));
-  EXPECT_THAT(Complaint({"worlds.0={name: evac, type: evac, weights: w.safetensors}"}), HasSubstr("config"));
+  const std::string weights = (folder_ / "w.safetensors").string();
+  EXPECT_THAT(Complaint({"worlds.0={name: evac, type: evac, weights: " + weights + "}"}), HasSubstr("config"));
   EXPECT_THAT(Complaint({"worlds.0={name: echo, type: echo, steps: 3}"}), HasSubstr("steps"));
+}
+
+/// "~" became a file of that name, and what a mapping holds was looked for beside the suite.
+TEST_F(EvacSuite, PathsInWhatIsSetAreRelativeToTheWorkingDirectoryWhereverTheyStand) {
+  std::filesystem::create_directory(folder_ / "here");
+  Write("here/other.safetensors", "other weights");
+  Write("here/statistics.yaml", "{}\n");
+  const auto here = [&](const char* file) { return std::filesystem::relative(folder_ / "here" / file).string(); };
+  const std::string config = (folder_ / "c.yaml").string();
+  const Suite suite = Read({"worlds=[{name: evac, type: evac, weights: " + here("other.safetensors") +
+                            ", config: \"" + config + "\", cache: {folder: " + here("cache") + "}}]"});
+  EXPECT_EQ(suite.worlds.at(0).evac->weights, folder_ / "here/other.safetensors");
+  EXPECT_EQ(suite.worlds[0].evac->config, config);
+  EXPECT_EQ(suite.worlds[0].evac->cache_folder, folder_ / "here/cache");
+  EXPECT_EQ(Read({"worlds.0.cache={folder: " + here("cache") + "}"}).worlds[0].evac->cache_folder,
+            folder_ / "here/cache");
+  EXPECT_TRUE(Read({"worlds.0.statistics=" + here("statistics.yaml")}).worlds[0].evac->statistics);
+  for (const char* nothing : {"~", "null", ""})
+    EXPECT_FALSE(Read({"worlds.0.statistics=" + std::string(nothing)}).worlds[0].evac->statistics) << nothing;
 }
 
 TEST_F(EvacSuite, ATaskOfAnotherPeriodIsRefusedBeforeTheRealWorldsEpisodes) {

@@ -120,6 +120,23 @@ TEST_F(SuiteTest, TheHashIgnoresCommentsLayoutAndSpeedButNotTheContentOfFiles) {
   EXPECT_NE(ReadSuite(path, {}).hash, hash);
 }
 
+/// Runs of one recording in two folders went into one OUT, and shards of them lost episodes or held them twice.
+TEST_F(SuiteTest, TheHashCoversWhatARecordingsTaskIsCalled) {
+  const auto path = Write("suite.yaml", kSuite);
+  for (const std::string folder : {"other", "elsewhere/rec", "many/a", "several/a"}) {
+    std::filesystem::create_directories(folder_ / folder);
+    Write(folder + "/action.npy", "bytes");
+  }
+  std::filesystem::create_directory_symlink(folder_ / "rec", folder_ / "link");
+  const auto hash = [&](const char* recording) {
+    return ReadSuite(path, {"recording=" + (folder_ / recording).string()}).hash;
+  };
+  EXPECT_NE(hash("other"), hash("rec"));
+  EXPECT_NE(hash("several"), hash("many")) << "of several the task is called like their folder";
+  EXPECT_EQ(hash("elsewhere/rec"), hash("rec"));
+  EXPECT_EQ(hash("link"), hash("rec"));
+}
+
 TEST_F(SuiteTest, TheHashCoversWhatASceneInAnotherFolderThanItsPageIsMadeOf) {
   const std::filesystem::path scenes = EVAC_SOURCE_DIR "/worldmodel/sim/scenes";
   for (const char* name : {"tasks", "mjcf", "mjcf/meshes"}) std::filesystem::create_directory(folder_ / name);
@@ -207,11 +224,57 @@ TEST_F(SuiteTest, PathsInSetAreRelativeToTheWorkingDirectory) {
   EXPECT_EQ(suite.tasks[0].id, "take_ham");
 }
 
+/// "recording=rec #1" was the recording "rec".
+TEST_F(SuiteTest, APathInSetIsTakenLetterByLetter) {
+  const auto path = Write("suite.yaml", kSuite);
+  for (const char* name : {"rec #1", "a: b", "a, b]", "q\"\\q", "two\nlines", "&x", "*x"}) {
+    const auto recording = folder_ / "odd" / name;
+    std::filesystem::create_directories(recording);
+    std::ofstream(recording / "action.npy") << "bytes";
+    EXPECT_EQ(ReadSuite(path, {"recording=" + recording.string()}).recording, recording);
+  }
+  EXPECT_EQ(ReadSuite(path, {"recording='" + (folder_ / "rec").string() + "'"}).recording, folder_ / "rec");
+}
+
+TEST_F(SuiteTest, FilesOfAPolicyInAMappingThatIsSetAreRelativeToTheWorkingDirectory) {
+  const auto path = Write("suite.yaml", kSuite);
+  const auto file = std::filesystem::relative(Write("policy.py", "one")).string();
+  const Suite suite = ReadSuite(path, {"policies.0={name: mine, command: [x], files: [" + file + "]}"});
+  EXPECT_THAT(suite.policies[0].files, testing::ElementsAre((folder_ / "policy.py").string()));
+  EXPECT_THAT(Complaint(path, {"policies.0={name: mine, command: [x], files: [\"\"]}"}), HasSubstr("files"));
+}
+
+/// The clock's count overflowed: a policy was given up at once, or never.
+TEST_F(SuiteTest, AWaitOfMoreThanADayIsRefused) {
+  for (const char* field : {"deadline_s", "repeat_after_s", "start_s"}) {
+    EXPECT_EQ(Complaint(std::string(kSuite), {fmt::format("transport={{{}: 86400}}", field)}), "no complaint");
+    for (const char* wait : {"86401", "1e10", "0"})
+      EXPECT_THAT(Complaint(std::string(kSuite), {fmt::format("transport={{{}: {}}}", field, wait)}),
+                  AllOf(HasSubstr(fmt::format("field transport.{}", field)), HasSubstr("at most 86400 s")));
+  }
+}
+
 TEST_F(SuiteTest, TheStoredTextReadsAsTheSameSuite) {
   const Suite suite = ReadSuite(Write("suite.yaml", kSuite), {"seeds=[3]"});
   const Suite again = ParseSuite(suite.text, suite.path);
   EXPECT_EQ(again.hash, suite.hash);
   EXPECT_EQ(again.seeds, std::vector<std::uint64_t>{3});
+}
+
+/// .29 of 100 is 28.999999999999996 in binary.
+TEST(ErrorBudget, IsAsManyEpisodesAsTheShareSaysInDecimals) {
+  const auto allowed = [](double budget, int episodes) {
+    Suite suite;
+    suite.error_budget = budget;
+    return AllowedFailures(suite, episodes);
+  };
+  EXPECT_EQ(allowed(.29, 100), 29);
+  EXPECT_EQ(allowed(.57, 100), 57);
+  EXPECT_EQ(allowed(.58, 50), 29);
+  EXPECT_EQ(allowed(.1, 100), 10);
+  EXPECT_EQ(allowed(.1, 99), 9) << "rounded down";
+  EXPECT_EQ(allowed(0, 100), 0);
+  EXPECT_EQ(allowed(1, 100), 100);
 }
 
 TEST(Scheduler, PairsShareTheirSeedsAcrossWorldsAndWorldsAcrossPolicies) {

@@ -8,6 +8,7 @@ namespace evac {
 namespace {
 
 using testing::HasSubstr;
+using testing::Not;
 
 /// A run of one task in two worlds with verdicts of an oracle and of a judge, one letter an episode: s, f, ?, i.
 class Judged {
@@ -126,6 +127,41 @@ TEST(JudgeCalibration, TooFewOfOneKindIsNoAnswer) {
   const JudgeCalibrationReport report = CalibrateJudge(run.store(), "vlm:x", "oracle");
   EXPECT_THAT(report.missing, testing::ElementsAre(HasSubstr("task take: 70 successes and 5 failures")));
   EXPECT_FALSE(CalibrateJudge(run.store(), "vlm:nobody", "oracle").missing.empty());
+}
+
+TEST(JudgeCalibration, AJudgeOfClipsOfWhichNobodyKnowsTheOutcomeIsNotAccepted) {
+  Judged run("real", Times(50, "sf"), Times(50, "sf"));
+  run.Add("dream", Times(20, "??"), Times(20, "sf"));  // the oracle reads no physics there
+  const JudgeCalibrationReport report = CalibrateJudge(run.store(), "vlm:x", "oracle");
+  EXPECT_THAT(report.missing, testing::ElementsAre(HasSubstr("world dream: the truth tells success or failure of none "
+                                                             "of the 40 episodes where the judge does")));
+  EXPECT_THAT(Text(report), Not(HasSubstr("a gate may count this judge")));
+  Judged silent("real", Times(50, "sf"), Times(50, "sf"));
+  silent.Add("dream", "ssff", "????");
+  EXPECT_THAT(CalibrateJudge(silent.store(), "vlm:x", "oracle").missing, testing::IsEmpty())
+      << "a gate counts nothing of it there";
+}
+
+TEST(JudgeCalibration, AWorldThatTheTruthWasNeverAskedAboutIsMissingToo) {
+  Judged run("real", Times(50, "sf"), Times(50, "sf"));
+  run.Add("sim", Times(20, "sf"), Times(20, "sf"));
+  for (int i = 0; i < 100; ++i)
+    run.Say("human", {{"take", std::to_string(i), "policy", "v1", 1}, "real"}, "sf"[i % 2]);
+  EXPECT_THAT(CalibrateJudge(run.store(), "vlm:x", "human").missing, testing::ElementsAre(HasSubstr("world sim: ")));
+}
+
+TEST(JudgeCalibration, ProbesOfAJudgeThatWasShownFewerImagesAreFound) {
+  Judged run("real", "ssff", "ssff");
+  for (int i = 0; i < 4; ++i) {
+    const EpisodeKey key = {{"take", std::to_string(i), "policy", "v1", 1}, "real"};
+    run.Say("vlm:x:small", key, "ssff"[i]).Say("vlm:x:flip:small", key, "sfff"[i]);
+    run.Say("vlm:x:flip", key, 's').Say("vlm:x:retest:small", key, "ssff"[i]);
+  }
+  const auto probes = CalibrateJudge(run.store(), "vlm:x:small", "oracle").probes;
+  ASSERT_EQ(probes.size(), 2u);
+  EXPECT_EQ(probes.at("flip").same.successes, 3) << "not the probe of the judge that was shown more";
+  EXPECT_EQ(probes.at("flip").same.trials, 4);
+  EXPECT_EQ(probes.at("retest").same.successes, 4);
 }
 
 TEST(JudgeCalibration, ProbesAreComparedWithTheJudgeItself) {

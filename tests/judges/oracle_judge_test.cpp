@@ -5,6 +5,7 @@
 #include <numbers>
 
 #include "core/error.h"
+#include "core/store_sqlite.h"
 #include "judges/judge_episodes.h"
 #include "judges/rubric.h"
 #include "tests/support/temp_folder.h"
@@ -239,6 +240,18 @@ TEST_F(OracleJudgeTest, WhatTheMachineRefusesIsNoVerdictOfAClip) {
   full.has_memory = false;
   EXPECT_THROW(JudgeEpisodes(full, store_, {}), std::bad_alloc);
   EXPECT_FALSE(store_.CurrentVerdicts().contains(id)) << "it can be asked about again";
+}
+
+/// It was stored as `invalid`, which nothing asks about again.
+TEST_F(OracleJudgeTest, ATrackThatTheDiskDoesNotGiveIsNoVerdict) {
+  store_ = Store::CreateOrContinue(folder_ / "run", {.suite_text = "", .suite_hash = "h", .suite_path = "", .evac_version = ""});
+  store_.AddWorld({.name = "real", .type = "mujoco", .is_real = true, .profile_hash = ""});
+  store_.AddPolicy({"hold", "a", ""});
+  Add(LiftTask(), TrackMaker().Frame({0, 0, 0}).track());
+  sqlite::Connection::OpenReadWrite(folder_ / "run/evac.sqlite").Run("DROP TABLE privileged");
+  OracleJudge oracle(store_);
+  EXPECT_THAT([&] { JudgeEpisodes(oracle, store_, {}); }, testing::ThrowsMessage<Error>(HasSubstr("privileged")));
+  EXPECT_TRUE(store_.Verdicts().empty());
 }
 
 TEST(Rubric, EveryKindMeasuresWhatItsNameSays) {

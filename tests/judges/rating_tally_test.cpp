@@ -143,6 +143,35 @@ TEST(RatingBoard, ThePaceIsOfVotesThatWereMissing) {
   EXPECT_EQ(progress(ann.now_ms).at("hours_left"), 1.5);
 }
 
+TEST(RatingTally, ACorrectedAnswerDidNotComeTooFastToHaveSeenTheClip) {
+  SmallStudy study(4, {.raters_per_clip = 2});
+  StudyStore store = study.Open();
+  RatingDesk desk(store, {});
+  AtTheDesk ann(store, desk);
+  const std::string clip = ann.Next().body.at("presentation");
+  HumanVerdict first = ann.Watched(clip, "success");
+  first.max_speed = 2;
+  ASSERT_EQ(ann.Say(first).status, 200);
+  HumanVerdict other = ann.Watched(clip, "failure");
+  other.supersedes = store.CurrentVerdict(clip)->id;
+  other.rt_ms = 400;
+  ASSERT_EQ(ann.Say(other).status, 200);
+  const auto board = [&] { return RatingBoard(store, 0).at("raters").at(0); };
+  EXPECT_TRUE(board().at("concerns").empty()) << board().at("concerns");
+  EXPECT_EQ(board().at("median_rt_s"), 9);
+  RatingTally tally;
+  tally.Read(store);
+  ASSERT_EQ(tally.By(ann.id).size(), 1u);
+  EXPECT_EQ(tally.By(ann.id)[0].label, "failure");
+  EXPECT_EQ(tally.By(ann.id)[0].max_speed, 2) << "a long clip at twice the speed takes half its time";
+  EXPECT_EQ(store.CurrentVerdict(clip)->rt_ms, 400) << "what is stored is what the browser said";
+  ASSERT_EQ(desk.Retract(ann.Me(), {ann.epoch, NewSecret(), other.client_uuid}, 0).status, 200);
+  HumanVerdict hasty = ann.Watched(clip, "failure");
+  hasty.rt_ms = 400;
+  ASSERT_EQ(ann.Say(hasty).status, 200);
+  EXPECT_EQ(board().at("concerns").size(), 1u) << "what was undone lends its time to nobody";
+}
+
 TEST(RatingTally, ClipsThatWereAddedAreThere) {
   SmallStudy study(4, {.raters_per_clip = 2});
   StudyStore store = study.Open();

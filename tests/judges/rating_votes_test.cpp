@@ -57,6 +57,24 @@ TEST(Rates, UndecidedClipsAreBoundsNotFailures) {
   EXPECT_TRUE(rates.far_apart);
 }
 
+TEST(Rates, DawidAndSkeneSayNothingOfClipsWithOneVoteEach) {
+  std::vector<RatedClip> clips(6, Rated({"success"}));
+  clips.resize(10, Rated({"failure"}));
+  clips.push_back(Rated({"success", "cannot_tell"}));
+  for (RatedClip& clip : clips) clip.resolution.label = Label::kSuccess;  // as majority of one, or by an adjudicator
+  for (std::size_t i = 6; i < 10; ++i) clips[i].resolution.label = Label::kFailure;
+  const LabelRates rates = RatesOf(clips);
+  EXPECT_FALSE(rates.dawid_skene);
+  EXPECT_EQ(rates.dawid_skene.reason(), "no clip has two votes");
+  EXPECT_NEAR(*rates.majority, 7.0 / 11, 1e-12);
+  EXPECT_NEAR(*rates.soft, 7.0 / 11, 1e-12);
+  clips.pop_back();
+  EXPECT_FALSE(RatesOf(clips).far_apart) << "three rates of one and the same votes";
+  clips.push_back(Rated({"success", "success"}));
+  EXPECT_TRUE(RatesOf(clips).dawid_skene);
+  EXPECT_EQ(RatesOf(std::vector{Rated({"cannot_tell"})}).dawid_skene.reason(), "no votes");
+}
+
 TEST(Agreement, RawAgreementStaysHighWhereKappaFalls) {
   std::vector<RatedClip> clips(19, Rated({"success", "success", "success"}));
   clips.push_back(Rated({"success", "success", "failure"}));

@@ -72,6 +72,18 @@ bool Asks(const SeenRequest& request, const std::string& words) {
   return request.body.find(words) != std::string::npos;
 }
 
+int Images(const SeenRequest& request) {
+  int images = 0;
+  const json asked = json::parse(request.body);
+  for (const json& part : asked["messages"][1]["content"]) images += part["type"] == "image_url";
+  return images;
+}
+
+/// What vLLM answers with `--limit-mm-per-prompt '{"image": 8}'`.
+ScriptedAnswer AtMostEight() {
+  return Answer(400, R"({"error": {"message": "At most 8 image(s) may be provided in one prompt."}})");
+}
+
 class VlmJudgeTest : public testing::Test {
  protected:
   Verdict Rate(ScriptedServer::Script script, VlmJudgeOptions options = {}) {
@@ -184,15 +196,39 @@ TEST_F(VlmJudgeTest, ARefusalIsInvalidAndNeverAFailure) {
 
 TEST_F(VlmJudgeTest, TooManyImagesAreAskedAboutWithFewerUnderAnotherName) {
   const Verdict verdict = Rate([](const SeenRequest& request) {
-    int images = 0;
-    const json asked = json::parse(request.body);
-    for (const json& part : asked["messages"][1]["content"]) images += part["type"] == "image_url";
-    if (images > 8) return Answer(400, R"({"error": {"message": "At most 8 images: too many images"}})");
-    return Saying(Content("success"), "stop", 900);
+    return Images(request) > 8 ? AtMostEight() : Saying(Content("success"), "stop", 900);
   });
   EXPECT_EQ(verdict.label, Label::kSuccess) << verdict.reason;
   EXPECT_EQ(verdict.judge, config_.JudgeName() + ":small");
   EXPECT_EQ(server_->Seen().size(), 6u);
+}
+
+TEST_F(VlmJudgeTest, WhatServersSayOfTooManyImagesIsUnderstoodInCapitalsOrNot) {
+  for (const char* sentence : {"At most 8 image(s) may be provided in one prompt.", "Too many images",
+                               "Payload TOO LARGE", "this model's maximum context length is 4096 tokens"}) {
+    ++config_.sampling.seed;  // asked anew
+    const Verdict verdict = Rate([&](const SeenRequest& request) {
+      if (Images(request) > 8) return Answer(400, json{{"error", {{"message", sentence}}}}.dump());
+      return Saying(Content("success"), "stop", 900);
+    });
+    EXPECT_EQ(verdict.judge, config_.JudgeName() + ":small") << sentence;
+  }
+  const Verdict other =
+      Rate([](const SeenRequest&) { return Answer(400, R"({"error": {"message": "No such role"}})"); });
+  EXPECT_EQ(other.judge, config_.JudgeName());
+  EXPECT_THAT(other.reason, testing::StartsWith("unsupported_media: "));
+}
+
+TEST_F(VlmJudgeTest, AnEpisodeWithoutAClipIsLeftOutAndNotInvalid) {
+  episode_.video.clear();
+  try {
+    Rate([](const SeenRequest&) { return Saying(Content("success")); });
+    FAIL() << "there is nothing to see";
+  } catch (const Error& error) {
+    EXPECT_STREQ(error.kind(), "not_judged");
+    EXPECT_THAT(error.what(), HasSubstr(episode_.key.Id() + ": it has no clip"));
+  }
+  EXPECT_TRUE(server_->Seen().empty());
 }
 
 TEST_F(VlmJudgeTest, AnswersArePaidForOnceAndErrorsAreAskedAgain) {
@@ -237,6 +273,15 @@ TEST_F(VlmJudgeTest, TheFlipProbeAsksTheOtherWayRoundUnderItsOwnName) {
       {.probe = VlmProbe::kFlip});
   EXPECT_EQ(verdict.label, Label::kFailure);
   EXPECT_EQ(verdict.judge, config_.JudgeName() + ":flip");
+}
+
+TEST_F(VlmJudgeTest, AProbeThatIsShownFewerImagesHasTheNameThatCalibrationLooksFor) {
+  const Verdict verdict = Rate(
+      [](const SeenRequest& request) {
+        return Images(request) > 8 ? AtMostEight() : Saying(Content("failure"), "stop", 900);
+      },
+      {.probe = VlmProbe::kFlip});
+  EXPECT_EQ(verdict.judge, config_.JudgeName() + ":flip:small");
 }
 
 TEST(VlmSight, AModelWithoutEyesIsRefused) {

@@ -288,6 +288,17 @@ TEST(Attention, TiledIsPlain) {
   }
 }
 
+/// All scores of a picture of the published size lay in memory at once: gigabytes for each scene.
+TEST(Attention, OfBf16IsTiledToo) {
+  const at::NoGradGuard no_gradients;
+  const auto halved = [](std::int64_t length, std::uint64_t seed) { return Noise({2, length, 64}, seed).to(at::kBFloat16); };
+  const Tensor q = halved(600, 1), k = halved(400, 2), v = halved(400, 3);
+  const Tensor exact = Attention(q.to(at::kFloat), k.to(at::kFloat), v.to(at::kFloat), 2);
+  const Tensor found = Attention(q, k, v, 2);
+  EXPECT_EQ(found.scalar_type(), at::kBFloat16);
+  EXPECT_TRUE(found.equal(exact.to(at::kBFloat16))) << "nothing between is in bf16";
+}
+
 TEST(Attention, OverTimeIsAttentionOfEachPixel) {
   const at::NoGradGuard no_gradients;
   const Tensor q = Noise({2, 5, 3, 32}, 1), k = Noise({2, 5, 3, 32}, 2), v = Noise({2, 5, 3, 32}, 3);

@@ -483,5 +483,14 @@ TEST_F(LcmPolicyTest, OptionsOutOfRangeAreRefused) {
   EXPECT_THROW(LcmPolicy{options}, Error);
 }
 
+TEST_F(LcmPolicyTest, AWaitBeyondWhatTheClockCountsIsRefused) {
+  using Options = LcmPolicyOptions;
+  for (double Options::* wait_s : {&Options::deadline_s, &Options::start_s, &Options::repeat_after_s}) {
+    Options options = Patient(wire::OwnAddress());
+    options.*wait_s = 1e10;
+    EXPECT_THROW(LcmPolicy{options}, Error);
+  }
+}
+
 }  // namespace
 }  // namespace evac

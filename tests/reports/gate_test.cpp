@@ -5,9 +5,11 @@
 #include <gtest/gtest.h>
 
 #include "core/error.h"
+#include "core/statistics/inverted_interval.h"
 #include "core/statistics/planning.h"
 #include "core/statistics/sequential.h"
 #include "core/statistics/sequential_planning.h"
+#include "core/statistics/two_samples.h"
 #include "reports/gate_evidence.h"
 #include "reports/gate_output.h"
 #include "tests/reports/repeated_run.h"
@@ -200,6 +202,18 @@ TEST(Gate, HowManyMoreIsPlannedFromWhatRepeatsTell) {
       DecidedOnRepeats("test: boschloo", Alike(10, "sssf"), Alike(10, "sssf")).decision.rules.at(0);
   EXPECT_THAT(unpaired.statement, HasSubstr("(Boschloo on 4 and 4 effective episodes)"));
   EXPECT_THAT(unpaired.more, HasSubstr("about 2560 more episodes of each")) << "260 tell as much as 2600 such";
+}
+
+TEST(Gate, ManyUnpairedEpisodesAreTestedAsEverywhere) {
+  const Outcomes now = Repeat(330, 's') + Repeat(270, 'f'), then = Repeat(372, 's') + Repeat(228, 'f');
+  const RuleDecision rule = DecidedOnRepeats("test: boschloo", {now}, {then}).decision.rules.at(0);
+  EXPECT_THAT(rule.statement, HasSubstr("(Newcombe)"));
+  const auto states = [](const Outcomes& outcomes) {
+    std::vector<Count> counts;
+    for (const char outcome : outcomes) counts.push_back({outcome == 's', 1});
+    return counts;
+  };
+  EXPECT_DOUBLE_EQ(*rule.p, BoschlooOrNewcombe(states(now), states(then)).two_sided);
 }
 
 TEST(Gate, UnpairedRulesWantOneTaskAndTheSameOnBothSides) {

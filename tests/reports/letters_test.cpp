@@ -1,9 +1,11 @@
 #include "reports/letters.h"
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <map>
 
+#include "reports/methods.h"
 #include "reports/report_data.h"
 #include "tests/reports/repeated_run.h"
 #include "tests/reports/sample_run.h"
@@ -60,8 +62,19 @@ TEST(Letters, PoliciesThatShareFewStatesAreComparedAsTwoSamples) {
   const std::vector<SampleCell> cells = {
       {"a", "pick", "1", "ssssssssss----------", "u"}, {"a", "pick", "2", "----------ffffffffff", "u"}};
   const ReportData report = ReportDataOf(SampleRun(cells).Summary());
-  EXPECT_TRUE(report.letters.has_unpaired);
+  EXPECT_THAT(report.letters.unpaired_tests, testing::ElementsAre("Boschloo"));
   EXPECT_EQ(LettersOf(report, "real"), (Letters{{"a pick@1", "a"}, {"a pick@2", "b"}}));
+}
+
+TEST(Letters, MoreUnpairedEpisodesThanAnExactTestTakesAreComparedAllTheSame) {
+  const std::string gap(3000, '-'), one = std::string(1800, 's') + std::string(1200, 'f'),
+                                    two = gap + std::string(1155, 's') + std::string(945, 'f');
+  const ReportData report = ReportDataOf(RepeatedRun({{"a", "p", {one}, {}}, {"a", "q", {two}, {}}}));
+  EXPECT_THAT(report.letters.unpaired_tests, testing::ElementsAre("Newcombe"));
+  EXPECT_EQ(LettersOf(report, "real"), (Letters{{"a p@c", "a"}, {"a q@c", "b"}}));
+  const std::string methods = MethodsParagraph(report);
+  EXPECT_THAT(methods, testing::HasSubstr("Newcombe where fewer than 80 % are shared"));
+  EXPECT_THAT(methods, testing::Not(testing::HasSubstr("Boschloo")));
 }
 
 /// Of the real world, each cell's letters.

@@ -142,6 +142,26 @@ TEST(ComparePolicies, RepeatsOfOneStateDoNotCountAsNewStatesUnpairedEither) {
   EXPECT_EQ(row.difference.interval->low, NewcombeDifference({2, 2}, {0, 2}).interval->low);
 }
 
+TEST(ComparePolicies, MoreUnpairedEpisodesThanAnExactTestTakesAreComparedAllTheSame) {
+  const std::string many = Times(1800, "s") + Times(1200, "f");
+  const std::string others = Times(3000, "-") + Times(1155, "s") + Times(945, "f");
+  ComparedPolicy one = Policy("a", many, "t"), two = Policy("b", others, "t");
+  const ComparisonRow row = ComparePolicies(one, two).all;
+  EXPECT_FALSE(row.is_paired);
+  EXPECT_EQ(row.test, "Newcombe");
+  EXPECT_EQ(row.winner, Winner::kFirst);
+  EXPECT_NEAR(NewcombeDifference({1800, 3000}, {1155, 2100}, 1 - *row.p).interval->low, 0, 1e-9);
+
+  Add("u", many, one);
+  Add("u", others, two);
+  const PolicyComparison both = ComparePolicies(one, two);
+  EXPECT_EQ(both.tasks[0].test, "Newcombe");
+  EXPECT_EQ(both.all.test, "Cochran-Mantel-Haenszel");
+  EXPECT_EQ(both.all.first_trials.all, 6000);
+  EXPECT_NEAR(*both.all.first.value, 0.6, 1e-12);
+  EXPECT_NEAR(*both.all.difference.value, 0.05, 1e-12);
+}
+
 TEST(ComparePolicies, RepeatsOfOneStateDoNotFillStrata) {
   const ComparisonRow row = ComparePolicies(TenTimes("a", {{"t", "sss"}, {"u", "ssf"}}),
                                             TenTimes("b", {{"t", "---fff"}, {"u", "---sff"}})).all;

@@ -108,6 +108,20 @@ TEST(Checkpoints, TheirOrderIsThatOfTheNumbersInTheirNames) {
   EXPECT_THAT(TrendInWords(curves[0], 0), HasSubstr("1 of 1 step rise"));
 }
 
+TEST(Checkpoints, ADecimalBeforeAUnitIsOfTheNumberAndElsewhereOfAVersion) {
+  EXPECT_EQ(StepOf("0.5M"), 5e5);
+  EXPECT_EQ(StepOf("step_1.5k"), 1500);
+  EXPECT_EQ(StepOf("step.5k"), 5000) << "no digit before the point";
+  EXPECT_EQ(StepOf("v1.10"), 10) << "after v1.5";
+  const SampleRun run(
+      {{"a", "pick", "0.5M", "fff", "fff"}, {"a", "pick", "1M", "sff", "sff"}, {"a", "pick", "2M", "sss", "sss"}});
+  const std::vector<CheckpointCurve> curves = CheckpointsOf(run.Summary());
+  ASSERT_EQ(curves.size(), 1u);
+  EXPECT_EQ(curves[0].points[0].checkpoint, "0.5M");
+  EXPECT_THAT(TrendInWords(curves[0], 0), HasSubstr("In real, from 0.5M to 2M: 0 % → 100 %, +100 points"));
+  EXPECT_THAT(TrendInWords(curves[0], 0), HasSubstr("2 of 2 steps rise"));
+}
+
 TEST(Checkpoints, APolicyWithOneIsNoCurve) {
   EXPECT_TRUE(CheckpointsOf(SampleRun({{"a", "pick", "1", "s", "s"}}).Summary()).empty());
 }
@@ -130,6 +144,27 @@ TEST(Headlines, AClearLossIsWorseWithItsNumbersAndASmallOneIsNotDecided) {
   EXPECT_THAT(small_text, HasSubstr("Is pick@new worse than pick@good?"));
   EXPECT_THAT(small_text, HasSubstr("[not decided] pick@new: 50 % against 75 %"));
   EXPECT_THAT(small_text, Not(HasSubstr("[worse]")));
+}
+
+TEST(Headlines, WhereHoldsATaskToAllCandidatesAsTheFirstAnswerDoes) {
+  // Six flips to none: p = .031 alone, and not significant as one of three.
+  const std::string good = "ssssssffff", bad = "ffffffffff";
+  std::vector<SampleCell> cells = {{"a", "pick", "good", good, good}, {"a", "pick", "x", bad, bad}};
+  EXPECT_THAT(AllText(HeadlinesOf(ReportDataOf(SampleRun(cells).Summary()))),
+              HasSubstr("[worse] a: pick@x -60 points"));
+  cells.push_back({"a", "pick", "y", bad, bad});
+  cells.push_back({"a", "pick", "z", bad, bad});
+  const ReportData report = ReportDataOf(SampleRun(cells).Summary());
+  ASSERT_EQ(report.candidates.size(), 3u);
+  for (const Candidate& candidate : report.candidates) {
+    ASSERT_EQ(candidate.task_p_holm.size(), 1u);
+    EXPECT_EQ(*candidate.task_p_holm[0], *candidate.p_holm) << "of one task: the same test";
+    EXPECT_NEAR(*candidate.p_holm, 3 * 2.0 / 64, 1e-12);
+  }
+  const std::string text = AllText(HeadlinesOf(report));
+  EXPECT_THAT(text, HasSubstr("[not decided] pick@x: 0 % against 60 %"));
+  EXPECT_THAT(text, HasSubstr("[not decided] a: no difference that these episodes can show"));
+  EXPECT_THAT(text, Not(HasSubstr("[worse]")));
 }
 
 TEST(Headlines, HowManyMoreIsPlannedAtACandidatesShareOfAlpha) {
@@ -183,6 +218,7 @@ TEST(Methods, NameTheTestsThatWereUsedAndNoOthers) {
   EXPECT_THAT(text, HasSubstr("exact McNemar"));
   EXPECT_THAT(text, HasSubstr("paired by initial state and seed"));
   EXPECT_THAT(text, HasSubstr("paired state bootstrap"));
+  EXPECT_THAT(text, HasSubstr("Holm-adjusted over the 3 comparisons, those of single tasks over all 6 of them. "));
   EXPECT_THAT(text, Not(HasSubstr("Boschloo")));
   EXPECT_THAT(text, HasSubstr("No episode was excluded."));
   const SampleRun apart({{"a", "pick", "1", "ssffe", "-----"}, {"a", "pick", "2", "-----ssff", "---------"}});

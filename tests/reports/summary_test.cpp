@@ -9,6 +9,7 @@
 #include "core/statistics/rates.h"
 #include "reports/counted_judges.h"
 #include "reports/page.h"
+#include "reports/report_data.h"
 #include "reports/report_json.h"
 #include "reports/run_correlation.h"
 #include "tests/reports/repeated_run.h"
@@ -36,6 +37,17 @@ TEST(Summary, OnlySuccessesAndFailuresAreInARate) {
   EXPECT_EQ(real.Of(Outcome::kError), 1);
   EXPECT_EQ(real.Of(Outcome::kUnjudged), 1);
   EXPECT_EQ(real.Apart(), 4);
+}
+
+TEST(Summary, APolicyWithoutCheckpointStandsWhereTheSuiteNamesIt) {
+  SampleRun run({{"take_bottle", "alpha", "b", "s", "s"},
+                 {"take_bottle", "alpha", "default", "s", "s"},
+                 {"take_bottle", "main", "default", "s", "s"}});
+  RunData data = ReadRun(run.store());
+  data.run.suite_text = "policies:\n  - {name: main}\n  - {name: alpha}\n  - {name: alpha, checkpoint: b}\n";
+  const RunSummary summary = Summarise(std::move(data), {});
+  EXPECT_THAT(summary.policies, testing::ElementsAre("main@default", "alpha@default", "alpha@b"));
+  EXPECT_EQ(ReportDataOf(summary).baseline, "main@default") << "the first declared";
 }
 
 TEST(Summary, ARateWithoutVerdictsIsUndefinedAndNotZero) {
@@ -95,6 +107,7 @@ TEST(Summary, OfSeveralJudgesTheFirstThatCanTellCountsEpisodeByEpisode) {
 TEST(Summary, AJudgesShortNameStandsForOneOrIsRefused) {
   const std::vector<std::string> there = {"classifier:abc", "classifier:def", "oracle", "vlm:x", "vlm:x:flip"};
   EXPECT_EQ(FullJudgeNames("vlm", there), "vlm:x");
+  EXPECT_EQ(FullJudgeNames("vlm", {"oracle", "vlm:x:flip:small", "vlm:x:small"}), "vlm:x:small") << "a probe is nobody's name";
   EXPECT_EQ(FullJudgeNames("classifier:def,oracle", there), "classifier:def,oracle");
   EXPECT_EQ(FullJudgeNames("nobody", there), "nobody");
   EXPECT_THROW(FullJudgeNames("oracle,classifier", there), Error);

@@ -2,6 +2,8 @@
 
 #include <hdf5.h>
 
+#include <algorithm>
+#include <array>
 #include <fstream>
 #include <nlohmann/json.hpp>
 
@@ -36,6 +38,14 @@ SyntheticClip::SyntheticClip(int step_count) : steps(step_count), frames(step_co
       positions_m.insert(positions_m.end(), {0.4 + 0.01 * step, arm == 0 ? 0.2 : -0.2, 0.3});
       quaternions_xyzw.insert(quaternions_xyzw.end(), {turn.x(), turn.y(), turn.z(), turn.w()});
     }
+  }
+}
+
+void SyntheticClip::LoseLeftArm() {
+  for (std::size_t step = 0; step < static_cast<std::size_t>(steps); ++step) {
+    grippers[2 * step] = 0;
+    std::fill_n(&positions_m[6 * step], 3, 0.0);
+    std::copy_n(std::array{0.0, 0.0, 0.0, 1.0}.begin(), 4, &quaternions_xyzw[8 * step]);
   }
 }
 

@@ -29,6 +29,9 @@ struct SyntheticClip {
   static Eigen::Isometry3d MountFromCamera();
   Eigen::Isometry3d BaseFromGripper(int step, int arm) const;
 
+  /// As recordings of a robot without one say it: at the base's origin, unturned, open.
+  void LoseLeftArm();
+
   void Write(const ClipFolders& folders) const;
 
  private:

@@ -2,6 +2,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "harness/job.h"
 #include "tests/support/temp_folder.h"
 #include "tests/system/run_support.h"
 
@@ -59,6 +60,21 @@ TEST(Conventions, WhatIsNotDeclaredIsSeenInTheFirstChunkBeforeAnyEpisodeCounts) 
     EXPECT_THAT(warned.err,
                 testing::ContainsRegex(fmt::format("warning: policy {}@default, task take_bottle, first chunk: .*{}",
                                                    fault, said.substr(0, 15))));
+}
+
+/// The next episode's first chunk was asked for instead, of a policy that had been found to be as it declared.
+TEST(Conventions, ARunThatGoesOnIsAskedNoMoreThanOneThatWasNeverInterrupted) {
+  const TempFolder folder;
+  Job third;
+  third.key = {{"take_bottle", "3-0002", "faulty", "default", 1}, "real"};
+  const std::string odd = fmt::format("policies.0.command=[faulty-policy, --fault, delta@{}]", third.PolicySeed());
+  const CommandResult whole = RunCommand(RunWords(kFaults, folder / "run", {odd}));
+  ASSERT_EQ(whole.exit_code, 0) << whole.err;
+  const std::string before = List(folder / "run");
+  EXPECT_THAT(before, HasSubstr("outside the workspace"));
+  const CommandResult again = RunCommand({Binary("evac"), "resume", (folder / "run").string(), "--retry-failed"});
+  EXPECT_EQ(again.exit_code, 0) << again.err;
+  EXPECT_EQ(List(folder / "run"), before);
 }
 
 }  // namespace

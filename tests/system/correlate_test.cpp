@@ -144,7 +144,7 @@ TEST(ReportCommand, AFolderThatCannotBeMadeIsNamed) {
   std::ofstream(table) << "group,task,policy,real_sr,sim_sr\n,t,a,0.2,0.5\n";
   const CommandResult result =
       RunCommand({Binary("evac"), "report", "--pairs", table, "--out", table + "/page"});
-  EXPECT_EQ(result.exit_code, 4);
+  EXPECT_EQ(result.exit_code, 2);
   EXPECT_NE(result.err.find("evac: " + table + ": cannot be made: "), std::string::npos) << result.err;
 }
 

@@ -109,6 +109,18 @@ TEST_F(ImaginedRun, WeightsOfAnotherNetworkAreRefusedBeforeTheFirstEpisodeOfAnyW
   EXPECT_FALSE(fs::exists(folder_ / "run" / "videos"));
 }
 
+/// Validated and begun, every episode of it failed.
+TEST_F(ImaginedRun, OfMoreStepsThanTheScheduleHasIsRefusedBeforeTheFirstEpisodeOfAnyWorld) {
+  WriteFileAtomically(folder_ / "short.yaml", ReadFile(kSmallNetwork) + "\nschedule: {steps: 50}\n");
+  nn::RandomWeights random(5);
+  nn::SaveWeights(weights_, random, ReadEvacConfig(folder_ / "short.yaml"));
+  const auto settings = Settings({"worlds.1.config=" + (folder_ / "short.yaml").string(), "worlds.1.steps=100"});
+  const CommandResult result = RunCommand(RunWords(kImagined, folder_ / "run", settings));
+  EXPECT_EQ(result.exit_code, 2) << result.err;
+  EXPECT_THAT(result.err, HasSubstr("world evac: field steps: found 100, wanted at most 50"));
+  EXPECT_FALSE(fs::exists(folder_ / "run" / "videos"));
+}
+
 TEST_F(ImaginedRun, WeightsThatWereTrainedForSomethingElseAreRefusedBeforeTheFirstEpisodeOfAnyWorld) {
   ActionStatistics other = AgiBotWorldStatistics();
   other.deviation[7] *= 2;

@@ -298,12 +298,13 @@ TEST_F(FidelityRun, SaysWhichWorldTheSuiteLacks) {
   EXPECT_THAT(result.err, HasSubstr("wanted another of type mujoco with the real world's profile"));
 }
 
-/// Three recordings of two tasks, one too short to be replayed.
+/// Four recordings, one too short to be replayed and one of a robot without a left arm.
 void WriteRecordings(const fs::path& root) {
-  for (const auto& [name, steps] : {std::pair{"one", 120}, {"two", 90}, {"short", 9}}) {
+  for (const auto& [name, steps] : {std::pair{"one", 120}, {"two", 90}, {"short", 9}, {"one_armed", 90}}) {
     SyntheticClip clip(steps);
     clip.cameras = {"head", "hand_right"};
     std::ranges::fill(clip.grippers, 60.0F);  // half closed
+    if (name == std::string("one_armed")) clip.LoseLeftArm();
     fs::create_directories(root / name);
     clip.Write(OneFolder(root / name));
   }
@@ -311,6 +312,9 @@ void WriteRecordings(const fs::path& root) {
 
 TEST_F(FidelityRun, OfRecordingsComparesPicturesAndSaysWhatWasLeftOut) {
   WriteRecordings(folder_ / "mine");
+  nn::RandomWeights random(5);
+  nn::SaveWeights(weights_, random, ReadEvacConfig(EVAC_SOURCE_DIR "/tests/system/evac_small.yaml"),
+                  {.metadata = {{"arms", "left,right"}}});
   const fs::path out = folder_ / "out";
   const CommandResult result = RunCommand(
       {Binary("evac"), "fidelity", EVAC_SOURCE_DIR "/apps/configs/fidelity_recordings.yaml", "--out", out.string(),
@@ -318,7 +322,8 @@ TEST_F(FidelityRun, OfRecordingsComparesPicturesAndSaysWhatWasLeftOut) {
        "worlds.1.config=" EVAC_SOURCE_DIR "/tests/system/evac_small.yaml", "--set",
        "worlds.1.statistics=" EVAC_SOURCE_DIR "/apps/configs/robots/agibotworld.yaml"});
   ASSERT_EQ(result.exit_code, 0) << result.err;
-  EXPECT_THAT(result.err, HasSubstr("1 recordings left out: 1 too_short"));
+  EXPECT_THAT(result.err, HasSubstr("2 recordings left out: 1 other_robot, 1 too_short"));
+  EXPECT_THAT(result.err, HasSubstr("one_armed: found arms right, wanted left, right"));
   const nlohmann::json numbers = Numbers(out);
   EXPECT_EQ(numbers["open_loop"]["psnr_by_chunk"].size(), 4u) << "120 steps at 30 Hz are 40 at 10 Hz: 4 chunks of 8";
   EXPECT_TRUE(numbers["pearson"].is_null());

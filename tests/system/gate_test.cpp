@@ -158,6 +158,15 @@ TEST_F(GateCommand, ARunThatTheJudgeHasNotJudgedIsNoBaseline) {
   EXPECT_FALSE(std::filesystem::exists(folder_ / "nobody.json"));
 }
 
+TEST_F(GateCommand, APinnedFileIsWrittenWithTheFoldersAboveIt) {
+  const CommandResult pinned = Evac({"gate", "pin", Path("main"), "--out", Path("new/folder/baseline.json")});
+  EXPECT_EQ(pinned.exit_code, 0) << pinned.err;
+  EXPECT_EQ(ReadFile(Path("new/folder/baseline.json")), ReadFile(Path("baseline.json")));
+  const CommandResult in_a_file = Evac({"gate", "pin", Path("main"), "--out", Path("gate.yaml/baseline.json")});
+  EXPECT_EQ(in_a_file.exit_code, 2) << in_a_file.err;
+  EXPECT_THAT(in_a_file.err, HasSubstr(Path("gate.yaml") + ":"));
+}
+
 TEST_F(GateCommand, AJudgeWhoGaveNoVerdictIsInvalidAndNotInconclusive) {
   WriteFileAtomically(folder_ / "gate.yaml", "judge: orakel\ngates: [{name: r, test: ci_lower, world: sim, at_least: 0.5}]");
   const CommandResult unknown = Gate("main");

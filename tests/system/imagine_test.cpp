@@ -265,6 +265,20 @@ TEST_F(ImagineCommand, WeightsSayHowActionsAreNormalisedAndWhichPeriodTheyAreFor
   ExpectRefused(Words("refused", {"--weights", folder_ / "tiny.safetensors", "--steps", "2", "--stride", "3"}), "frames 0.1 s apart are asked for");
 }
 
+/// Packed with a period typed in few digits, a robot's own recordings were those of another period.
+TEST_F(ImagineCommand, APeriodThatWasRoundedWhenPackingIsTheRecordings) {
+  nn::RandomWeights weights(5);
+  const auto of_period = [&](const char* period_s) {
+    nn::SaveWeights(folder_ / "tiny.safetensors", weights, ReadEvacConfig(folder_ / "tiny.yaml"),
+                    {.metadata = {{"period_s", period_s}}});
+  };
+  of_period("0.0333");  // of 30 Hz
+  const CommandResult result = RunCommand(Frames("rounded"));
+  EXPECT_EQ(result.exit_code, 0) << result.err;
+  of_period("0.035");
+  ExpectRefused(Frames("refused"), "frames 0.03333333 s apart are asked for");
+}
+
 TEST_F(ImagineCommand, WeightsOfOtherArmsThanTheRecordingsAreRefused) {
   nn::RandomWeights weights(5);
   nn::SaveWeights(folder_ / "tiny.safetensors", weights, ReadEvacConfig(folder_ / "tiny.yaml"),

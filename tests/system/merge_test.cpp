@@ -164,5 +164,16 @@ TEST(Merge, AShardIsWhichOfHowMany) {
     EXPECT_EQ(RunShard(folder / "run", shard).exit_code, 2) << shard;
 }
 
+/// 4294967297 of 4294967298 passed as 1 of 2.
+TEST(Merge, AShardsNumbersThatFitNoIntAreRefused) {
+  const TempFolder folder;
+  for (const char* shard : {"4294967297/4294967298", "1/4294967298", "1/99999999999999999999"}) {
+    const CommandResult result = RunShard(folder / "run", shard);
+    EXPECT_EQ(result.exit_code, 2) << shard;
+    EXPECT_THAT(result.err, HasSubstr("wanted which of how many, such as 2/4"));
+  }
+  EXPECT_FALSE(fs::exists(folder / "run"));
+}
+
 }  // namespace
 }  // namespace evac

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstring>
 #include <limits>
+#include <nlohmann/json.hpp>
 #include <optional>
 #include <set>
 
@@ -51,11 +52,7 @@ class PackCommand : public testing::Test {
   /// The same without a left arm.
   SyntheticClip OneArmed() const {
     SyntheticClip clip = Good();
-    for (std::size_t step = 0; step < 9; ++step) {
-      clip.grippers[2 * step] = 0;
-      for (std::size_t i = 0; i < 3; ++i) clip.positions_m[6 * step + i] = 0;
-      for (std::size_t i = 0; i < 4; ++i) clip.quaternions_xyzw[8 * step + i] = i == 3 ? 1 : 0;
-    }
+    clip.LoseLeftArm();
     return clip;
   }
   void Add(const std::string& name, const SyntheticClip& clip) { clip.Write(OneFolder(folder_ / ("data/" + name))); }
@@ -276,6 +273,8 @@ TEST_F(PackCommand, ShardsAreImaginedAgainIntoAFolderOfTheirOwn) {
   ASSERT_EQ(result.exit_code, 0) << result.err;
   EXPECT_THAT(result.out, HasSubstr("imagined latents of 2 shards, 2 of them new"));
   EXPECT_THAT(RunCommand(imagine).out, HasSubstr("0 of them new"));
+  WriteText(page, ReadFile(page) + "\ndomain: 1\n");  // the same sizes, and another answer
+  EXPECT_THAT(RunCommand(imagine).out, HasSubstr("2 of them new"));
   const TensorFile truth = TensorFile::Open(folder_ / "out/latents_00000.safetensors"),
                    imagined = TensorFile::Open(folder_ / "imagined/latents_00000.safetensors");
   const auto bytes = [](const TensorFile& file, const char* name) {
@@ -316,6 +315,19 @@ TEST_F(PackCommand, GivesTheSameBytesForAnyNumberOfJobsAndGoesOnWhereItWasCut) {
   fs::remove(folder_ / "one/shards.json");
   ASSERT_EQ(RunCommand(Words("one", {"--crops", "2"})).exit_code, 0);
   EXPECT_EQ(HashesOf("one"), whole);
+}
+
+/// Sixty-four clips of full size were as many gigabytes in memory as a machine has, for each core.
+TEST_F(PackCommand, AShardHoldsNoMoreMegabytesThanItMay) {
+  for (const char* name : {"a", "b", "c"}) Add(name, Good());
+  ASSERT_EQ(RunCommand(Words("out")).exit_code, 0);
+  ASSERT_EQ(RunCommand(Words("small", {"--shard-mb", "0.001"})).exit_code, 0);
+  const auto shards = [&](const char* out) {
+    return nlohmann::json::parse(ReadFile(folder_ / out / "shards.json")).at("shards").size();
+  };
+  EXPECT_EQ(shards("out"), 2u);
+  EXPECT_EQ(shards("small"), 3u);
+  EXPECT_NE(Said("small").at("recipe"), Said("out").at("recipe"));
 }
 
 TEST_F(PackCommand, NormalisesByTheStatisticsThatWeightsWereTrainedWith) {

@@ -165,6 +165,9 @@ TEST(RatingSession, WrongWordsAreRefusedWithWhatWasWanted) {
               HasSubstr("--raters: found 5, but " + study + " was begun with 3"));
   EXPECT_THAT(Rate({"new", study, "--run", run.folder().string(), "--name", "other"}).err,
               HasSubstr("--name: found 'other'"));
+  const CommandResult higher = Rate({"new", study, "--run", run.folder().string(), "--height", "96"});
+  EXPECT_EQ(higher.exit_code, 2);
+  EXPECT_THAT(higher.err, HasSubstr("--height: found 96, but " + study + " was begun with 64"));
   const std::string unknown = study + "_unknown";
   EXPECT_THAT(Rate({"new", unknown, "--run", run.folder().string(), "--gold-from", "orakel"}).err,
               HasSubstr("--gold-from: found 'orakel', wanted one who has judged these runs: oracle"));

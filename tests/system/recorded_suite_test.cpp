@@ -5,13 +5,17 @@
 #include <map>
 #include <set>
 
+#include "apps/evaluate.h"
 #include "apps/factory.h"
 #include "apps/network_parts.h"
 #include "apps/recorded_suite.h"
+#include "core/collection.h"
 #include "core/error.h"
 #include "core/file.h"
 #include "core/recording_writer.h"
 #include "core/store.h"
+#include "core/store_lock.h"
+#include "core/version.h"
 #include "tests/support/command.h"
 #include "tests/support/late_recording.h"
 #include "tests/support/synthetic_recording.h"
@@ -303,6 +307,103 @@ TEST_F(RecordedStates, TheHashCoversWhatLiesBesideATasksFolder) {
   EXPECT_TRUE(hashes.insert(hash()).second);
   WriteLateRecording({folder_ / "tree", "carry", "3"});
   EXPECT_TRUE(hashes.insert(hash()).second) << "another initial state";
+}
+
+TEST_F(RecordedStates, TheHashCoversTheRowsOfACollectionsTaskWhichSayWhatItsStatesAre) {
+  const auto collect = [&](const std::string& episode, const std::string& state) {
+    CollectedEpisode row;
+    row.task = "carry";
+    row.episode = episode;
+    row.initial_state = state;
+    row.stop = "still";
+    row.frames = 5;
+    const TreePlace place{folder_ / "tree", row.task, row.episode};
+    WriteLateRecording(place);
+    WriteText(RowPath(place), CollectedJson(row));
+  };
+  const auto hash = [&] {
+    return ReadSuite(WriteSuite(kEcho), {"recording=" + (folder_ / "tree/observations/carry").string()}).hash;
+  };
+  collect("1", "collect-7-00000");
+  collect("2", "collect-7-00001");
+  const std::string two_states = hash();
+  collect("2", "collect-7-00000");
+  EXPECT_NE(hash(), two_states) << "both began alike: there is one";
+}
+
+TEST_F(RecordedStates, TheHashOfACollectionIsTheSameWhicheverProcessWroteItLast) {
+  WriteLateRecording({folder_ / "tree", "carry", "1"});
+  const auto hash = [&] { return ReadSuite(WriteSuite(kEcho), {"recording=" + (folder_ / "tree").string()}).hash; };
+  const std::string never_locked = hash();
+  { const RunLock lock(folder_ / "tree/lock"); }
+  EXPECT_EQ(hash(), never_locked);
+  WriteText(folder_ / "tree/lock", "4711\n");
+  EXPECT_EQ(hash(), never_locked);
+}
+
+/// Runs of the echo world whose third state cannot begin, in this process: what is there no more was there when it was read.
+class LostState : public RecordedStates {
+ protected:
+  LostState()
+      : suite_(Filled(std::string(kEcho) + "error_budget: 1\n",
+                      {"recording=" + (folder_ / "many").string(), "policies.0.name=hold",
+                       "policies.0.command=[evac-policy, hold]"})) {
+    fs::remove_all(folder_ / "many/c");
+  }
+
+  EpisodeKey Key(const std::string& state) const {
+    return {{suite_.tasks.front().id, state, "hold", "recorded", 1}, "echo"};
+  }
+
+  Store Open(const std::string& run) const {
+    return Store::CreateOrContinue(
+        folder_ / run, {.suite_text = suite_.text, .suite_hash = suite_.hash, .suite_path = "", .evac_version = EVAC_VERSION});
+  }
+
+  /// Runs what is to do. @returns how each state's episode stopped.
+  std::map<std::string, StopReason> Stops(const std::string& run, const EvaluateOptions& options = {}) const {
+    Store store = Open(run);
+    EXPECT_EQ(Evaluate(suite_, store, options), ExitCode::kOk);
+    std::map<std::string, StopReason> stops;
+    for (const Episode& episode : store.Episodes()) stops[episode.key.pair.initial_state] = episode.stop;
+    return stops;
+  }
+
+  const Suite suite_;
+};
+
+/// `--retry-failed` took its row away, and neither that call nor any after it came to an end.
+TEST_F(LostState, FailsItsOwnEpisodeAndNotTheRunThatGoesOn) {
+  const std::map<std::string, StopReason> wanted = {
+      {"a", StopReason::kMaxChunks}, {"b", StopReason::kMaxChunks}, {"c", StopReason::kWorldError}};
+  EXPECT_EQ(Stops("run"), wanted);
+  EXPECT_EQ(Stops("run", {.retry_failed = true}), wanted);
+  Open("run").RemoveFailed(Key("c"));
+  EXPECT_EQ(Stops("run"), wanted) << "killed just before it";
+}
+
+TEST_F(LostState, FailsInAShardOfItsOwnToo) {
+  Shard alone{1, 2};
+  while (!alone.Holds(Key("c").pair) || alone.Holds(Key("a").pair) || alone.Holds(Key("b").pair))
+    alone = alone.number < alone.of ? Shard{alone.number + 1, alone.of} : Shard{1, alone.of + 1};
+  EXPECT_EQ(Stops("run", {.shard = alone}), (std::map<std::string, StopReason>{{"c", StopReason::kWorldError}}));
+}
+
+/// Reasons were gone before the world was asked whether it can begin at all.
+TEST_F(LostState, LeavesFailedRowsWhereTheirWorldCannotBeTried) {
+  {
+    Store store = Open("run");
+    Declare(suite_, store);
+    store.AddPolicy({"hold", "recorded", "{}"});
+    EpisodeRecord record;
+    record.episode.key = Key("c");
+    record.episode.stop = StopReason::kPolicyError;
+    record.episode.failure = "it broke";
+    store.Add(record);
+  }
+  fs::remove_all(folder_ / "many/a");
+  EXPECT_THROW(Stops("run", {.retry_failed = true}), Error);
+  EXPECT_TRUE(Open("run").Has(Key("c")));
 }
 
 TEST_F(RecordedStates, EveryPolicyBeginsInEachAndAReplayOfOneInNone) {

@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 
 #include <filesystem>
+#include <fstream>
 
 #include "core/store.h"
 #include "tests/support/command.h"
@@ -39,6 +40,30 @@ TEST_F(Refusals, AMissingSuiteOrProgramOrRunIsInvalidInput) {
   const CommandResult program = Run({"policies.0.command=[no-such-policy]"});
   EXPECT_EQ(program.exit_code, 2);
   EXPECT_THAT(program.err, HasSubstr("no-such-policy"));
+}
+
+TEST_F(Refusals, AnOutThatIsAFileIsInvalidInputAndNamed) {
+  std::ofstream(folder_ / "run") << "mine";
+  const CommandResult result = Run({});
+  EXPECT_EQ(result.exit_code, 2);
+  EXPECT_THAT(result.err, HasSubstr("evac: " + (folder_ / "run").string() + ":"));
+}
+
+/// It said "confidence is -1".
+TEST_F(Refusals, ARiskOfAComparisonThatIsNoShareIsNamedAsTheOption) {
+  for (const char* option : {"--alpha", "--power"}) {
+    for (const char* found : {"2", "0", "1", "nan"}) {
+      const CommandResult result = RunCommand({Binary("evac"), "compare", "a", "b", "--run", folder_.path().string(), option, found});
+      EXPECT_EQ(result.exit_code, 2);
+      EXPECT_THAT(result.err, AllOf(HasSubstr(std::string("compare: ") + option + " is "), HasSubstr("wanted between 0 and 1")));
+    }
+  }
+}
+
+TEST_F(Refusals, MoreTrialsThanCanBeCountedAreRefusedAndNotCountedForEver) {
+  const CommandResult result = RunCommand({Binary("evac"), "plan", "--trials", "99999999999"});
+  EXPECT_EQ(result.exit_code, 2);
+  EXPECT_THAT(result.err, HasSubstr("plan: --trials is 99999999999, wanted at most 100000"));
 }
 
 TEST_F(Refusals, AnOptionThatIsNoNumberIsInvalidInput) {

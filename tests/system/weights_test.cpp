@@ -6,6 +6,7 @@
 #include <fstream>
 #include <nlohmann/json.hpp>
 
+#include "core/file.h"
 #include "core/hash.h"
 #include "core/tensor_file.h"
 #include "tests/support/temp_folder.h"
@@ -130,6 +131,19 @@ TEST_F(WeightsCommand, ARenamedKeyIsRefusedByConvertAndNamedByInspect) {
   EXPECT_EQ(converted.exit_code, 2);
   EXPECT_THAT(converted.text, HasSubstr("_renamed"));
   EXPECT_FALSE(fs::exists(folder_ / "out.safetensors"));
+}
+
+TEST_F(WeightsCommand, InspectSaysThatAnotherNoiseScheduleDoesNotFit) {
+  Init("a.safetensors");
+  WriteFileAtomically(folder_ / "noisy.yaml", ReadFile(folder_ / "tiny.yaml") + "\nschedule: {base_scale: 0.9}\n");
+  const Answer answer = Evac("inspect a.safetensors --config noisy.yaml --json");
+  EXPECT_EQ(answer.exit_code, 1);
+  const auto json = nlohmann::json::parse(answer.text);
+  EXPECT_FALSE(json.at("fits"));
+  EXPECT_THAT(json.at("schedule").get<std::string>(), HasSubstr("scale_arr"));
+  const Answer words = Evac("inspect a.safetensors --config noisy.yaml");
+  EXPECT_EQ(words.exit_code, 1);
+  EXPECT_THAT(words.text, HasSubstr("does not fit: "));
 }
 
 TEST_F(WeightsCommand, BadFilesEndInOneMessageAndExitCode2) {

@@ -102,6 +102,22 @@ TEST_F(WorldStartTest, AForecastIsGivenWhereThePageHasOneAndNowhereElse) {
   EXPECT_THAT(train, none_given) << "it would be drawn anew, and stay so";
 }
 
+/// It was taken: turns are counted in frames and views told apart by their order, so it said where hands are not.
+TEST_F(WorldStartTest, AForecastOfOtherCamerasIsRefused) {
+  const std::filesystem::path other = folder_ / "other.safetensors";
+  {
+    const TensorFile file = TensorFile::Open(Forecast());
+    EXPECT_EQ(file.metadata().at("period_s"), "0.1");
+    TensorMetadata metadata = file.metadata();
+    metadata["cameras"] = "hand_right,head";
+    WriteTensorFile(other, file.tensors(), metadata);
+  }
+  WorldStart start{.codec = Codec()};
+  start.forecast = other;
+  EXPECT_THAT([&] { Train(Place("refused"), start); },
+              ThrowsMessage<TensorError>(HasSubstr("other.safetensors: the forecast was trained for cameras 'hand_right,head'")));
+}
+
 TEST_F(WorldStartTest, AnExceptionThatBeginsNoKeyIsRefused) {
   ASSERT_EQ(Train(Place("plain", false), {.codec = Codec()}), "done");
   WorldStart start{.codec = Codec(), .init = Weights("plain")};

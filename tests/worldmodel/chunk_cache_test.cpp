@@ -6,6 +6,7 @@
 #include <chrono>
 #include <fstream>
 
+#include "core/hash.h"
 #include "core/tensor_file.h"
 #include "tests/support/temp_folder.h"
 
@@ -71,6 +72,24 @@ TEST(ChunkCache, WhatNobodyHasFinishedForADayIsRemovedAndWhatIsBeingWrittenIsNot
   const ChunkCache a_day_later({.folder = folder.path()});
   EXPECT_FALSE(fs::exists(partial));
   EXPECT_TRUE(fs::exists(old_entry)) << "whole, and below the limit";
+}
+
+/// 2^40 frames of no numbers have no bytes, and were made one by one.
+TEST(ChunkCache, AnEntryOfManyFramesWithoutNumbersIsAMiss) {
+  const TempFolder folder;
+  ChunkCache cache({.folder = folder.path()});
+  fs::create_directories(folder / "aa");
+  for (const std::vector<std::int64_t>& views : {std::vector<std::int64_t>{0, 10, 10}, {1, 0, 10}, {1, 10, 0}}) {
+    const TensorView tensors[] = {
+        {{"latents", TensorType::kF32, {1000, 0}}, {}},
+        {{"pictures", TensorType::kU8, {1000, views[0], views[1], views[2], 3}}, {}}};
+    const std::string nothing = Sha256Hex(""), hash = Sha256Hex(nothing + nothing);
+    WriteTensorFile(folder / "aa" / (KeyOf(10) + ".safetensors"), tensors,
+                    {{"format", "evac chunk 1"}, {"sha256", hash}});
+    EXPECT_FALSE(cache.Find(KeyOf(10)));
+  }
+  cache.Keep(KeyOf(11), SmallChunk());
+  EXPECT_TRUE(cache.Find(KeyOf(11)));
 }
 
 }  // namespace

@@ -184,6 +184,14 @@ TEST(MotionStatistics, ThePageComesBackToTheLastBit) {
   EXPECT_EQ(read.deviation, statistics.deviation);
 }
 
+TEST(MotionStatistics, ARobotsNameComesBackWhateverItIs) {
+  for (const char* name : {"desk", "G1: mine", "", "7", "- \"a\" #1", "two\nlines"}) {
+    ActionStatistics statistics = AgiBotWorldStatistics();
+    statistics.robot = name;
+    EXPECT_EQ(ParseActionStatistics(StatisticsPage(statistics), "page").robot, name);
+  }
+}
+
 TEST(Shard, HoldsItsClipsOneAfterTheOther) {
   const TempFolder folder;
   std::vector<Clip> clips = {MakeClip(Source({40.5, 30.5}), {0, 0, kWidth_px, kHeight_px}, Options()),

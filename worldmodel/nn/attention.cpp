@@ -24,6 +24,11 @@ bool CanBeTiled(const Tensor& x) {
          (x.size(0) == 1 || x.stride(0) == x.size(1) * x.stride(1));
 }
 
+/// bf16 on the CPU, not to be differentiated: as floats they can be tiled, and their scores need no memory of their own.
+bool IsWorthWidening(const Tensor& x) {
+  return !at::GradMode::is_enabled() && x.is_cpu() && x.scalar_type() == at::kBFloat16;
+}
+
 /// Whether one head's scores fit into the nearest cache: then they are worked on there.
 bool IsSmall(const Tensor& q, const Tensor& k) {
   return HasFastGradient(q) && q.size(1) * k.size(1) <= kSmallScores;
@@ -42,6 +47,7 @@ Tensor PlainAttention(const Tensor& q, const Tensor& k, const Tensor& v, std::in
 
 Tensor Attention(const Tensor& q, const Tensor& k, const Tensor& v, std::int64_t heads) {
   RECORD_FUNCTION("evac::attention", (std::vector<c10::IValue>{q, k, v}));  // for profiles: costs nothing otherwise
+  if (IsWorthWidening(q)) return Attention(q.to(at::kFloat), k.to(at::kFloat), v.to(at::kFloat), heads).to(q.scalar_type());
   if (!CanBeTiled(q) || !CanBeTiled(k) || !CanBeTiled(v)) {
     if (!IsSmall(q, k)) return PlainAttention(q, k, v, heads);
     return FastAttention(q.unsqueeze(2), k.unsqueeze(2), v.unsqueeze(2), heads).squeeze(2);

@@ -5,12 +5,10 @@
 namespace evac::nn {
 namespace {
 
-constexpr std::int64_t kCodecPixels = std::int64_t{2} * 320 * 512;  // at once: two pictures of the published size
-
 /// `count` pictures of `pixels` each through `function`, so many at a time as memory bears.
 template <typename Function>
 Tensor InBatches(std::int64_t count, std::int64_t pixels, Function function) {
-  const std::int64_t batch = std::max<std::int64_t>(1, kCodecPixels / pixels);
+  const std::int64_t batch = PicturesAtOnce(pixels);
   std::vector<Tensor> parts;
   for (std::int64_t from = 0; from < count; from += batch)
     parts.push_back(function(from, std::min(batch, count - from)));
@@ -18,6 +16,8 @@ Tensor InBatches(std::int64_t count, std::int64_t pixels, Function function) {
 }
 
 }  // namespace
+
+std::int64_t PicturesAtOnce(std::int64_t pixels) { return std::max<std::int64_t>(1, std::int64_t{2} * 320 * 512 / pixels); }
 
 Tensor EncodeImages(const EvacModel& model, const Tensor& images, const Tensor& noise) {
   return InBatches(images.size(0), images.size(2) * images.size(3), [&](std::int64_t from, std::int64_t count) {

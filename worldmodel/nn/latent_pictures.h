@@ -5,6 +5,9 @@
 /// Pictures through the codec, so many at a time as memory bears.
 namespace evac::nn {
 
+/// How many pictures of so many pixels the codec takes at once: two of the published size, at least one.
+std::int64_t PicturesAtOnce(std::int64_t pixels);
+
 /// Pictures [N, 3, H, W] in [-1, 1] → [N, z, h, w], scaled; undefined noise: the posterior's mean.
 Tensor EncodeImages(const EvacModel& model, const Tensor& images, const Tensor& noise);
 /// Pictures [BV, K, 3, H, W] and noise [BV, K, z, h, w] → [BV, z, K, h, w].

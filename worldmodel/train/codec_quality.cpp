@@ -1,12 +1,13 @@
 #include <algorithm>
 #include <cmath>
 
+#include "worldmodel/nn/latent_pictures.h"
 #include "worldmodel/train/codec_training.h"
 
 namespace evac::train {
 namespace {
 
-constexpr std::int64_t kBatch = 16;
+constexpr std::int64_t kBatch = 16;           ///< of small pictures
 constexpr std::int64_t kNormaliseWith = 512;  ///< pictures whose latents are measured
 constexpr double kPointLogVariance = -30;     ///< the least that a posterior can say
 
@@ -60,9 +61,12 @@ Tensor AroundObject(const Tensor& picture, const Tensor& object_px) {
   return picture.narrow(1, top, rows).narrow(2, left, columns);
 }
 
+/// @param pictures  [N, H, W, 3]
 template <typename Function>
-void InBatches(std::int64_t count, Function function) {
-  for (std::int64_t from = 0; from < count; from += kBatch) function(from, std::min(kBatch, count - from));
+void InBatches(const Tensor& pictures, Function function) {
+  const std::int64_t count = pictures.size(0);
+  const std::int64_t at_once = std::min(kBatch, nn::PicturesAtOnce(pictures.size(1) * pictures.size(2)));
+  for (std::int64_t from = 0; from < count; from += at_once) function(from, std::min(at_once, count - from));
 }
 
 /// [N, 3, H, W]: squared errors of what comes back, as colours 0 … 1.
@@ -77,7 +81,7 @@ CodecQuality MeasureCodec(const nn::Vae& vae, const ShardSet& shards, std::int64
   const at::NoGradGuard no_gradients;
   Errors whole, object, maps;
   const Sampled frames = Sample(shards, pictures, &Shard::frames);
-  InBatches(frames.pictures.size(0), [&](std::int64_t from, std::int64_t count) {
+  InBatches(frames.pictures, [&](std::int64_t from, std::int64_t count) {
     const Tensor squares = SquaredErrors(vae, PicturesFrom(frames.pictures.narrow(0, from, count)));
     whole.Add(squares);
     for (std::int64_t i = 0; i < count; ++i) {
@@ -86,7 +90,7 @@ CodecQuality MeasureCodec(const nn::Vae& vae, const ShardSet& shards, std::int64
     }
   });
   const Sampled drawn = Sample(shards, std::max<std::int64_t>(1, pictures / 4), &Shard::maps);
-  InBatches(drawn.pictures.size(0), [&](std::int64_t from, std::int64_t count) {
+  InBatches(drawn.pictures, [&](std::int64_t from, std::int64_t count) {
     maps.Add(SquaredErrors(vae, PicturesFrom(drawn.pictures.narrow(0, from, count))));
   });
   return {whole.Psnr(), object.Psnr(), maps.Psnr()};
@@ -96,7 +100,7 @@ void NormaliseLatents(const nn::Vae& vae, const ShardSet& shards, const std::vec
   const at::NoGradGuard no_gradients;
   std::vector<Tensor> means;
   const Sampled frames = Sample(shards, kNormaliseWith, &Shard::frames);
-  InBatches(frames.pictures.size(0), [&](std::int64_t from, std::int64_t count) {
+  InBatches(frames.pictures, [&](std::int64_t from, std::int64_t count) {
     means.push_back(vae.Encode(PicturesFrom(frames.pictures.narrow(0, from, count))).Sample({}));
   });
   const Tensor latents = at::cat(means).transpose(0, 1).flatten(1);  // [z, all]

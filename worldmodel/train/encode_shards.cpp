@@ -3,17 +3,20 @@
 #include <algorithm>
 #include <vector>
 
+#include "worldmodel/nn/latent_pictures.h"
+
 namespace evac::train {
 namespace {
 
-constexpr std::int64_t kBatch = 32;
+constexpr std::int64_t kBatch = 32;  ///< of small pictures
 
 /// [F, V, H, W, 3] bytes → [F, V, z, h, w] half
 Tensor Encode(const nn::Vae& vae, const Tensor& pictures) {
   const Tensor all = pictures.flatten(0, 1);
+  const std::int64_t at_once = std::min(kBatch, nn::PicturesAtOnce(all.size(1) * all.size(2)));
   std::vector<Tensor> parts;
-  for (std::int64_t from = 0; from < all.size(0); from += kBatch) {
-    const Tensor batch = PicturesFrom(all.narrow(0, from, std::min(kBatch, all.size(0) - from)));
+  for (std::int64_t from = 0; from < all.size(0); from += at_once) {
+    const Tensor batch = PicturesFrom(all.narrow(0, from, std::min(at_once, all.size(0) - from)));
     parts.push_back((vae.Encode(batch).Sample({}) * vae.scale_factor()).to(at::kHalf));
   }
   return at::cat(parts).unflatten(0, {pictures.size(0), pictures.size(1)}).contiguous();

@@ -5,6 +5,7 @@
 
 #include "worldmodel/nn/evac_model.h"
 #include "worldmodel/nn/weights.h"
+#include "worldmodel/train/train_world.h"
 
 namespace evac::train {
 namespace {
@@ -77,6 +78,7 @@ TrainerSummary TrainForecast(const JobPlace& place, const ForecastOptions& given
                            {"agreement", Text("%.3f", quality.agreement)},
                            {"finder_px", Text("%.2f", quality.finder_px)}};
     card.merge(summary.CardOfSteps());
+    card.merge(WhatFor(shards.metadata()));
     WriteTensorFile(place.out / "forecast.safetensors", views, card);
   });
   return summary;

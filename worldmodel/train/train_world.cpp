@@ -171,6 +171,7 @@ TrainerSummary TrainWorld(const JobPlace& place, const WorldOptions& given, cons
     CheckShards(*set, place.config, start);
   }
   CheckHoldout(holdout, shards);
+  if (!start.forecast.empty()) CheckForecastFor(start.forecast, WhatFor(shards.metadata()));
   Sources sources(start, place.config, options.job.trainer.seed);
   OnlyRead read(sources.routed, place.config);
   std::deque<WorldWorker> workers;

@@ -28,6 +28,12 @@ void CheckStart(const nn::ModelConfig& config, const WorldStart& start);
 /// statistics; arms_read says which arms of recordings are their actions (worldmodel/trained_for.h).
 TensorMetadata WhatFor(const TensorMetadata& shards);
 
+/// A forecast counts turns in frames, knows views by their order, and looks where hands are: it is of no use to a network
+/// that sees otherwise. What either does not say is not compared.
+/// @param what_for  of the network, as WhatFor says it
+/// @throws TensorError naming the file and what differs: period, cameras, arms (and which are read), or how maps are drawn
+void CheckForecastFor(const std::filesystem::path& forecast, const TensorMetadata& what_for);
+
 /// Trains the denoiser and its resamplers (EVAC's first stage of training is the codec) and writes
 /// OUT/weights.safetensors: the whole network, the codec included, averaged weights of the best hold-out.
 /// @param look  is given strips of the hold-out after each measurement

@@ -82,6 +82,16 @@ void CheckSchedule(const nn::ModelConfig& config, const WorldStart& start, const
 
 }  // namespace
 
+void CheckForecastFor(const std::filesystem::path& forecast, const TensorMetadata& what_for) {
+  const TensorFile file = TensorFile::OpenCheckpoint(forecast);
+  for (const char* key : {"period_s", "cameras", "arms", "arms_read", "pose_map"}) {
+    const auto own = file.metadata().find(key), wanted = what_for.find(key);
+    if (own == file.metadata().end() || wanted == what_for.end() || own->second == wanted->second) continue;
+    throw TensorError(forecast.string() + ": the forecast was trained for " + key + " '" + own->second + "', wanted '" +
+                      wanted->second + "'");
+  }
+}
+
 void CheckStart(const nn::ModelConfig& config, const WorldStart& start) {
   CheckForecast(config, start);
   if (start.init.empty()) return;

@@ -1,0 +1,143 @@
+#include "judges/rating_study.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <map>
+#include <set>
+
+#include "core/error.h"
+#include "core/video.h"
+#include "tests/reports/stored_run.h"
+
+namespace evac {
+namespace {
+
+namespace fs = std::filesystem;
+using testing::HasSubstr;
+
+StudyMade Make(const fs::path& folder, const StudyOptions& options) {
+  return MakeStudy(folder, options, [](std::size_t, std::size_t) {});
+}
+
+std::vector<StudyClip> ClipsIn(const fs::path& folder) {
+  return StudyStore::Open(folder, StudyStore::Mode::kReadOnly).Clips();
+}
+
+cv::Mat FirstPicture(const fs::path& folder, const StudyClip& clip) {
+  return ReadAllFrames(folder / clip.file).front();
+}
+
+bool IsBlack(const cv::Mat& picture, int x_px, int y_px) {
+  const cv::Vec3b pixel = picture.at<cv::Vec3b>(y_px, x_px);
+  return pixel[0] + pixel[1] + pixel[2] < 30;
+}
+
+/// An episode of which there is nothing to see.
+void AddUnseen(StoredRun& run, const std::string& state, StopReason stop) {
+  EpisodeRecord record;
+  record.episode.key = {{"take", state, "pick", "1", 1}, "real"};
+  record.episode.stop = stop;
+  record.episode.stop_reason = "after 0 chunks";
+  run.store().Add(record);
+}
+
+/// One more task, whose camera is `height_px` high where that of "take" is 48: of one height it is as much wider.
+void AddWide(StoredRun& run, int height_px) {
+  Task task = run.store().Tasks().front();
+  task.id = "wide";
+  task.cameras.front().height_px = height_px;
+  run.store().AddTask(task);
+  run.AddEpisode({{"wide", "41-0000", "pick", "1", 1}, "real"}, 's');
+}
+
+TEST(RatingStudy, StatesAreDrawnOnceForAllRunsSoThatPairsStayPairs) {
+  StoredRun real("recorded", std::string(12, 's'), std::string(12, 'f')), imagined("imagined", "", "");
+  imagined.store().AddWorld({"dream", "evac", false, "network"});
+  for (int i = 0; i < 9; ++i)
+    imagined.AddEpisode({{"take", fmt::format("41-{:04d}", i), "pick", "1", 1}, "dream"}, 's');
+  for (const std::uint64_t seed : {1, 2}) {
+    const fs::path folder = real.folder().parent_path() / fmt::format("study_{}", seed);
+    Make(folder, {.runs = {real.folder(), imagined.folder()}, .seed = seed, .height_px = 64, .states = 4});
+    std::map<std::string, std::set<std::string>> states;  // by world
+    for (const StudyClip& clip : ClipsIn(folder)) states[clip.world].insert(clip.initial_state);
+    EXPECT_EQ(states["real"].size(), 4u);
+    EXPECT_EQ(states["sim"], states["real"]);
+    std::set<std::string> in_both;
+    for (const std::string& state : states["real"]) {
+      if (state < "41-0009") in_both.insert(state);
+    }
+    EXPECT_EQ(states["dream"], in_both) << "seed " << seed;
+  }
+}
+
+TEST(RatingStudy, OnlyStatesWithAClipAreDrawn) {
+  StoredRun run("gaps", "sf", "fs");
+  for (int i = 0; i < 10; ++i) {
+    AddUnseen(run, fmt::format("42-{:04d}", i), StopReason::kPolicyError);
+    AddUnseen(run, fmt::format("43-{:04d}", i), StopReason::kMaxChunks);
+  }
+  const fs::path folder = run.folder().parent_path() / "study";
+  const StudyMade made = Make(folder, {.runs = {run.folder()}, .height_px = 64, .states = 2});
+  EXPECT_EQ(made.clips, 4) << "two states in two worlds";
+  EXPECT_THAT(made.left_out, testing::ElementsAre(HasSubstr("10 failed episodes"), HasSubstr("10 episodes without")));
+}
+
+TEST(RatingStudy, AWaveWithoutAHeightIsAsLargeAsTheFirst) {
+  StoredRun run("begun", "s", "f");
+  const fs::path folder = run.folder().parent_path() / "study";
+  Make(folder, {.runs = {run.folder()}, .height_px = 720});
+  run.Add("41-0007", 's', 's');
+  Make(folder, {.runs = {run.folder()}});
+  const std::vector<StudyClip> clips = ClipsIn(folder);
+  ASSERT_EQ(clips.size(), 4u);
+  EXPECT_EQ(clips.back().wave, 2);
+  for (const StudyClip& clip : clips) {
+    EXPECT_EQ(clip.views, clips.front().views) << "wave " << clip.wave;
+    EXPECT_FALSE(IsBlack(FirstPicture(folder, clip), 300, 20)) << "wave " << clip.wave;
+  }
+}
+
+TEST(RatingStudy, AWaveOfAnotherHeightIsRefused) {
+  StoredRun run("begun", "s", "f");
+  const fs::path folder = run.folder().parent_path() / "study";
+  Make(folder, {.runs = {run.folder()}, .height_px = 65});
+  run.Add("41-0007", 's', 's');
+  EXPECT_THAT([&] { Make(folder, {.runs = {run.folder()}, .height_px = 96}); },
+              testing::ThrowsMessage<Error>(HasSubstr("--height: found 96, but " + folder.string() +
+                                                      " was begun with 66, and a wave cannot change that")));
+  EXPECT_EQ(ClipsIn(folder).size(), 2u);
+  Make(folder, {.runs = {run.folder()}, .height_px = 65});
+  EXPECT_EQ(ClipsIn(folder).size(), 4u) << "the same command adds what came since";
+}
+
+TEST(RatingStudy, AWaveWithAWiderTaskIsMadeSmallerInsteadOfEndingInAnAssertion) {
+  StoredRun run("begun", "s", "f");
+  const fs::path folder = run.folder().parent_path() / "study";
+  Make(folder, {.runs = {run.folder()}, .height_px = 128});
+  AddWide(run, 32);
+  Make(folder, {.runs = {run.folder()}});
+  const StudyInfo info = StudyStore::Open(folder, StudyStore::Mode::kReadOnly).info();
+  EXPECT_EQ(info.width_px, 170);
+  const StudyClip wide = ClipsIn(folder).back();
+  ASSERT_EQ(wide.task, "wide");
+  const cv::Mat picture = FirstPicture(folder, wide);
+  EXPECT_EQ(picture.size(), cv::Size(170, 128));
+  EXPECT_FALSE(IsBlack(picture, 85, 64));
+  EXPECT_FALSE(IsBlack(picture, 85, 30)) << "as large as it fits: 168x84";
+  EXPECT_TRUE(IsBlack(picture, 85, 8));
+}
+
+TEST(RatingStudy, ATaskThatFitsIntoNoClipOfTheStudyIsRefusedByName) {
+  StoredRun run("begun", "s", "f");
+  const fs::path folder = run.folder().parent_path() / "study";
+  Make(folder, {.runs = {run.folder()}, .height_px = 64});
+  AddWide(run, 24);
+  EXPECT_THAT([&] { Make(folder, {.runs = {run.folder()}}); },
+              testing::ThrowsMessage<Error>(HasSubstr("task wide: its views are 170 px wide if they are 64 px high, "
+                                                      "wanted at most 86")));
+  EXPECT_EQ(ClipsIn(folder).size(), 2u);
+}
+
+}  // namespace
+}  // namespace evac
