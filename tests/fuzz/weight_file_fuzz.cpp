@@ -33,7 +33,8 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   scratch.Write("w.safetensors", data, size);
   ReadOrRefuse([&] {
     evac::WeightFile file(scratch.folder() / "w.safetensors", "fuzz 1");
-    for (const auto& [field, text] : file.card()) {
+    for (const auto& entry : file.card()) {
+      const std::string& field = entry.first;
       ReadOrRefuse([&] { Require(std::isfinite(file.Number(field))); });
       ReadOrRefuse([&] { Require(std::abs(file.Whole(field, -5, 5)) <= 5); });
       ReadOrRefuse([&] { Require(!file.Names(field).empty()); });
