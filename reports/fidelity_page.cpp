@@ -25,8 +25,9 @@ std::string Percent(const Number& number) {
                 : fmt::format("<span class=\"quiet\" title=\"{}\">–</span>", Escaped(number.reason()));
 }
 std::string Decimal(const Number& number, int digits) {
-  return number ? fmt::format("{:.{}f}", *number, digits)
-                : fmt::format("<span class=\"quiet\" title=\"{}\">–</span>", Escaped(number.reason()));
+  if (!number) return fmt::format("<span class=\"quiet\" title=\"{}\">–</span>", Escaped(number.reason()));
+  const std::string text = fmt::format("{:.{}f}", *number, digits);
+  return text.find_first_not_of("-0.") == std::string::npos && text.starts_with('-') ? text.substr(1) : text;  // no "-0.00"
 }
 std::string WithInterval(const Estimate& estimate, double factor, int digits, const char* unit) {
   std::string text = estimate.value ? fmt::format("{:.{}f}{}", factor * *estimate.value, digits, unit)

@@ -24,7 +24,8 @@ std::string HashOfFiles(const Recording& recording, const std::optional<Collecte
 /// An episode of a collection whose row is not written yet is not whole.
 void RefuseUnfinished(const fs::path& folder) {
   const std::optional<TreePlace> place = PlaceOf(folder);
-  if (!place || !fs::exists(place->root / "collection.json") || fs::exists(RowPath(*place))) return;
+  std::error_code unknown;  // what cannot be looked at is told where it is read
+  if (!place || !fs::exists(place->root / "collection.json", unknown) || fs::exists(RowPath(*place), unknown)) return;
   throw InvalidInput("{}: its collection has no row for it yet", folder.string()).Called("unfinished");
 }
 

@@ -163,6 +163,16 @@ TEST_F(MergedRuns, DoNotRemoveWhatNoMergeLeftWhereTheyWouldBeMade) {
   EXPECT_FALSE(std::filesystem::exists(folder_ / "merged"));
 }
 
+/// A file of the lock's name was written over, and then removed.
+TEST_F(MergedRuns, DoNotLockWhatIsNoLock) {
+  a_.Add(samples::SomeEpisode(a_, key_));
+  WriteFileAtomically(folder_ / "merged.lock", "mine");
+  EXPECT_THAT([&] { Merge(); }, testing::ThrowsMessage<Error>(testing::HasSubstr((folder_ / "merged.lock").string())));
+  EXPECT_EQ(ReadFile(folder_ / "merged.lock"), "mine");
+  WriteFileAtomically(folder_ / "merged.lock", "12345\n");  // of a merge that was killed
+  EXPECT_EQ(Merge().episodes, 1);
+}
+
 TEST_F(MergedRuns, AreMadeOverWhatAMergeLeftThatWasBrokenOff) {
   a_.Add(samples::SomeEpisode(a_, key_));
   const std::filesystem::path video = a_.folder() / a_.Episodes().at(0).video;

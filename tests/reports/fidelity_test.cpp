@@ -247,6 +247,13 @@ TEST(Fidelity, WithoutAJudgeNothingIsClaimed) {
   EXPECT_THAT(FidelityText(fidelity), HasSubstr("Pearson –"));
 }
 
+/// A kappa of nothing is -2e-16 where it is added up.
+TEST(Fidelity, ThePageHasNoNegativeZero) {
+  FidelityInput input = Sample();
+  input.judge.kappa_masked = -2.3e-16;
+  EXPECT_THAT(FidelityPage(FidelityOf(input)), HasSubstr("with the object painted over 0.00."));
+}
+
 TEST(Fidelity, WhereTwoMmrvsAreShownEachSaysOverWhat) {
   FidelityInput input = Sample();
   EXPECT_THAT(FidelityPage(FidelityOf(input)), Not(HasSubstr("It ranks all points as one list"))) << "of one task they are the same";
