@@ -125,6 +125,10 @@ void MakeCorpus(const fs::path& corpus) {
   MakePageSeeds(corpus / "suite_fuzz");
   MakeShardSeeds(corpus / "shards_fuzz");
   MakeTensorSeeds(corpus);
+  fs::create_directories(corpus / "truth_fuzz");
+  evac::WriteTruth(corpus / "truth_fuzz/three_frames", {{"head"}, std::vector<float>(6, 1), std::vector<std::uint8_t>(3, 0)});
+  evac::WriteText(corpus / "scene_files_fuzz/desk.xml",
+                  "<mujoco><compiler meshdir='.'/><include file=\"scene.xml\"/><mesh file = 'a.obj'/></mujoco>");
   evac::WriteText(corpus / "weights_card_fuzz/desk",
                   "0.1\n" + evac::ReadFile(EVAC_SOURCE_DIR "/worldmodel/weights/desk/statistics.yaml"));
 }
