@@ -28,7 +28,9 @@ void AddPlan(CLI::App& app, ExitCode& exit_code) {
   command->add_option("--rate", o.rate, "success rate expected")->capture_default_str();
   command->add_option("--difference", o.difference, "between two policies, that must not be missed")
       ->capture_default_str();
-  command->add_option("--flips", o.flips, "share of initial states in which the two differ")->capture_default_str();
+  command->add_option_function<double>(
+      "--flips", [arguments](const double& share) { arguments->options.flips = share; },
+      "share of initial states in which the two differ (default: 0.2, as far as the two rates allow it)");
   command->add_option("--trials", o.trials, "initial states at hand")->capture_default_str();
   command->add_option("--margin", o.margin, "of \"not worse by\"")->capture_default_str();
   command->add_option("--correlation", o.correlation, "over policies, to be shown")->capture_default_str();
@@ -43,7 +45,7 @@ void AddPlan(CLI::App& app, ExitCode& exit_code) {
       "Examples:\n"
       "  evac plan\n"
       "  evac plan --rate 0.28 --difference 0.08 --trials 25\n"
-      "  evac plan --rate 0.9 --flips 0.15 --trials 100 --imagined 2000 --json");
+      "  evac plan --rate 0.85 --flips 0.15 --trials 100 --imagined 2000 --json");
   command->callback([arguments, &exit_code] {
     const std::int64_t trials = arguments->options.trials;
     if (trials > kMostTrials) throw InvalidInput("plan: --trials is {}, wanted at most {}", trials, kMostTrials);

@@ -31,20 +31,62 @@ std::vector<JudgeQualityRow> RowsBy(const std::vector<JudgedItem>& items, const 
   return rows;
 }
 
+std::int64_t StatesOf(const std::vector<JudgedItem>& items) {
+  std::set<StateKey> states;
+  for (const JudgedItem& item : items) {
+    if (IsDecided(item.judge) && IsDecided(item.truth)) states.insert({item.task, item.initial_state});
+  }
+  return std::ssize(states);
+}
+
+std::int64_t TrueSuccesses(const Confusion& confusion) {
+  return confusion.both_success + confusion.only_human_success;
+}
+
+/// Of a domain where all ends alike, either sensitivity or specificity is not known: who only tells the domains apart
+/// would not be found out.
+std::vector<std::string> OneSidedDomains(const JudgeQualityRow& real, const JudgeQualityRow& other) {
+  std::vector<std::string> sentences;
+  if (real.confusion.total() == 0 || other.confusion.total() == 0) return sentences;
+  for (const JudgeQualityRow* row : {&real, &other}) {
+    const std::int64_t all = row->confusion.total(), successes = TrueSuccesses(row->confusion);
+    if (successes > 0 && successes < all) continue;
+    sentences.push_back(fmt::format("{}: no {} among {}, wanted both outcomes in each kind of clips", row->group,
+                                    successes == 0 ? "success" : "failure", all));
+  }
+  return sentences;
+}
+
+JudgeQualityRow OnRealClips(const std::vector<JudgedItem>& items) {
+  return QualityOn(items, "real clips", [](const JudgedItem& item) { return item.is_real; });
+}
+
+JudgeQualityRow OnOtherClips(const std::vector<JudgedItem>& items) {
+  return QualityOn(items, "other clips", [](const JudgedItem& item) { return !item.is_real; });
+}
+
 /// What is missing before a judge can be accepted or refused on each task.
 std::vector<std::string> Missing(const std::vector<JudgedItem>& items, const JudgeAcceptance& wanted) {
   std::vector<std::string> missing;
   if (items.empty()) missing.push_back("no episode has a verdict of both");
   for (const JudgeQualityRow& row : RowsBy(items, "task", &JudgedItem::task)) {
-    const std::int64_t successes = row.confusion.both_success + row.confusion.only_human_success;
+    const std::int64_t successes = TrueSuccesses(row.confusion);
     const std::int64_t failures = row.confusion.total() - successes;
     if (row.confusion.total() < wanted.min_items_per_task || std::min(successes, failures) < wanted.min_per_class)
       missing.push_back(fmt::format("{}: {} successes and {} failures, wanted {} items with {} of each", row.group,
                                     successes, failures, wanted.min_items_per_task, wanted.min_per_class));
   }
   const Estimate kappa = QualityOn(items, "all", [](const JudgedItem&) { return true; }).statistics.kappa;
-  if (kappa.value && *kappa.value < 1 && !kappa.interval)  // a judge that never erred has no spread to see
+  const std::int64_t states = StatesOf(items);
+  if (kappa.value && !kappa.interval && *kappa.value < 1) {
     missing.push_back(fmt::format("how far kappa can be believed: {}", kappa.interval.reason()));
+  } else if (kappa.value && !kappa.interval && states < wanted.min_unerring_states) {  // no spread to see
+    missing.push_back(
+        fmt::format("how far kappa can be believed: never wrong, but in {} initial state{} only, wanted {}", states,
+                    states == 1 ? "" : "s", wanted.min_unerring_states));
+  }
+  for (std::string& sentence : OneSidedDomains(OnRealClips(items), OnOtherClips(items)))
+    missing.push_back(std::move(sentence));
   return missing;
 }
 
@@ -81,8 +123,7 @@ double DifferenceOf(const Number& a, const Number& b) { return a && b ? std::abs
 std::vector<std::string> Refusals(const std::vector<JudgedItem>& items, const JudgeAcceptance& wanted) {
   std::vector<std::string> refusals;
   const auto everything = QualityOn(items, "all", [](const JudgedItem&) { return true; });
-  const auto real = QualityOn(items, "real clips", [](const JudgedItem& item) { return item.is_real; });
-  const auto other = QualityOn(items, "other clips", [](const JudgedItem& item) { return !item.is_real; });
+  const JudgeQualityRow real = OnRealClips(items), other = OnOtherClips(items);
   const Estimate& kappa = everything.statistics.kappa;
   RefuseUnless(kappa.value && *kappa.value >= wanted.min_kappa,
                fmt::format("kappa is {}, wanted at least {}",

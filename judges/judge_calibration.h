@@ -36,10 +36,13 @@ struct JudgeQualityRow {
 JudgeQualityRow QualityOn(const std::vector<JudgedItem>& items, const std::string& group,
                           const std::function<bool(const JudgedItem&)>& is_in);
 
-/// What vlm_judge.md 2.5 asks of a judge whose verdicts a gate may count.
+/// What docs/vlm_judge.md asks of a judge whose verdicts a gate may count.
 struct JudgeAcceptance {
   std::int64_t min_items_per_task = 60, min_per_class = 15;
   double min_kappa = 0.6, min_kappa_low = 0.4;
+  /// Of a judge that was never wrong, whose kappa has no interval: were it wrong in 30 % of the states, kappa .4 where
+  /// both outcomes are as many, so many would show none of it with a chance of 2 % (.7^11).
+  std::int64_t min_unerring_states = 11;
   double max_bias = 0.05;               ///< share, either way, in real and in other worlds
   double max_domain_difference = 0.10;  ///< of sensitivity and of specificity between the two
   double max_errors = 0.02;             ///< share

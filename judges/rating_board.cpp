@@ -43,6 +43,7 @@ Json AgreementJson(const std::vector<RatedClip>& clips, int raters_per_clip) {
                {"agreement", ToJson(agreement.agreement)}};
   if (agreement.interval)
     json["alpha"]["low"] = agreement.interval->low, json["alpha"]["high"] = agreement.interval->high;
+  json["dropped_replicates"] = agreement.dropped_replicates;
   return json;
 }
 

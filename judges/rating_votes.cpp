@@ -88,14 +88,19 @@ std::optional<double> AlphaOf(const Pairs& sum) {
   return 1 - sum.different * (sum.total - 1) / expected;
 }
 
-Defined<Interval> AlphaInterval(const std::vector<Pairs>& pairs, double alpha, int replicates) {
+/// @param dropped  replicates whose ratings are all equal
+Defined<Interval> AlphaInterval(const std::vector<Pairs>& pairs, double alpha, int replicates, std::int64_t& dropped) {
   if (pairs.size() < 2 || replicates == 0) return Undefined{"too few clips"};
   SplitMix64 draws(0);
   Resampled resampled{alpha, {}, {}};
   for (int b = 0; b < replicates; ++b) {
     Pairs sum;
     for (std::size_t i = 0; i < pairs.size(); ++i) sum += pairs[draws.Below(pairs.size())];
-    if (const auto drawn_alpha = AlphaOf(sum)) resampled.replicates.push_back(*drawn_alpha);
+    if (const auto drawn_alpha = AlphaOf(sum)) {
+      resampled.replicates.push_back(*drawn_alpha);
+    } else {
+      ++dropped;
+    }
   }
   return IntervalsOf(resampled).percentile;
 }
@@ -115,7 +120,7 @@ std::unordered_map<std::int64_t, std::string_view> FirstAnswers(const std::vecto
   return first;
 }
 
-/// rating.md 1.5: a verdict that came before anybody could have seen the clip.
+/// A verdict that came before anybody could have seen the clip.
 bool IsTooFast(const StudyStore::Ballot& ballot, const StudyClip& clip, double period_s) {
   if (ballot.showing == Showing::kImport) return false;
   const double clip_ms = 1e3 * clip.frames * period_s / std::max(1.0, ballot.max_speed);
@@ -219,7 +224,7 @@ RatingAgreement RatersAgreement(const std::vector<RatedClip>& clips, int raters_
   if (result.clips == 0) return result;
   if (const auto alpha = AlphaOf(sum)) {
     result.alpha = *alpha;
-    result.interval = AlphaInterval(by_clip, *alpha, replicates);
+    result.interval = AlphaInterval(by_clip, *alpha, replicates, result.dropped_replicates);
   } else {
     result.alpha = Undefined{"all ratings are equal"};
   }

@@ -11,7 +11,7 @@
 #include "core/statistics/votes.h"
 #include "core/store_study.h"
 
-/// From votes to labels (rating.md 1.6).
+/// From votes to labels (docs/rating_session.md).
 namespace evac {
 
 /// What became of one clip.
@@ -54,6 +54,7 @@ LabelRates RatesOf(std::span<const RatedClip* const> clips);
 struct RatingAgreement {
   Number alpha = Undefined{"no votes"};                ///< Krippendorff's, nominal, of success, failure and cannot tell
   Defined<Interval> interval = Undefined{"no votes"};  ///< of alpha, percentile bootstrap over clips
+  std::int64_t dropped_replicates = 0;                 ///< of it, as their ratings are all equal
   Number fleiss = Undefined{"no votes"};               ///< of the clips that all have `raters_per_clip` votes
   Number agreement = Undefined{"no votes"};            ///< share of agreeing pairs of votes
   std::int64_t clips = 0;                              ///< with two votes or more

@@ -80,8 +80,12 @@ void WithholdTheVacuous(CorrelationGroup& group) {
 void UseBootstrap(const Defined<BootstrapOf>& bootstrap, const std::string& method, Estimate& estimate,
                   Defined<Interval>& bca) {
   estimate.method = method;
-  estimate.interval = bootstrap ? bootstrap->intervals.percentile : Defined<Interval>(Undefined{bootstrap.reason()});
-  bca = bootstrap ? bootstrap->intervals.bca : Defined<Interval>(Undefined{bootstrap.reason()});
+  estimate.interval = bca = Undefined{bootstrap.reason()};
+  if (!bootstrap) return;
+  estimate.interval = bootstrap->of_record(estimate.confidence);
+  bca = bootstrap->not_as_drawn.empty() ? bootstrap->intervals.bca : Undefined{bootstrap->not_as_drawn};
+  if (estimate.interval && !bootstrap->not_as_drawn.empty())
+    estimate.method += fmt::format(", {}: as far as outcomes that are all alike leave open", bootstrap->not_as_drawn);
 }
 
 }  // namespace

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 #include <httplib.h>
+#include <sys/socket.h>
 
 #include <algorithm>
 #include <atomic>
@@ -39,6 +40,13 @@ void SendFile(const fs::path& file, const char* type, httplib::Response& respons
   });
 }
 
+/// Instead of httplib's own choice, SO_REUSEPORT, by which two programs share a port and each gets some requests. An
+/// address that nobody listens at any more is free at once.
+void TakeFreeAddressAlone(socket_t socket) {
+  const int yes = 1;
+  ::setsockopt(socket, SOL_SOCKET, SO_REUSEADDR, &yes, sizeof yes);
+}
+
 bool IsLoopback(const std::string& host) { return host == "localhost" || host == "::1" || host.starts_with("127."); }
 
 }  // namespace
@@ -64,6 +72,7 @@ struct Dashboard::Server {
       Answer(request, response);
       return httplib::Server::HandlerResponse::Handled;
     });
+    http.set_socket_options(TakeFreeAddressAlone);
     port = options.port == 0 ? http.bind_to_any_port(options.host)
                              : (http.bind_to_port(options.host, options.port) ? options.port : -1);
     if (port < 0) throw InvalidInput("dashboard: {}:{} cannot be listened at", options.host, options.port);

@@ -23,7 +23,8 @@ struct DashboardOptions {
 /// when a store has changed and somebody asks.
 class Dashboard {
  public:
-  /// Listens from here on. @throws InvalidInput if the address cannot be had or an option is out of range.
+  /// Listens from here on. @throws InvalidInput if the address cannot be had, or is another program's, or an option
+  /// is out of range.
   explicit Dashboard(DashboardOptions options);
   ~Dashboard();
   Dashboard(const Dashboard&) = delete;

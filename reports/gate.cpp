@@ -52,7 +52,7 @@ std::string EndOf(const GateRule& rule, const Evidence& evidence, GateOutcome ou
   return why + (rule.on_inconclusive == OnInconclusive::kFail ? "; inconclusive counts as failed here" : "");
 }
 
-/// @param family  how many p-values were corrected together.
+/// @param family  how many p-values were corrected together; 0: none was.
 RuleDecision Finish(const GateRule& rule, Evidence& evidence, std::ptrdiff_t family) {
   RuleDecision& decision = evidence.decision;
   const GateOutcome outcome = OutcomeOf(rule, evidence);
@@ -133,7 +133,9 @@ GateResult Decide(const GateRules& rules, const GateCandidate& candidate, const 
   for (const GateRule& rule : rules.rules) evidences.push_back(Examine(rule, input));
   Correct(rules.correction, evidences);
   const auto family =
-      std::ranges::count_if(evidences, [](const Evidence& one) { return bool(one.decision.p_adjusted); });
+      rules.correction == GateCorrection::kNone
+          ? 0
+          : std::ranges::count_if(evidences, [](const Evidence& one) { return bool(one.decision.p_adjusted); });
   for (std::size_t i = 0; i < evidences.size(); ++i) {
     if (evidences[i].look) result.looks.push_back(*evidences[i].look);
     decision.rules.push_back(Finish(rules.rules[i], evidences[i], family));

@@ -97,8 +97,8 @@ void Describe(const GateRule& rule, const Estimate& difference, std::int64_t n, 
 
 /// The difference of the pairs, its interval on their effective number.
 Estimate DifferenceOf(const GatePairs& pairs, double confidence) {
-  Estimate difference = TangoOfClusters(pairs.all, pairs.effective, confidence);
-  difference.method = OnPairs("Tango", {pairs.all.pairs, pairs.effective.pairs});
+  Estimate difference = TangoOfClusters(pairs.by_state, confidence);
+  difference.method = OnPairs("Tango", PairsOfInterval(pairs.by_state, confidence));
   return difference;
 }
 
@@ -158,16 +158,16 @@ void ComparePairs(const GateRule& rule, const GateInput& input, const GateSides&
     Bet(input, pairs, evidence);
   } else {
     const bool by_margin = rule.test == GateTest::kNonInferiority;
-    decision.p = by_margin
-                     ? PBelow([&](double c) { return TangoDifference(pairs.effective, c).interval; }, -rule.margin)
+    decision.p = by_margin ? PBelow([&](double c) { return TangoOfClusters(pairs.by_state, c).interval; }, -rule.margin)
                  : worse > better ? McNemarExact(pairs.effective.flips).p_exact
                                   : 1.0;
-    decision.statement +=
-        fmt::format("{} pairs, {} better / {} worse, {} ({})", counted.pairs, better, worse, PValue(*decision.p),
-                    OnPairs(by_margin ? "Tango against the margin" : "exact McNemar",
-                            {counted.pairs, pairs.effective.pairs}));
+    decision.statement += fmt::format(
+        "{} pairs, {} better / {} worse, {} ({})", counted.pairs, better, worse, PValue(*decision.p),
+        by_margin ? OnPairs("Tango against the margin", PairsOfInterval(pairs.by_state, PassConfidence(rule)))
+                  : OnPairs("exact McNemar", {counted.pairs, pairs.effective.pairs}));
   }
-  evidence.more = MorePairs(rule, counted, is_bet ? counted.pairs : pairs.effective.pairs);
+  evidence.more = MorePairs(rule, counted,
+                            is_bet ? counted.pairs : PairsOfInterval(pairs.by_state, PassConfidence(rule)).effective);
   decision.counter_examples = std::move(pairs.counter_examples);
 }
 
@@ -177,8 +177,7 @@ void CompareUnpaired(const GateRule& rule, const GateSides& sides, Evidence& evi
   decision.value = ClusteredWilsonInterval(candidate, kShownConfidence);
   decision.baseline = ClusteredWilsonInterval(baseline, kShownConfidence);
   const auto difference = [&](double confidence) {
-    return NewcombeOfRates(ClusteredWilsonInterval(candidate, confidence),
-                           ClusteredWilsonInterval(baseline, confidence));
+    return NewcombeOfRates(RateOfStates(candidate, confidence), RateOfStates(baseline, confidence));
   };
   const Trials here(candidate), there(baseline);
   Describe(rule, difference(PassConfidence(rule)), here.all.trials, evidence);

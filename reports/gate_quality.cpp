@@ -25,6 +25,7 @@ struct Held {
   double threshold = 0;
   bool is_ceiling = false;  ///< good is below
   const char* unit = "episodes";
+  double least_p = 0;  ///< less cannot be shown, however far the interval is
 };
 
 /// From how many on the interval would clear the threshold with power, if the value stays.
@@ -48,7 +49,8 @@ void Hold(const GateRule& rule, const Held& held, Evidence& evidence) {
   if (!held.value.value) {
     decision.p = Undefined{held.value.value.reason()};
   } else {
-    decision.p = held.is_ceiling ? PAbove(held.interval, held.threshold) : PBelow(held.interval, held.threshold);
+    const double p = held.is_ceiling ? PAbove(held.interval, held.threshold) : PBelow(held.interval, held.threshold);
+    decision.p = std::max(p, held.least_p);
   }
   const Defined<Interval>& interval = held.value.interval;
   evidence.shows_good = held.value.value && interval &&
@@ -65,8 +67,7 @@ void HoldRate(const GateRule& rule, const GateSides& sides, Evidence& evidence) 
     trials += count.trials;
   }
   const auto estimate = [=](double confidence) {
-    return has_repeats ? ClusteredWilsonInterval(states, confidence)
-                       : ClopperPearsonInterval(successes, trials, confidence);
+    return has_repeats ? RateOfStates(states, confidence) : ClopperPearsonInterval(successes, trials, confidence);
   };
   evidence.decision.states = trials;
   Hold(rule, {estimate(1 - 2 * rule.alpha), [=](double c) { return estimate(c).interval; }, *rule.at_least}, evidence);
@@ -108,26 +109,32 @@ void HoldCorrelation(const GateRule& rule, const RunSummary& run, const GateSide
             [](double) -> Defined<Interval> { return Undefined{"not resampled"}; },
             rule.at_most.value_or(rule.at_least.value_or(0)), rule.metric == "mmrv",
             "(task, policy) points or initial states"};
-  PairedBootstrap bootstrap;
+  std::string dropped;
   if (held.value.value) {  // the same draws as the report's, at the confidence that is asked
-    bootstrap = PairedStateBootstrap(by_state, group.options.convention, group.options.bootstrap);
+    const PairedBootstrap bootstrap = PairedStateBootstrap(by_state, group.options.convention, group.options.bootstrap);
     if (const auto& resampled = Resampled(bootstrap, rule.metric)) {
-      held.interval = [&resampled](double c) { return IntervalsOf(resampled->resampled, c).percentile; };
+      held.interval = resampled->of_record;
+      held.least_p = 1 / (1 + static_cast<double>(resampled->resampled.replicates.size()));
+      if (resampled->undefined > 0)
+        dropped = fmt::format(", {} of {} replicates had none and were dropped", resampled->undefined,
+                              group.options.bootstrap.replicates);
     } else {
       held.interval = [reason = resampled.reason()](double) -> Defined<Interval> { return Undefined{reason}; };
     }
   }
   held.value.confidence = 1 - 2 * rule.alpha;
   held.value.interval = held.interval(held.value.confidence);
+  if (!held.value.interval) dropped.clear();  // its reason says it
   RuleDecision& decision = evidence.decision;
   for (const PairTable& table : comparison.tables) {
     if (rule.task.empty() || table.task == rule.task) decision.states += table.Counted();
   }
   Hold(rule, held, evidence);
   evidence.more = held.value.value ? evidence.more : "";
-  decision.statement = fmt::format("{} of {} against {}{}: {} ({:g} %) over {}, {}", rule.metric, sides.world,
-                                   run.reference, rule.task.empty() ? "" : " on " + rule.task, NumberWithInterval(held.value), 100 * held.value.confidence,
-                                   Counted(held.value.n, "point"), Counted(decision.states, "pair"));
+  decision.statement = fmt::format("{} of {} against {}{}: {} ({:g} %) over {}, {}{}", rule.metric, sides.world,
+                                   run.reference, rule.task.empty() ? "" : " on " + rule.task,
+                                   NumberWithInterval(held.value), 100 * held.value.confidence,
+                                   Counted(held.value.n, "point"), Counted(decision.states, "pair"), dropped);
 }
 
 void HoldKappa(const GateRule& rule, const RunSummary& run, const GateSides& sides, Evidence& evidence) {
@@ -175,6 +182,14 @@ void CountErrors(const GateRule& rule, const GateSides& sides, Evidence& evidenc
 }
 
 }  // namespace
+
+Estimate RateOfStates(const std::vector<Count>& states, double confidence) {
+  Estimate rate = ClusteredWilsonInterval(states, confidence);
+  const std::int64_t tried = std::ranges::count_if(states, [](const Count& count) { return count.trials > 0; });
+  rate.interval = Interval{std::min(rate.interval->low, WilsonInterval(tried, tried, confidence).interval->low),
+                           std::max(rate.interval->high, WilsonInterval(0, tried, confidence).interval->high)};
+  return rate;
+}
 
 void ExamineQuality(const GateRule& rule, const RunSummary& run, const GateSides& sides, Evidence& evidence) {
   if (rule.test == GateTest::kCiLower) HoldRate(rule, sides, evidence);

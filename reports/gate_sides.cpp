@@ -190,10 +190,9 @@ GatePairs PairUp(const GateSides& sides, const GateData& data) {
       pairs.counter_examples.push_back(
           {task, state, seed, ClipPath(data.candidate, one->video), ClipPath(*data.baseline, partner->second->video)});
   }
-  std::vector<PairedOutcomes> clusters;
-  for (const auto& [state, outcomes] : states) clusters.push_back(outcomes);
-  pairs.all = SumOf(clusters);
-  pairs.effective = EffectivePairs(clusters);
+  for (const auto& [state, outcomes] : states) pairs.by_state.push_back(outcomes);
+  pairs.all = SumOf(pairs.by_state);
+  pairs.effective = EffectivePairs(pairs.by_state);
   pairs.candidate = Values(candidate);
   pairs.baseline = Values(baseline);
   return pairs;

@@ -38,7 +38,8 @@ GateSides SidesOf(const GateRule& rule, const GateData& data);
 
 /// The states that count on both sides. "First" is the candidate: flips.only_first are for the better.
 struct GatePairs {
-  PairedOutcomes all;
+  std::vector<PairedOutcomes> by_state;    ///< by (task, initial state)
+  PairedOutcomes all;                      ///< of them together
   PairedOutcomes effective;                ///< where states repeat (several seeds), what the pairs tell as much as
   PairedOutcomes one_each;                 ///< one pair of each state: the first seed that counts in the baseline, so
                                            ///< that a growing run adds pairs and exchanges none

@@ -42,8 +42,9 @@ HeadlineItem CandidateItem(const Candidate& candidate) {
     const std::string n = all.is_paired
                               ? Counted(all.shared, "pair")
                               : fmt::format("{} and {}", all.first_episodes, Counted(all.second_episodes, "episode"));
-    text += fmt::format(": {} against {}, {} ({}, {})", Percent(*all.first.value), Percent(*all.second.value),
-                        PointsWithInterval(all.difference), n, PValue(*candidate.p_holm));
+    text += fmt::format(": {} against {}, {}{} ({}, {})", Percent(*all.first.value), Percent(*all.second.value),
+                        PointsWithInterval(all.difference), all.stratified_se ? " task by task" : "", n,
+                        PValue(*candidate.p_holm));
   } else {
     text += ": no episode of both is judged";
   }

@@ -48,9 +48,8 @@ struct Said {
 Estimate BiasOf(const ConfusionByState& states, double confidence) {
   std::vector<PairedOutcomes> clusters;
   for (const auto& [state, c] : states) clusters.push_back({{c.only_judge_success, c.only_human_success}, c.total()});
-  const PairedOutcomes all = SumOf(clusters), effective = EffectivePairs(clusters);
-  Estimate bias = TangoOfClusters(all, effective, confidence);
-  bias.method = OnPairs("Tango", {all.pairs, effective.pairs});
+  Estimate bias = TangoOfClusters(clusters, confidence);
+  bias.method = OnPairs("Tango", PairsOfInterval(clusters, confidence));
   return bias;
 }
 

@@ -10,7 +10,7 @@
 #include "reports/summary.h"
 
 /// How far each judge may be believed: against the best judge there is, in each world, since a judge that reads real
-/// videos well may misread imagined ones (statistics.md 3.3).
+/// videos well may misread imagined ones (docs/statistics.md).
 namespace evac {
 
 /// One judge in one world.

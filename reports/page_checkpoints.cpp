@@ -26,7 +26,8 @@ std::string CheckpointsPart(const ReportData& report) {
   std::string html =
       "<section id=\"checkpoints\"><h2>Checkpoints</h2><p class=\"quiet\">Success rate by checkpoint, Wilson "
       "intervals. "
-      "The sentence compares the last checkpoint with the first one, on the same initial states.</p>";
+      "The sentence compares the last checkpoint with the first one, on the same initial states where at least 80 % of "
+      "them are shared; else it says “unpaired”.</p>";
   std::string policy;
   for (const CheckpointCurve& curve : report.checkpoints) {
     if (curve.policy != policy) {

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <string_view>
+#include <utility>
 
 #include "reports/html.h"
 #include "reports/page_parts.h"
@@ -34,10 +35,12 @@ std::string Example(const CounterExample& example, const RunSummary& summary, co
 std::string Examples(const RuleDecision& rule, const RunSummary& summary, const PageOptions& options) {
   if (rule.counter_examples.empty()) return "";
   std::string items;
-  for (std::size_t i = 0; i < rule.counter_examples.size() && i < kMostExamples; ++i)
-    items += Example(rule.counter_examples[i], summary, options);
-  return fmt::format("<details><summary>{}</summary><ul class=\"flips\">{}</ul></details>",
-                     Counted(static_cast<std::int64_t>(rule.counter_examples.size()), "counter-example"), items);
+  const std::size_t shown = std::min(rule.counter_examples.size(), kMostExamples);
+  for (std::size_t i = 0; i < shown; ++i) items += Example(rule.counter_examples[i], summary, options);
+  const std::int64_t all = std::max(rule.flips_worse, std::ssize(rule.counter_examples));  // a bet is on fewer
+  return fmt::format("<details><summary>{}{}</summary><ul class=\"flips\">{}</ul></details>",
+                     Counted(all, "counter-example"),
+                     std::cmp_less(shown, all) ? fmt::format(", the first {}", shown) : "", items);
 }
 
 std::string Rule(const RuleDecision& rule, const RunSummary& summary, const PageOptions& options) {

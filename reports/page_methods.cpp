@@ -23,8 +23,8 @@ std::string Notes(const RunSummary& summary) {
   }
   html += fmt::format(
       "<p>Pairs share task, initial state, policy, checkpoint and seed. McNemar’s test is exact and two-sided, on the "
-      "effective number of pairs where an initial state was tried with several seeds; decided below p = {}; not "
-      "corrected for the number of tests.</p>",
+      "effective number of pairs where initial states repeat (seeds, policies); decided below p = {}; not corrected "
+      "for the number of tests.</p>",
       kAlpha);
   html += fmt::format(
       "<p>“Follows closely” means that the whole interval of Pearson lies above {}; “in direction”, above 0. Fewer "

@@ -1,7 +1,9 @@
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <map>
+#include <set>
 
 #include "reports/charts.h"
 #include "reports/counted_judges.h"
@@ -129,10 +131,11 @@ std::string RatesPart(const ReportData& report) {
       "Wilson interval"
       ", clustered by initial state where states repeat. Errors, “cannot tell” and invalid verdicts stand apart and "
       "are in no rate.";
-  if (report.letters.pairs > 0) {
+  if (const std::set<std::string>& unpaired = report.letters.unpaired_tests; report.letters.pairs > 0) {
     html += fmt::format(
         " Policies that share a letter, on one task in one world, do not differ significantly: exact McNemar over "
-        "shared initial states (on their effective number where states repeat), Holm over {} of a world, {:.0f} %.",
+        "shared initial states{} (on their effective number where states repeat), Holm over {} of a world, {:.0f} %.",
+        unpaired.empty() ? "" : fmt::format(", {} where fewer than 80 % are shared", fmt::join(unpaired, " or ")),
         Counted(report.letters.pairs, "pair"), 100 * (1 - summary.options.confidence));
   }
   html += "</p>";

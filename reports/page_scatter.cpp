@@ -50,6 +50,8 @@ std::string StatisticsTable(const WorldComparison& comparison) {
   html += StatisticRow("MMRV", group.mmrv, "0: no two ranked wrongly");
   html += "</tbody></table>";
   std::string notes = fmt::format("Intervals: {}. ", Escaped(group.pearson.method));
+  if (group.mmrv.interval && group.mmrv.method != group.pearson.method)
+    notes += fmt::format("Of MMRV: {}. ", Escaped(group.mmrv.method));
   if (group.undefined_replicates > 0)
     notes += fmt::format("{} replicates without a defined Pearson were dropped. ", group.undefined_replicates);
   notes += fmt::format("MMRV: {}; {} among the points.", Escaped(Name(group.options.convention)),

@@ -51,7 +51,8 @@ std::string Partings(const ReportData& report, const std::string& world) {
   std::string html = fmt::format(
       "<h3>Where {0} parts from {1}</h3><p class=\"quiet\">Among the pairs that had reached every stage before: how "
       "many "
-      "went on in one world alone. Exact McNemar, Holm over this table.</p><div class=\"wide\"><table "
+      "went on in one world alone. Exact McNemar on the effective number of pairs where initial states repeat (seeds, "
+      "policies), Holm over this table.</p><div class=\"wide\"><table "
       "class=\"points\"><thead><tr><th scope=\"col\">task</th><th scope=\"col\">stage</th><th scope=\"col\">{0} is</th>"
       "<th scope=\"col\" class=\"num\">pairs</th><th scope=\"col\" class=\"num\">only {0}</th><th scope=\"col\" "
       "class=\"num\">only {1}</th><th scope=\"col\" class=\"num\">after Holm</th></tr></thead><tbody>",

@@ -47,7 +47,7 @@ std::string FlipList(const RunSummary& summary, const PairTable& table, const Pa
           ? fmt::format("<p class=\"quiet\">The first {}; select a cell of the strip for any.</p>", kMostListed)
           : "";
   return fmt::format("<details><summary>{}</summary><ul class=\"flips\">{}</ul>{}</details>",
-                     Counted(table.real_only + table.other_only, "flipped state"), items, more);
+                     Counted(table.real_only + table.other_only, "flipped pair"), items, more);
 }
 
 std::string Strip(const RunSummary& summary, const WorldComparison& comparison, const PairTable& table) {
@@ -57,8 +57,8 @@ std::string Strip(const RunSummary& summary, const WorldComparison& comparison, 
   return fmt::format(
       "<div class=\"states\" role=\"group\" aria-label=\"{}\" data-task=\"{}\" data-policy=\"{}\" "
       "data-world=\"{}\">{}</div><p class=\"pointed\" aria-live=\"polite\"></p>",
-      Escaped(fmt::format("{} initial states of {}, {}", states.size(), table.task, table.policy)), Escaped(table.task),
-      Escaped(table.policy), Escaped(comparison.other), StateStrip(states));
+      Escaped(fmt::format("{} of {}, {}", Counted(std::ssize(states), "pair"), table.task, table.policy)),
+      Escaped(table.task), Escaped(table.policy), Escaped(comparison.other), StateStrip(states));
 }
 
 std::string TwoByTwo(const WorldComparison& comparison, const PairTable& table) {

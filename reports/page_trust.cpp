@@ -12,6 +12,11 @@ namespace {
 
 std::string RateOrReason(const Estimate& rate) { return Escaped(PercentWithInterval(rate)); }
 
+std::string Tested(const TaskTrust& task) {
+  if (task.pairs.n() == 0) return "–";
+  return OnPairs(PValue(task.test.p_exact), {task.pairs.n(), task.tested_pairs});
+}
+
 std::string TaskRow(const TaskTrust& task, const TrustReport& trust) {
   const std::string statement = TrustStatement(task, trust);
   const std::string more = task.trust != Trust::kUnknown ? ""
@@ -23,7 +28,7 @@ std::string TaskRow(const TaskTrust& task, const TrustReport& trust) {
       "class=\"more-pairs\">{}</td></tr>",
       Escaped(statement), Breakable(task.task), Tag(Name(task.trust)), BiasStrip(task.bias, trust.options.margin),
       Escaped(PointsWithInterval(task.bias)), task.pairs.n(), Escaped(NumberWithInterval(task.agreement.kappa)),
-      task.pairs.n() > 0 ? PValue(task.test.p_exact) : "–", more.empty() ? "–" : more);
+      Escaped(Tested(task)), more.empty() ? "–" : more);
 }
 
 std::string TaskTable(const TrustReport& trust) {

@@ -20,12 +20,40 @@ void Require(bool holds, const char* option, double found, const char* wanted) {
   if (!holds) throw InvalidInput("plan: --{} is {}, wanted {}", option, found, wanted);
 }
 
+constexpr double kUsualFlips = 0.2, kRounding = 1e-9;
+
+/// The other policy's rate: towards the side with room.
+double OtherRate(const PlanOptions& o) {
+  const double above = o.rate + o.difference, below = o.rate - o.difference;
+  if (above <= 1 + kRounding) return std::min(1.0, above);
+  return std::abs(below) < kRounding ? 0 : below;
+}
+
+/// In how many states two such policies can differ: beside the difference, as often either way as the worse succeeds
+/// and the better fails.
+double MostFlips(const PlanOptions& o) {
+  const auto [worse, better] = std::minmax({o.rate, OtherRate(o)});
+  return o.difference + 2 * std::min(worse, 1 - better);
+}
+
+void CheckFlips(const PlanOptions& o) {
+  if (!o.flips) return;
+  const double flips = *o.flips, most = MostFlips(o);
+  Require(flips > 0 && flips <= 1, "flips", flips, "above 0 and at most 1");
+  Require(flips >= o.difference, "flips", flips, "at least the difference: without flips there is none");
+  const std::string wanted = fmt::format("at most {:.4g}: of {} against {} no more can differ", most,
+                                         Percent(OtherRate(o)), Percent(o.rate));
+  Require(flips <= most + kRounding, "flips", flips, wanted.c_str());
+}
+
 void Check(const PlanOptions& o) {
   const auto inside = [](double x) { return x > 0 && x < 1; };
   Require(inside(o.rate), "rate", o.rate, "between 0 and 1");
   Require(inside(o.difference), "difference", o.difference, "between 0 and 1");
-  Require(o.flips > 0 && o.flips <= 1, "flips", o.flips, "above 0 and at most 1");
-  Require(o.flips >= o.difference, "flips", o.flips, "at least the difference: without flips there is none");
+  const std::string room =
+      fmt::format("at most {:.4g}, as far as a rate can be from {:g}", std::max(o.rate, 1 - o.rate), o.rate);
+  Require(OtherRate(o) >= 0, "difference", o.difference, room.c_str());
+  CheckFlips(o);
   Require(o.trials >= 1, "trials", static_cast<double>(o.trials), "at least 1");
   Require(inside(o.margin), "margin", o.margin, "between 0 and 1");
   Require(inside(o.correlation), "correlation", o.correlation, "between 0 and 1");
@@ -51,12 +79,9 @@ PlanRow SizeRow(std::string key, std::string question, const SampleSize& size, s
 
 double Confidence(const PlanOptions& options) { return 1 - options.promise.alpha; }
 
-/// The other policy's rate: towards the side with room.
-double OtherRate(const PlanOptions& o) {
-  return o.rate + o.difference <= 1 ? o.rate + o.difference : o.rate - o.difference;
+FlipRates FlipsOf(const PlanOptions& o) {
+  return {(*o.flips + o.difference) / 2, std::max(0.0, *o.flips - o.difference) / 2};
 }
-
-FlipRates FlipsOf(const PlanOptions& o) { return {(o.flips + o.difference) / 2, (o.flips - o.difference) / 2}; }
 
 void AddRates(const PlanOptions& o, std::vector<PlanRow>& rows) {
   const double half_width = WilsonHalfWidth(o.rate, o.trials, Confidence(o));
@@ -75,7 +100,7 @@ void AddDifferences(const PlanOptions& o, std::vector<PlanRow>& rows) {
   const std::string seen = fmt::format("to see {} against {}", Percent(OtherRate(o)), Percent(o.rate));
   const FlipRates flips = FlipsOf(o);
   rows.push_back(SizeRow("paired_states",
-                         fmt::format("initial states {}, same states, {} of them flip", seen, Percent(o.flips)),
+                         fmt::format("initial states {}, same states, {} of them flip", seen, Percent(*o.flips)),
                          PairsForMcNemar(flips, o.promise), "exact McNemar"));
   rows.push_back(SizeRow("unpaired_episodes", fmt::format("episodes of each policy {}, different states", seen),
                          TrialsPerPolicy(o.rate, OtherRate(o), o.promise), "normal approximation"));
@@ -88,7 +113,7 @@ void AddDifferences(const PlanOptions& o, std::vector<PlanRow>& rows) {
                      detectable ? InPoints(*detectable) : "", "normal approximation"));
   rows.push_back(SizeRow("non_inferiority_pairs",
                          fmt::format("initial states to show \"not worse by {}\", paired", InPoints(o.margin)),
-                         PairsForNonInferiority(o.flips, o.margin, o.promise), "normal approximation, one-sided"));
+                         PairsForNonInferiority(*o.flips, o.margin, o.promise), "normal approximation, one-sided"));
   rows.push_back(SizeRow("non_inferiority_episodes", fmt::format("episodes of each policy to show that, unpaired"),
                          TrialsForNonInferiority(o.rate, o.margin, o.promise), "normal approximation, one-sided"));
 }
@@ -119,8 +144,9 @@ void AddReal(const PlanOptions& o, std::vector<PlanRow>& rows) {
     const auto part = [&](double share) {
       return static_cast<std::int64_t>(std::lround(share * static_cast<double>(n)));
     };
-    const std::int64_t successes = part(o.rate), only_real = part(o.rate * (1 - o.agreement)),
-                       only_model = part((1 - o.rate) * (1 - o.agreement));
+    const std::int64_t successes = part(o.rate);  // halves are rounded up, each by itself
+    const std::int64_t only_real = std::min(successes, part(o.rate * (1 - o.agreement))),
+                       only_model = std::min(n - successes, part((1 - o.rate) * (1 - o.agreement)));
     const BothWorlds table{successes - only_real, only_real, only_model, n - successes - only_model};
     const double model_rate = o.rate * o.agreement + (1 - o.rate) * (1 - o.agreement);
     const Count further{std::llround(model_rate * static_cast<double>(o.imagined)), o.imagined};
@@ -171,12 +197,14 @@ std::vector<std::string> Words(const PlanOptions& o, const std::vector<PlanRow>&
 Plan MakePlan(const PlanOptions& options) {
   Check(options);
   Plan plan{options, {}, {}};
-  AddRates(options, plan.rows);
-  AddDifferences(options, plan.rows);
-  AddCorrelation(options, plan.rows);
-  AddRaters(options, plan.rows);
-  AddReal(options, plan.rows);
-  plan.words = Words(options, plan.rows);
+  const PlanOptions& o = plan.options;
+  if (!o.flips) plan.options.flips = std::clamp(kUsualFlips, o.difference, std::max(o.difference, MostFlips(o)));
+  AddRates(o, plan.rows);
+  AddDifferences(o, plan.rows);
+  AddCorrelation(o, plan.rows);
+  AddRaters(o, plan.rows);
+  AddReal(o, plan.rows);
+  plan.words = Words(o, plan.rows);
   return plan;
 }
 
@@ -193,7 +221,7 @@ std::string PlanText(const Plan& plan) {
 nlohmann::ordered_json PlanJson(const Plan& plan) {
   const PlanOptions& o = plan.options;
   nlohmann::ordered_json json = {{"schema", 1}};
-  json["options"] = {{"rate", o.rate},           {"difference", o.difference}, {"flips", o.flips},
+  json["options"] = {{"rate", o.rate},           {"difference", o.difference}, {"flips", *o.flips},
                      {"trials", o.trials},       {"margin", o.margin},         {"correlation", o.correlation},
                      {"accuracy", o.accuracy},   {"right", o.wanted_right},    {"imagined", o.imagined},
                      {"agreement", o.agreement}, {"alpha", o.promise.alpha},   {"power", o.promise.power}};

@@ -82,7 +82,7 @@ Flips FlipsOf(const Side& first, const Side& second) {
 }
 
 /// Pairs by initial state, so that repeats of one do not count as if they were new.
-PairedOutcomes EffectivePairsOf(const Side& first, const Side& second) {
+std::vector<PairedOutcomes> PairsByState(const Side& first, const Side& second) {
   std::map<std::string, PairedOutcomes> states;
   for (const auto& [where, judged] : first.counted) {
     const auto partner = second.counted.find(where);
@@ -94,7 +94,7 @@ PairedOutcomes EffectivePairsOf(const Side& first, const Side& second) {
   }
   std::vector<PairedOutcomes> clusters;
   for (const auto& [state, outcomes] : states) clusters.push_back(outcomes);
-  return EffectivePairs(clusters);
+  return clusters;
 }
 
 Winner WinnerOf(const ComparisonRow& row, const Number& p, double alpha) {
@@ -147,10 +147,11 @@ void Decide(const ComparisonOptions& options, std::size_t family, ComparisonRow&
 void ComparePaired(const Side& first, const Side& second, const ComparisonOptions& options, ComparisonRow& row) {
   row.first = RateOfSide(SharedPart(first, second), options.confidence());
   row.second = RateOfSide(SharedPart(second, first), options.confidence());
-  const PairedOutcomes effective = EffectivePairsOf(first, second);
-  row.difference = TangoOfClusters({row.flips, row.shared}, effective, options.confidence());
+  const std::vector<PairedOutcomes> states = PairsByState(first, second);
+  const PairedOutcomes effective = EffectivePairs(states);
+  row.difference = TangoOfClusters(states, options.confidence());
+  row.difference.method = OnPairs("Tango", PairsOfInterval(states, options.confidence()));
   row.pairs = {row.shared, effective.pairs};
-  row.difference.method = OnPairs("Tango", row.pairs);
   row.test = OnPairs("exact McNemar", row.pairs);
   if (row.shared > 0) row.p = McNemarExact(effective.flips).p_exact;
 }

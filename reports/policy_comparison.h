@@ -11,7 +11,7 @@
 #include "core/statistics/rates.h"
 #include "reports/outcome.h"
 
-/// Which of two policies is better, and how sure: per task and over all tasks (statistics.md 3.2). Paired by initial
+/// Which of two policies is better, and how sure: per task and over all tasks (docs/statistics.md). Paired by initial
 /// state and seed wherever at least 80 % of them are shared. Repeats of an initial state are not new states: rates are
 /// of all episodes; intervals, tests and plans of what these tell as much as. Output: policy_comparison_output.h.
 namespace evac {

@@ -133,8 +133,9 @@ std::string DecisionOf(const PolicyComparison& comparison) {
   const auto rate = [](const Estimate& estimate) {
     return estimate.value ? Percent(*estimate.value) : "undefined: " + estimate.value.reason();
   };
-  const std::string how = fmt::format("{} against {}, {}, p {} ({}, {})", rate(all.first), rate(all.second),
-                                      Points(all.difference), all.p ? PValue(*all.p).substr(2) : "undefined", all.test,
+  const std::string how = fmt::format("{} against {}, {}{}, p {} ({}, {})", rate(all.first), rate(all.second),
+                                      Points(all.difference), all.stratified_se ? " task by task" : "",
+                                      all.p ? PValue(*all.p).substr(2) : "undefined", all.test,
                                       all.is_paired ? Counted(all.shared, "pair")
                                                     : fmt::format("{} and {} episodes, not on the same initial states",
                                                                   all.first_episodes, all.second_episodes));

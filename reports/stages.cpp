@@ -180,9 +180,9 @@ std::string PartingInWords(const StageParting& parting, const std::string& refer
   const std::string lead = decided ? fmt::format("{} is {} than {} at {}", parting.world,
                                                  only_other > only_real ? "kinder" : "harder", reference, parting.stage)
                                    : fmt::format("not decided at {}", parting.stage);
-  return fmt::format("{}: of {}, {} went on in {} alone and {} in {} alone (exact McNemar, {} after Holm)", lead,
+  return fmt::format("{}: of {}, {} went on in {} alone and {} in {} alone ({}, {} after Holm)", lead,
                      Counted(parting.pairs, "pair"), only_other, parting.world, only_real, reference,
-                     PValue(*parting.p_holm));
+                     OnPairs("exact McNemar", {parting.pairs, parting.effective_pairs}), PValue(*parting.p_holm));
 }
 
 }  // namespace evac

@@ -87,15 +87,17 @@ void AddFindings(const RunSummary& summary, Bounded& page) {
 void AddCounterExamples(const GateDecision& decision, Bounded& page) {
   for (const RuleDecision& rule : decision.rules) {
     if (rule.counter_examples.empty() || page.IsFull()) continue;
-    page.Add(fmt::format("<details><summary>{}: {} where only the baseline succeeded</summary>\n\n", TagText(rule.name),
-                         Counted(rule.flips_worse, "initial state")));
+    const std::int64_t listed = std::ssize(rule.counter_examples), all = std::max(rule.flips_worse, listed);
+    page.Add(fmt::format("<details><summary>{}: {} where only the baseline succeeded{}</summary>\n\n",
+                         TagText(rule.name), Counted(all, "pair"),
+                         listed < all ? fmt::format(", the first {}", listed) : ""));
     page.Add("| task | initial state | seed | candidate | baseline |\n|---|---|---|---|---|\n");
     for (const CounterExample& example : rule.counter_examples) {
       page.AddRow(fmt::format("| {} | {} | {} | {} | {} |\n", MarkdownText(example.task),
                               MarkdownText(example.initial_state), example.seed, MarkdownText(example.candidate_video),
                               MarkdownText(example.baseline_video)));
     }
-    page.EndRows("initial states");
+    page.EndRows("pairs");
     page.Add("\n</details>\n\n");
   }
 }

@@ -107,10 +107,11 @@ ConfusionByState ConfusionsOf(const std::string& task, const std::map<std::strin
   return states;
 }
 
-PairedOutcomes EffectiveOf(const std::map<std::string, BothWorlds>& tables) {
+/// model - real of each initial state.
+std::vector<PairedOutcomes> DifferencesOf(const std::map<std::string, BothWorlds>& tables) {
   std::vector<PairedOutcomes> clusters;
   for (const auto& [state, table] : tables) clusters.push_back({{table.only_model, table.only_real}, table.n()});
-  return EffectivePairs(clusters);
+  return clusters;
 }
 
 std::vector<bool> Flags(const Count& count) {
@@ -128,7 +129,7 @@ void Foretell(const PpiStates& states, const std::vector<BothOutcomes>& first_of
   std::vector<PairedOutcomes> clusters;
   for (const BothWorlds& table : states.paired) clusters.push_back({{table.only_model, table.only_real}, table.n()});
   rate.predicted = PpiMoverByState(states, confidence);
-  rate.predicted.method = OnPairs(rate.predicted.method, {rate.pairs.n(), EffectivePairs(clusters).pairs});
+  rate.predicted.method = OnPairs(rate.predicted.method, PairsOfInterval(clusters, confidence));
   rate.tuned = PpiMeanByState(states, PpiWeight::kTuned, confidence);
   rate.betting =
       PpiBetting(first_of_state, Flags(first_further), {.confidence = confidence, .seed = options.bootstrap.seed});
@@ -163,7 +164,7 @@ PredictedRate Predict(const std::string& policy, const Paired& paired, const Tru
 }
 
 /// The policies' rates over the pairs, with their states, for the bootstrap.
-Estimate CorrelationOver(const std::vector<std::string>& policies, const Paired& paired, const TrustOptions& options) {
+TaskPoints PointsOver(const std::vector<std::string>& policies, const Paired& paired) {
   std::set<std::string> states;
   for (const auto& [key, pairs] : paired.pairs) states.insert(key.second);
   TaskPoints task;
@@ -188,17 +189,23 @@ Estimate CorrelationOver(const std::vector<std::string>& policies, const Paired&
     task.points.push_back(std::move(point));
     task.outcomes.points.push_back(std::move(outcomes));
   }
-  if (task.points.size() < kMinTrustPolicies) {
-    Estimate none;
-    none.n = static_cast<std::int64_t>(task.points.size());
-    none.value =
-        Undefined{fmt::format("{} policies, and fewer than {} say nothing", task.points.size(), kMinTrustPolicies)};
-    none.interval = Undefined{none.value.reason()};
-    return none;
+  return task;
+}
+
+void AddCorrelation(const TaskPoints& points, const TrustOptions& options, TaskTrust& task) {
+  if (points.points.size() < kMinTrustPolicies) {
+    task.correlation.n = std::ssize(points.points);
+    const Undefined too_few{
+        fmt::format("{} policies, and fewer than {} say nothing", points.points.size(), kMinTrustPolicies)};
+    task.correlation.value = too_few;
+    task.correlation.interval = too_few;
+    return;
   }
   BootstrapOptions bootstrap = options.bootstrap;
   bootstrap.confidence = options.confidence;
-  return CorrelateOutcomes("", {task}, {.convention = {}, .bootstrap = bootstrap}).pearson;
+  const CorrelationGroup group = CorrelateOutcomes("", {points}, {.convention = {}, .bootstrap = bootstrap});
+  task.correlation = group.pearson;
+  task.undefined_replicates = group.undefined_replicates;
 }
 
 /// Rates over the pairs, each initial state a cluster.
@@ -216,11 +223,15 @@ void AddRates(const std::map<std::string, BothWorlds>& tables, double confidence
 
 /// model - real and its test, on the effective number of pairs.
 void AddBias(const std::map<std::string, BothWorlds>& tables, double confidence, TaskTrust& task) {
-  const PairedOutcomes effective = EffectiveOf(tables);
-  task.bias = TangoOfClusters({{task.pairs.only_model, task.pairs.only_real}, task.pairs.n()}, effective, confidence);
-  task.bias.method = OnPairs("Tango", {task.pairs.n(), effective.pairs});
+  const std::vector<PairedOutcomes> states = DifferencesOf(tables);
+  const Repeated pairs = PairsOfInterval(states, confidence);
+  task.states = std::ssize(states);
+  task.bias = TangoOfClusters(states, confidence);
+  task.bias.method = OnPairs("Tango", pairs);
+  task.effective_pairs = pairs.effective;
+  const PairedOutcomes effective = EffectivePairs(states);
   task.test = McNemarExact(effective.flips);
-  task.effective_pairs = effective.pairs;
+  task.tested_pairs = effective.pairs;
 }
 
 /// From how many pairs on the bias's interval would no longer reach the margin it is nearest to; a further pair is
@@ -234,7 +245,12 @@ Defined<std::int64_t> MorePairs(const TaskTrust& task, const TrustOptions& optio
   if (distance < 0.005) return Undefined{"the bias seen is at the margin"};
   const double flips = static_cast<double>(pairs.discordant()) * effective / n;
   const double variance = (flips + 1) / (effective + 1) - bias * bias;
-  const auto wanted = static_cast<std::int64_t>(std::ceil(z * z * variance / (distance * distance) * n / effective));
+  const double by_flips = z * z * variance / (distance * distance) * n / effective;
+  // Never surer than without any flip, where each state is one pair.
+  const double by_states = std::abs(bias) < options.margin
+                               ? z * z * (1 - options.margin) / options.margin * n / static_cast<double>(task.states)
+                               : 0;
+  const auto wanted = static_cast<std::int64_t>(std::ceil(std::max(by_flips, by_states)));
   if (wanted > kMostPairsAskedFor) {
     return Undefined{fmt::format("the bias seen is so near the margin that {} pairs would not do", kMostPairsAskedFor)};
   }
@@ -272,7 +288,7 @@ TaskTrust TrustTask(const std::string& name, const ByState& real, const ByState&
     rate.real = ClusteredWilsonInterval(CountsOf(real, policy), options.confidence);
     rate.model = ClusteredWilsonInterval(CountsOf(model, policy), options.confidence);
   }
-  task.correlation = CorrelationOver({policies.begin(), policies.end()}, paired, options);
+  AddCorrelation(PointsOver({policies.begin(), policies.end()}, paired), options, task);
   Decide(options, task);
   return task;
 }

@@ -12,7 +12,7 @@
 #include "reports/summary.h"
 
 /// How far a world model may be trusted for each task, from trials in both worlds on the same initial states, and what
-/// the real success rate is, from few real and many imagined trials (statistics.md 3.9). Output: trust_output.h.
+/// the real success rate is, from few real and many imagined trials (docs/statistics.md). Output: trust_output.h.
 namespace evac {
 
 /// One outcome of one policy in one initial state.
@@ -59,14 +59,17 @@ struct PredictedRate {
 
 struct TaskTrust {
   std::string task;
-  std::int64_t effective_pairs = 0;  ///< what `pairs` tell as much as: repeats and shared states considered
-  BothWorlds pairs;                  ///< over all policies
-  Estimate real, model;              ///< rates over the pairs, clustered by state
-  Estimate bias;                     ///< model - real over the pairs, Tango
-  McNemar test;                      ///< of "no bias", on the effective pairs
-  ConfusionStatistics agreement;     ///< the model as judge of what the robot would do: kappa
-  Estimate same;                     ///< share of pairs with one outcome, clustered by state
-  Estimate correlation;              ///< Pearson over policies, undefined below kMinTrustPolicies
+  std::int64_t states = 0;                ///< initial states with a pair
+  std::int64_t effective_pairs = 0;       ///< that the bias rests on: repeats and shared states considered
+  std::int64_t tested_pairs = 0;          ///< the same of the test, to which pairs that agree are nothing
+  BothWorlds pairs;                       ///< over all policies
+  Estimate real, model;                   ///< rates over the pairs, clustered by state
+  Estimate bias;                          ///< model - real over the pairs, Tango
+  McNemar test;                           ///< of "no bias", on the effective pairs
+  ConfusionStatistics agreement;          ///< the model as judge of what the robot would do: kappa
+  Estimate same;                          ///< share of pairs with one outcome, clustered by state
+  Estimate correlation;                   ///< Pearson over policies, undefined below kMinTrustPolicies
+  std::int64_t undefined_replicates = 0;  ///< of its bootstrap, dropped
   Trust trust = Trust::kUnknown;
   Defined<std::int64_t> more = Undefined{"decided"};  ///< further pairs that would decide, if the bias is that seen
   std::vector<PredictedRate> policies;

@@ -32,7 +32,7 @@ std::string AgreementLine(const TaskTrust& task) {
   return fmt::format(
       "  per state: same outcome in {} of {}, kappa {}; flips {} model only / {} real only, {} {}\n",
       task.pairs.both + task.pairs.neither, task.pairs.n(), NumberWithInterval(task.agreement.kappa),
-      task.pairs.only_model, task.pairs.only_real, OnPairs("exact McNemar", {task.pairs.n(), task.effective_pairs}),
+      task.pairs.only_model, task.pairs.only_real, OnPairs("exact McNemar", {task.pairs.n(), task.tested_pairs}),
       PValue(task.test.p_exact));
 }
 
@@ -42,21 +42,28 @@ std::string CorrelationLine(const TaskTrust& task) {
         "  correlation: over {} it would mean nothing (wanted {} or more); the agreement per state stands for it\n",
         Counted(task.correlation.n, "policy", "policies"), kMinTrustPolicies);
   }
-  return fmt::format("  correlation over {}: Pearson {}\n", Counted(task.correlation.n, "policy", "policies"),
-                     NumberWithInterval(task.correlation));
+  const std::string dropped = fmt::format(", {} without one dropped", Counted(task.undefined_replicates, "replicate"));
+  return fmt::format("  correlation over {}: Pearson {}{}\n", Counted(task.correlation.n, "policy", "policies"),
+                     NumberWithInterval(task.correlation),
+                     task.undefined_replicates > 0 && task.correlation.interval ? dropped : "");
+}
+
+/// What is made of a rate and a difference may lie outside [0, 1], unlike its interval.
+Number AsShare(const Number& value) { return value ? Number(std::clamp(*value, 0.0, 1.0)) : value; }
+
+Estimate AsShare(Estimate estimate) {
+  estimate.value = AsShare(estimate.value);
+  return estimate;
 }
 
 std::string Tuned(const PredictedRate& rate) {
   if (!rate.tuned.value || rate.further.trials == 0) return "-";
-  return fmt::format("{} (weight {:.2f})", Percent(*rate.tuned.value), rate.tuned.lambda);
+  return fmt::format("{} (weight {:.2f})", Percent(*AsShare(rate.tuned.value)), rate.tuned.lambda);
 }
 
-/// MOVER's value may lie outside [0, 1]; its interval does not.
 std::string Predicted(const PredictedRate& rate) {
   if (!rate.predicted.value) return "as real alone: " + rate.predicted.value.reason();
-  Estimate shown = rate.predicted;
-  shown.value = std::min(1.0, std::max(0.0, *shown.value));
-  return PercentWithInterval(shown);
+  return PercentWithInterval(AsShare(rate.predicted));
 }
 
 std::string RatesTable(const TaskTrust& task) {
@@ -81,9 +88,9 @@ Json PolicyJson(const PredictedRate& rate) {
   json["real_without_partner"] = rate.real_alone;
   json["real"] = JsonOf(rate.real);
   json["model"] = JsonOf(rate.model);
-  json["predicted"] = JsonOf(rate.predicted);
-  json["predicted_by_betting"] = JsonOf(rate.betting);
-  Put(json, "ppi_plus_plus", rate.tuned.value);
+  json["predicted"] = JsonOf(AsShare(rate.predicted));
+  json["predicted_by_betting"] = JsonOf(AsShare(rate.betting));
+  Put(json, "ppi_plus_plus", AsShare(rate.tuned.value));
   json["ppi_plus_plus_weight"] = rate.tuned.lambda;
   json["ppi_plus_plus_interval"] =
       rate.tuned.allowed ? Json::array({rate.tuned.allowed->low, rate.tuned.allowed->high}) : Json(nullptr);
@@ -106,6 +113,7 @@ Json TaskJson(const TaskTrust& task, const TrustReport& report) {
   json["kappa"] = JsonOf(task.agreement.kappa);
   Put(json, "mcnemar_p_exact", task.pairs.n() > 0 ? Number(task.test.p_exact) : Undefined{"no pairs"});
   json["pearson"] = JsonOf(task.correlation);
+  json["undefined_replicates"] = task.undefined_replicates;
   json["more_pairs"] = task.more ? Json(*task.more) : Json(nullptr);
   if (!task.more) json["more_pairs_reason"] = task.more.reason();
   json["policies"] = Json::array();

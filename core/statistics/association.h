@@ -6,7 +6,7 @@
 
 #include "core/statistics/estimate.h"
 
-/// Association between two sequences of the same length (statistics.md 3.4).
+/// Association between two sequences of the same length (docs/statistics.md).
 /// Undefined, with the reason: fewer than 2 points, or a sequence whose values are all equal (max == min, not
 /// "variance is 0": rounding hides that). Two points make every coefficient ±1 or undefined: reports refuse that.
 /// All throw InvalidInput if the lengths differ or a value is not finite.

@@ -10,8 +10,8 @@ struct BetaPrior {
   double a = 1, b = 1;
 };
 
-/// P(the first rate is above the second), both with this prior, independent (statistics.md 3.7). To be printed with the
-/// prior; not for gates. A finite sum where a posterior's first parameter is whole and small, else quadrature.
+/// P(the first rate is above the second), both with this prior, independent (docs/statistics.md). To be printed with
+/// the prior; not for gates. A finite sum where a posterior's first parameter is whole and small, else quadrature.
 /// @throws InvalidInput for impossible counts or a prior not above 0.
 double ProbabilityGreater(const Count& first, const Count& second, const BetaPrior& prior = {});
 

@@ -7,7 +7,7 @@
 #include "core/statistics/confusion.h"
 #include "core/statistics/estimate.h"
 
-/// How far a judge's stated probabilities of success can be believed: statistics.md 3.3.
+/// How far a judge's stated probabilities of success can be believed: docs/statistics.md.
 namespace evac {
 
 struct Calibration {

@@ -7,7 +7,7 @@
 
 #include "core/statistics/estimate.h"
 
-/// One judge against the truth (a human's verdicts): statistics.md 3.3.
+/// One judge against the truth (a human's verdicts): docs/statistics.md.
 namespace evac {
 
 /// How often the judge and the human said what. "Positive" is success.

@@ -6,7 +6,7 @@
 #include <utility>
 #include <vector>
 
-/// Many p-values on one page (statistics.md 3.6). The family is every pair that the page shows.
+/// Many p-values on one page (docs/statistics.md). The family is every pair that the page shows.
 namespace evac {
 
 /// Adjusted p-values, in the order given, at most 1. All throw InvalidInput for a p outside [0, 1].

@@ -12,7 +12,8 @@ struct Flips {
   std::int64_t only_second = 0;  ///< c: failure in the first, success in the second
 };
 
-/// McNemar's test of "the two rates are equal", two-sided (statistics.md 3.2). b = c = 0: p is 1, chi-square undefined.
+/// McNemar's test (1947) of "the two rates are equal", two-sided (docs/statistics.md). b = c = 0: p is 1, chi-square
+/// undefined.
 struct McNemar {
   double p_exact = 1;                            ///< min(1, 2 P(Bin(b + c, 1/2) <= min(b, c)))
   double p_mid = 1;                              ///< 2 P(X < min) + P(X = min): less conservative, exactly 1 when b = c

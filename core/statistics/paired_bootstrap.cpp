@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <functional>
 #include <limits>
 #include <span>
@@ -174,7 +175,73 @@ std::string WhyNotResampled(const std::vector<TaskOutcomes>& tasks) {
   return "";
 }
 
-Defined<BootstrapOf> Bootstrap(const ResampledRates& rates, const Statistic& statistic, double confidence) {
+/// In how many states each point was tried, in the order of the rates.
+RatePairs StatesTried(const std::vector<TaskOutcomes>& tasks) {
+  const auto tried = [](const std::vector<Count>& world) {
+    return static_cast<double>(std::ranges::count_if(world, [](const Count& count) { return count.trials > 0; }));
+  };
+  RatePairs states;
+  for (const TaskOutcomes& task : tasks) {
+    for (const PointOutcomes& point : task.points) {
+      const double real = tried(point.real), sim = tried(point.sim);
+      if (real == 0 || sim == 0) continue;
+      states.real.push_back(real);
+      states.sim.push_back(sim);
+    }
+  }
+  return states;
+}
+
+/// What no draw from these states can show.
+struct Unseen {
+  RatePairs rates;
+  RatePairs tried;  ///< initial states, of each
+};
+
+/// The world's rates as they are, and with one that is 0 or 1 moved as far as its states leave open, each in turn.
+std::vector<std::vector<double>> Moved(const std::vector<double>& rates, const std::vector<double>& tried,
+                                       double tail) {
+  std::vector<std::vector<double>> ways{rates};
+  for (std::size_t i = 0; i < rates.size(); ++i) {
+    if (rates[i] != 0 && rates[i] != 1) continue;
+    const double open = 1 - std::pow(tail, 1 / tried[i]);
+    ways.emplace_back(rates)[i] = rates[i] == 0 ? open : 1 - open;
+  }
+  return ways;
+}
+
+Interval WithUnseen(Interval interval, const Unseen& unseen, const Statistic& statistic, double tail) {
+  const std::vector<std::vector<double>> sim_ways = Moved(unseen.rates.sim, unseen.tried.sim, tail);
+  for (const std::vector<double>& real : Moved(unseen.rates.real, unseen.tried.real, tail)) {
+    for (const std::vector<double>& sim : sim_ways) {
+      const Number value = statistic({.real = real, .sim = sim});
+      if (value) interval = {std::min(interval.low, *value), std::max(interval.high, *value)};
+    }
+  }
+  return interval;
+}
+
+IntervalAt IntervalOfRecord(const BootstrapOf& bootstrap, const Unseen& unseen, const Statistic& statistic) {
+  return [resampled = bootstrap.resampled, dropped = bootstrap.undefined, unseen,
+          statistic](double confidence) -> Defined<Interval> {
+    const std::int64_t drawn = dropped + std::ssize(resampled.replicates);
+    if (static_cast<double>(dropped) > (1 - confidence) * static_cast<double>(drawn))
+      return Undefined{fmt::format("{} of {} replicates have none: where they would lie nobody knows", dropped, drawn)};
+    const Defined<Interval> percentile = IntervalsOf(resampled, confidence).percentile;
+    const auto [least, most] = std::ranges::minmax(resampled.replicates);
+    return least < most ? percentile : WithUnseen(*percentile, unseen, statistic, (1 - confidence) / 2);
+  };
+}
+
+std::string WhyNotAsDrawn(const BootstrapOf& bootstrap, double confidence) {
+  const Defined<Interval> shown = bootstrap.of_record(confidence);
+  if (!shown) return shown.reason();
+  const Interval& drawn = *bootstrap.intervals.percentile;
+  return shown->low == drawn.low && shown->high == drawn.high ? "" : "no replicate differs";
+}
+
+Defined<BootstrapOf> Bootstrap(const ResampledRates& rates, const RatePairs& tried, const Statistic& statistic,
+                               double confidence) {
   const Number theta = statistic(rates.all);
   if (!theta) return Undefined{theta.reason()};
   BootstrapOf result;
@@ -189,6 +256,8 @@ Defined<BootstrapOf> Bootstrap(const ResampledRates& rates, const Statistic& sta
     if (const Number value = statistic(left_one_out)) result.resampled.jackknife.push_back(*value);
   }
   result.intervals = IntervalsOf(result.resampled, confidence);
+  result.of_record = IntervalOfRecord(result, {rates.all, tried}, statistic);
+  result.not_as_drawn = WhyNotAsDrawn(result, confidence);
   return result;
 }
 
@@ -209,10 +278,13 @@ PairedBootstrap PairedStateBootstrap(const std::vector<TaskOutcomes>& tasks, con
   }
   const ResampledRates rates =
       FitsAByte(tasks) ? Resample<std::uint16_t>(tasks, options) : Resample<std::int64_t>(tasks, options);
-  const auto bootstrap = [&](const Statistic& statistic) { return Bootstrap(rates, statistic, options.confidence); };
+  const RatePairs tried = StatesTried(tasks);
+  const auto bootstrap = [&](const Statistic& statistic) {
+    return Bootstrap(rates, tried, statistic, options.confidence);
+  };
   result.pearson = bootstrap([](const RatePairs& pairs) { return Pearson(pairs.sim, pairs.real).value; });
   result.spearman = bootstrap([](const RatePairs& pairs) { return Spearman(pairs.sim, pairs.real).value; });
-  result.mmrv = bootstrap([&](const RatePairs& pairs) { return Mmrv(pairs, convention).mmrv; });
+  result.mmrv = bootstrap([convention](const RatePairs& pairs) { return Mmrv(pairs, convention).mmrv; });
   return result;
 }
 

@@ -5,11 +5,12 @@
 #include <vector>
 
 #include "core/statistics/bootstrap.h"
+#include "core/statistics/inverted_interval.h"
 #include "core/statistics/mmrv.h"
 #include "core/statistics/rate_pairs.h"
 #include "core/statistics/rates.h"
 
-/// The interval of record of every comparison of worlds (statistics.md 3.4): what would the correlation have been, had
+/// The interval of record of every comparison of worlds (docs/statistics.md): what would the correlation have been, had
 /// other initial states of the same kind been drawn? It says nothing about other policies or tasks.
 namespace evac {
 
@@ -32,6 +33,14 @@ struct BootstrapOf {
   Resampled resampled;         ///< replicates in the order drawn
   std::int64_t undefined = 0;  ///< replicates dropped because the statistic was undefined there
   BootstrapIntervals intervals;
+  /// At any confidence: what is shown and decided from (docs/decisions/0012-interval-of-record.md). The percentile
+  /// interval, but undefined where more replicates were dropped than it leaves outside. Where no replicate differs from
+  /// another it would have no width: it then holds what the statistic comes to if, in each world, one point whose
+  /// outcomes are all alike in n states ends otherwise in a share 1 - tail^(1/n) of them (Clopper-Pearson's end), tail
+  /// the half of what it leaves outside.
+  IntervalAt of_record;
+  /// Why percentile and BCa alone may not be shown at the options' confidence; empty if they may.
+  std::string not_as_drawn;
 };
 
 struct PairedBootstrap {

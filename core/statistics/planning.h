@@ -5,7 +5,7 @@
 #include "core/statistics/estimate.h"
 #include "core/statistics/rates.h"
 
-/// How many trials, before any is made (statistics.md 3.11). All throw InvalidInput for shares outside [0, 1], or
+/// How many trials, before any is made (docs/statistics.md). All throw InvalidInput for shares outside [0, 1], or
 /// alpha, power or confidence outside (0, 1).
 namespace evac {
 

@@ -11,6 +11,7 @@ namespace evac {
 namespace {
 
 constexpr std::int64_t kLeastReal = 40, kLeastDiscordant = 5;
+constexpr double kNoSpread = 1e-12;  // what rounding leaves of 0
 
 void Check(const BothWorlds& paired, const Count& more) {
   if (std::min({paired.both, paired.only_real, paired.only_model, paired.neither}) < 0) {
@@ -68,10 +69,11 @@ struct Basis {
   const char *trials = "real trials", *pairs = "pairs";
 };
 
-Defined<Interval> Allowed(const Basis& basis, const Interval& normal) {
+Defined<Interval> Allowed(const Basis& basis, const Interval& normal, double se) {
   if (basis.real < kLeastReal) return Undefined{fmt::format("fewer than {} {}", kLeastReal, basis.trials)};
   if (basis.discordant < kLeastDiscordant)
     return Undefined{fmt::format("fewer than {} {} in which the worlds differ", kLeastDiscordant, basis.pairs)};
+  if (se <= kNoSpread) return Undefined{"the estimated spread is 0"};
   return Interval{std::clamp(normal.low, 0.0, 1.0), std::clamp(normal.high, 0.0, 1.0)};
 }
 
@@ -192,7 +194,7 @@ PpiEstimate PpiMean(const BothWorlds& paired, const Count& more, PpiWeight weigh
   result.value = value;
   result.se = se;
   result.normal = normal;
-  result.allowed = Allowed({paired.n(), paired.discordant()}, normal);
+  result.allowed = Allowed({paired.n(), paired.discordant()}, normal, se);
   return result;
 }
 
@@ -212,7 +214,7 @@ PpiEstimate PpiMeanByState(const PpiStates& states, PpiWeight weight, double con
   result.allowed = Allowed({count([](const BothWorlds& state) { return state.n() > 0; }),
                             count([](const BothWorlds& state) { return state.discordant() > 0; }),
                             "initial states tried for real", "initial states"},
-                           normal);
+                           normal, *result.se);
   return result;
 }
 
@@ -222,7 +224,7 @@ Estimate PpiMoverByState(const PpiStates& states, double confidence) {
   if (!rate.value || !HasRepeats(states)) return rate;
   std::vector<PairedOutcomes> clusters;
   for (const BothWorlds& state : states.paired) clusters.push_back({{state.only_real, state.only_model}, state.n()});
-  const Estimate rectifier = TangoOfClusters(SumOf(clusters), EffectivePairs(clusters), confidence);
+  const Estimate rectifier = TangoOfClusters(clusters, confidence);
   const Interval sum = MoverSum(ClusteredWilsonInterval(states.more, confidence), rectifier);
   rate.interval = Interval{std::clamp(sum.low, 0.0, 1.0), std::clamp(sum.high, 0.0, 1.0)};
   return rate;

@@ -7,7 +7,8 @@
 #include "core/statistics/rate_difference.h"
 #include "core/statistics/rates.h"
 
-/// The real success rate from few real trials and many imagined ones: prediction-powered inference (statistics.md 3.9).
+/// The real success rate from few real trials and many imagined ones: prediction-powered inference
+/// (Angelopoulos et al. 2023; docs/statistics.md).
 /// Y: real outcomes, G: the world model's on the *same* initial states (n of them), H: the world model's on N more.
 namespace evac {
 
@@ -34,7 +35,8 @@ struct PpiEstimate {
   Number se = Undefined{"no real trials"};
   Defined<Interval> normal = Undefined{"no real trials"};   ///< value ± z se, not clipped; width 0 if nothing varies
   Defined<Interval> allowed = Undefined{"no real trials"};  ///< the same, clipped; undefined below 40 real trials or 5
-                                                            ///< discordant pairs, where it may not be shown
+                                                            ///< discordant pairs and where it would have no width:
+                                                            ///< where it may not be shown
 };
 /// @param more  H. Without any, lambda is 0 except for kFull, which is undefined.
 /// @throws InvalidInput for impossible counts and unless 0 < confidence < 1.

@@ -5,7 +5,7 @@
 
 namespace evac {
 
-/// How far the tested world's rates are from the real ones, not only whether they go together (statistics.md 3.4).
+/// How far the tested world's rates are from the real ones, not only whether they go together (docs/statistics.md).
 /// All are undefined without points.
 struct RateAgreement {
   Number bias = Undefined{"no points"};     ///< mean(S - R): above 0 where the tested world is too kind

@@ -9,6 +9,8 @@
 namespace evac {
 namespace {
 
+constexpr double kRounding = 1e-9;  // 5.999… pairs are 6
+
 void Check(const PairedOutcomes& outcomes) {
   const auto [b, c] = outcomes.flips;
   if (b < 0 || c < 0 || b + c > outcomes.pairs) {
@@ -33,11 +35,20 @@ Estimate PairedDifference(const PairedOutcomes& outcomes, double confidence) {
   return difference;
 }
 
+/// Outcomes that need not be whole numbers.
+struct WeightedPairs {
+  explicit WeightedPairs(const PairedOutcomes& outcomes, double weight = 1)
+      : only_first(weight * static_cast<double>(outcomes.flips.only_first)),
+        only_second(weight * static_cast<double>(outcomes.flips.only_second)),
+        pairs(weight * static_cast<double>(outcomes.pairs)) {}
+  double Difference() const { return (only_first - only_second) / pairs; }
+  double only_first, only_second, pairs;
+};
+
 /// Tango's score statistic of "the difference is delta"; falls as delta grows. The share of (failure, success) pairs
 /// takes its most likely value under that hypothesis, the root of A q² + B q + C.
-double TangoScore(const PairedOutcomes& outcomes, double delta) {
-  const double n = static_cast<double>(outcomes.pairs), b = static_cast<double>(outcomes.flips.only_first),
-               c = static_cast<double>(outcomes.flips.only_second);
+double TangoScore(const WeightedPairs& outcomes, double delta) {
+  const auto [b, c, n] = outcomes;
   const double linear = -b - c + (2 * n - b + c) * delta, constant = -c * delta * (1 - delta);
   const double root = std::sqrt(std::max(0.0, linear * linear - 8 * n * constant));
   // The two forms are equal; each cancels where the other does not.
@@ -49,12 +60,45 @@ double TangoScore(const PairedOutcomes& outcomes, double delta) {
 }
 
 /// Where the falling score crosses `target` within [low, high], to the last bit.
-double CrossingOf(const PairedOutcomes& outcomes, double target, Interval within) {
+double CrossingOf(const WeightedPairs& outcomes, double target, Interval within) {
   for (int halving = 0; halving < 64; ++halving) {
     const double middle = (within.low + within.high) / 2;
     (TangoScore(outcomes, middle) > target ? within.low : within.high) = middle;
   }
   return (within.low + within.high) / 2;
+}
+
+/// @param outcomes  with pairs above 0
+Interval TangoInterval(const WeightedPairs& outcomes, double confidence) {
+  const double value = outcomes.Difference(), z = TwoSidedZ(confidence);
+  Interval interval{-1, 1};
+  if (value > -1) interval.low = CrossingOf(outcomes, z, {-1, value});
+  if (value < 1) interval.high = CrossingOf(outcomes, -z, {value, 1});
+  return interval;
+}
+
+std::int64_t ClustersWithPairs(std::span<const PairedOutcomes> clusters) {
+  return std::ranges::count_if(clusters, [](const PairedOutcomes& cluster) { return cluster.pairs > 0; });
+}
+
+/// The number of pairs at which a score interval of the share that differs from the rest ends where that of none ends,
+/// z² / (clusters + z²), of one pair per cluster; infinite where the share itself lies beyond.
+double PairsVouchedFor(const PairedOutcomes& all, std::int64_t clusters, double confidence) {
+  const auto [b, c] = all.flips;
+  const double differing = static_cast<double>(all.pairs - std::max({b, c, all.pairs - b - c}));
+  const double groups = static_cast<double>(clusters), z = TwoSidedZ(confidence);
+  const double share = differing / static_cast<double>(all.pairs), end_of_none = z * z / (groups + z * z);
+  if (share >= end_of_none) return INFINITY;
+  return groups / std::pow(1 - share / end_of_none, 2);
+}
+
+/// What the interval rests on: whole numbers where EffectivePairs are that, else all pairs in proportion.
+WeightedPairs BasisOf(std::span<const PairedOutcomes> clusters, double confidence) {
+  const PairedOutcomes all = SumOf(clusters), effective = EffectivePairs(clusters);
+  if (all.pairs == 0) return WeightedPairs(all);
+  const double vouched = PairsVouchedFor(all, ClustersWithPairs(clusters), confidence);
+  if (vouched >= static_cast<double>(effective.pairs)) return WeightedPairs(effective);
+  return WeightedPairs(all, vouched / static_cast<double>(all.pairs));
 }
 
 }  // namespace
@@ -83,11 +127,7 @@ Estimate TangoDifference(const PairedOutcomes& outcomes, double confidence) {
   Estimate difference = PairedDifference(outcomes, confidence);
   difference.method = "Tango";
   if (!difference.value) return difference;
-  const double value = *difference.value, z = TwoSidedZ(confidence);
-  Interval interval{-1, 1};
-  if (value > -1) interval.low = CrossingOf(outcomes, z, {-1, value});
-  if (value < 1) interval.high = CrossingOf(outcomes, -z, {value, 1});
-  difference.interval = interval;
+  difference.interval = TangoInterval(WeightedPairs(outcomes), confidence);
   return difference;
 }
 
@@ -104,8 +144,7 @@ PairedOutcomes SumOf(std::span<const PairedOutcomes> clusters) {
 
 PairedOutcomes EffectivePairs(std::span<const PairedOutcomes> clusters) {
   const PairedOutcomes total = SumOf(clusters);
-  double groups = 0;
-  for (const PairedOutcomes& cluster : clusters) groups += cluster.pairs > 0;
+  const double groups = static_cast<double>(ClustersWithPairs(clusters));
   const double n = static_cast<double>(total.pairs), b = static_cast<double>(total.flips.only_first),
                c = static_cast<double>(total.flips.only_second);
   if (groups == n) return total;
@@ -123,11 +162,16 @@ PairedOutcomes EffectivePairs(std::span<const PairedOutcomes> clusters) {
   return {flips, std::max<std::int64_t>({1, shrunk(total.pairs), flips.only_first + flips.only_second})};
 }
 
-Estimate TangoOfClusters(const PairedOutcomes& all, const PairedOutcomes& effective, double confidence) {
-  Estimate difference = TangoDifference(effective, confidence);
-  difference.value = TangoDifference(all, confidence).value;
-  difference.n = all.pairs;
+Estimate TangoOfClusters(std::span<const PairedOutcomes> clusters, double confidence) {
+  Estimate difference = PairedDifference(SumOf(clusters), confidence);
+  difference.method = "Tango";
+  if (difference.value) difference.interval = TangoInterval(BasisOf(clusters, confidence), confidence);
   return difference;
+}
+
+Repeated PairsOfInterval(std::span<const PairedOutcomes> clusters, double confidence) {
+  const double pairs = BasisOf(clusters, confidence).pairs;
+  return {SumOf(clusters).pairs, static_cast<std::int64_t>(std::floor(pairs + kRounding))};
 }
 
 Estimate BonettPriceDifference(const PairedOutcomes& outcomes, double confidence) {

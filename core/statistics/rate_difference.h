@@ -7,7 +7,7 @@
 #include "core/statistics/mcnemar.h"
 #include "core/statistics/rates.h"
 
-/// How far two success rates are apart: first - second, in [-1, 1] (statistics.md 3.2).
+/// How far two success rates are apart: first - second, in [-1, 1] (docs/statistics.md).
 /// Without data the value is undefined and the interval is [-1, 1]: nothing is known.
 /// All throw InvalidInput for impossible counts and unless 0 < confidence < 1.
 namespace evac {
@@ -36,9 +36,14 @@ Estimate TangoDifference(const PairedOutcomes& outcomes, double confidence = 0.9
 /// @param clusters  each one initial state's pairs. @throws InvalidInput for impossible counts.
 PairedOutcomes EffectivePairs(std::span<const PairedOutcomes> clusters);
 
-/// The difference of all pairs with the interval of their effective number.
-/// @param effective  EffectivePairs of the clusters that `all` is the sum of
-Estimate TangoOfClusters(const PairedOutcomes& all, const PairedOutcomes& effective, double confidence = 0.95);
+/// The difference of pairs that come in clusters: its value is that of all, its interval Tango's of as many as
+/// PairsOfInterval says. One pair per cluster: as TangoDifference. @throws as EffectivePairs and TangoDifference.
+Estimate TangoOfClusters(std::span<const PairedOutcomes> clusters, double confidence = 0.95);
+
+/// All pairs of the clusters, and how many independent ones that interval rests on: EffectivePairs, but where few of
+/// them differ from the rest, no more than leave it as wide as one pair of each cluster would if none did. One flip
+/// alone does not show that all the pairs that agree are independent (docs/decisions/0012-interval-of-record.md).
+Repeated PairsOfInterval(std::span<const PairedOutcomes> clusters, double confidence = 0.95);
 
 /// Same initial states: Wald's interval with 1 added to each kind of flip and 2 to the pairs (Bonett & Price 2012). The
 /// quick form; its value is that of the data as they are.

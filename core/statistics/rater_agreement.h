@@ -6,7 +6,7 @@
 
 #include "core/statistics/estimate.h"
 
-/// How far raters agree beyond chance (statistics.md 3.3). 1: always; 0: as chance would.
+/// How far raters agree beyond chance (docs/statistics.md). 1: always; 0: as chance would.
 namespace evac {
 
 /// Fleiss 1971: every item rated by the same number of raters.

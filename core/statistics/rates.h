@@ -5,7 +5,7 @@
 
 #include "core/statistics/estimate.h"
 
-/// One success rate and its interval (statistics.md 3.1). Each takes k = `successes` of n = `trials`.
+/// One success rate and its interval (docs/statistics.md). Each takes k = `successes` of n = `trials`.
 /// n = 0: the value is undefined, the interval is [0, 1]: nothing is known.
 /// All throw InvalidInput unless 0 <= k <= n and 0 < confidence < 1.
 namespace evac {

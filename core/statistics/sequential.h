@@ -9,7 +9,7 @@
 #include "core/statistics/rate_difference.h"
 #include "core/statistics/rates.h"
 
-/// Tests and intervals that stay valid however often one looks (statistics.md 3.8). An e-value is the money of a bet
+/// Tests and intervals that stay valid however often one looks (docs/statistics.md). An e-value is the money of a bet
 /// against "no difference", from 1: under that hypothesis it reaches 1 / alpha with probability at most alpha, ever.
 namespace evac {
 

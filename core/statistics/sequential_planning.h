@@ -4,7 +4,7 @@
 
 #include "core/statistics/planning.h"
 
-/// How many pairs until a test that may be looked at at any time has decided (statistics.md 3.8, 3.11). Of one look, at
+/// How many pairs until a test that may be looked at at any time has decided (docs/statistics.md). Of one look, at
 /// that size: flips whose difference is as unfavourable as only 1 - power of all are, by the normal approximation, still
 /// decide there. Looks before it can only decide sooner. Undefined above `most` pairs. All throw InvalidInput for flips
 /// outside [0, 1] or together above 1, and for alpha or power outside (0, 1).

@@ -7,7 +7,7 @@
 #include "core/statistics/estimate.h"
 #include "core/statistics/rates.h"
 
-/// Comparisons over several tasks, or of several policies, at once (statistics.md 3.2).
+/// Comparisons over several tasks, or of several policies, at once (docs/statistics.md).
 namespace evac {
 
 /// One task: the two rates compared in it.

@@ -3,8 +3,8 @@
 #include "core/statistics/estimate.h"
 #include "core/statistics/rates.h"
 
-/// Tests of "two success rates are equal", on different initial states (statistics.md 3.2). For the same initial states
-/// use McNemar. Tables are ordered by exact integers: two tables that are equally extreme are never told apart by
+/// Tests of "two success rates are equal", on different initial states (docs/statistics.md). For the same initial
+/// states use McNemar. Tables are ordered by exact integers: two tables that are equally extreme are never told apart by
 /// rounding. Without trials in one of the two every p is 1.
 /// All throw InvalidInput unless 0 <= successes <= trials, and above 5000 trials together: BoschlooOrNewcombe
 /// (two_samples.h) takes any number.

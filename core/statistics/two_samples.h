@@ -6,7 +6,7 @@
 
 #include "core/statistics/rates.h"
 
-/// "Two success rates are equal", on different initial states, however many there are (statistics.md 3.2).
+/// "Two success rates are equal", on different initial states, however many there are (docs/statistics.md).
 namespace evac {
 
 /// Effective trials of both together; above, Newcombe's interval says nearly the same as the exact test, and at once.

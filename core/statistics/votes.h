@@ -6,7 +6,7 @@
 
 #include "core/statistics/estimate.h"
 
-/// Several raters' votes on one item, and whether they could tell what they should not (statistics.md 3.3).
+/// Several raters' votes on one item, and whether they could tell what they should not (docs/statistics.md).
 namespace evac {
 
 enum class Vote { kSuccess, kFailure, kUnsure, kMissing };

@@ -104,6 +104,27 @@ TEST(JudgeCalibration, ManyClipsOfFewStatesAreNotManyClips) {
                                HasSubstr("how far kappa can be believed: all items are of one initial state")));
 }
 
+TEST(JudgeCalibration, NeverWrongInOneSceneIsNotNeverWrong) {
+  const std::string truth = Times(30, "sf");
+  const JudgeCalibrationReport one = CalibrateJudge(Judged("real", truth, truth, 1).store(), "vlm:x", "oracle");
+  EXPECT_EQ(*one.rows.front().statistics.kappa.value, 1);
+  EXPECT_THAT(one.missing, testing::ElementsAre("how far kappa can be believed: never wrong, but in 1 initial state "
+                                                "only, wanted 11"));
+  EXPECT_THAT(Text(one), Not(HasSubstr("a gate may count this judge")));
+  EXPECT_THAT(CalibrateJudge(Judged("real", truth, truth, 10).store(), "vlm:x", "oracle").missing, testing::SizeIs(1));
+  EXPECT_THAT(CalibrateJudge(Judged("real", truth, truth, 12).store(), "vlm:x", "oracle").missing, testing::IsEmpty());
+}
+
+TEST(JudgeCalibration, AJudgeThatOnlyReadsTheWorldIsNotAccepted) {
+  Judged run("real", Times(30, "s"), Times(30, "s"));
+  run.Add("sim", Times(30, "f"), Times(30, "f"));
+  const JudgeCalibrationReport report = CalibrateJudge(run.store(), "vlm:x", "oracle");
+  EXPECT_EQ(*report.rows.front().statistics.kappa.value, 1);
+  EXPECT_THAT(report.missing, testing::ElementsAre(HasSubstr("real clips: no failure among 30, wanted both outcomes"),
+                                                   HasSubstr("other clips: no success among 30")));
+  EXPECT_THAT(Text(report), Not(HasSubstr("a gate may count this judge")));
+}
+
 TEST(JudgeCalibration, AJudgeThatIsKinderToOneWorldIsRefusedThoughItsKappaIsGood) {
   Judged run("real", Times(50, "sf"), Times(50, "sf"));
   run.Add("sim", Times(50, "sf"), Times(40, "sf") + Times(10, "ss"));

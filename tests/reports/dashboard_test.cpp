@@ -43,6 +43,7 @@ class Served {
     dashboard_.Stop();
     thread_.join();
   }
+  int port() const { return dashboard_.port(); }
   httplib::Client Client() const {
     httplib::Client client(host_, dashboard_.port());
     client.set_read_timeout(60);
@@ -85,17 +86,15 @@ TEST(Dashboard, ShowsWhatARunWroteMeanwhileAndTellsThatThereIsMore) {
   httplib::Client client = served.Client();
   EXPECT_EQ(nlohmann::json::parse(client.Get("/runs/0/report.json")->body).at("episodes").size(), 4u);
   std::string heard;
-  std::thread writer([&run] {
-    std::this_thread::sleep_for(std::chrono::milliseconds(300));
-    run.Add("41-0100", 's', 'f');
-  });
+  int pieces = 0;
   httplib::Client listener = served.Client();
-  listener.Get("/events", [&heard](const char* bytes, std::size_t count) {
+  listener.Get("/events", [&](const char* bytes, std::size_t count) {
     heard.append(bytes, count);
+    if (++pieces == 1) run.Add("41-0100", 's', 'f');  // what came first is the state before
     const std::size_t first = heard.find("data: ");
-    return first == std::string::npos || heard.find("data: ", first + 1) == std::string::npos;  // until the second
+    const bool has_news = first != std::string::npos && heard.find("data: ", first + 1) != std::string::npos;
+    return !has_news && pieces < 30;  // breath is drawn every ten seconds: no news will come
   });
-  writer.join();
   EXPECT_THAT(heard, testing::MatchesRegex("data: .*\n\n(.|\n)*data: .*\n\n")) << "the state, then news";
   EXPECT_EQ(nlohmann::json::parse(client.Get("/runs/0/report.json")->body).at("episodes").size(), 6u);
 }
@@ -203,8 +202,28 @@ TEST(Dashboard, ARunThatIsNotThereYetIsListedWithTheReason) {
 TEST(Dashboard, AnAddressThatIsTakenIsRefused) {
   TempFolder empty;
   const Dashboard first({.runs = {empty.path()}});
-  EXPECT_GT(first.port(), 0);
-  EXPECT_THROW(Dashboard({.runs = {empty.path()}, .host = "no.such.host.invalid"}), Error);
+  ASSERT_GT(first.port(), 0);
+  const std::string taken = "127.0.0.1:" + std::to_string(first.port()) + " cannot be listened at";
+  EXPECT_THAT([&] { Dashboard({.runs = {empty.path()}, .port = first.port()}); },
+              testing::ThrowsMessage<Error>(HasSubstr(taken)));
+}
+
+TEST(Dashboard, AnAddressIsFreeAgainOnceItsDashboardIsGone) {
+  const StoredRun run("again", "s", "s");
+  int port = 0;
+  {
+    const Served served({run.folder()});
+    ASSERT_EQ(served.StatusOf("/"), 200);
+    port = served.port();
+  }
+  EXPECT_EQ(Dashboard({.runs = {run.folder()}, .port = port}).port(), port);
+}
+
+TEST(Dashboard, AnAddressOfNoMachineIsRefused) {
+  TempFolder empty;
+  EXPECT_THAT([&] { Dashboard({.runs = {empty.path()}, .host = "192.0.2.1"}); },
+              testing::ThrowsMessage<Error>(HasSubstr("192.0.2.1:0 cannot be listened at")))
+      << "RFC 5737 keeps it for documentation";
 }
 
 TEST(Dashboard, WhatCanBeListenedAtNoMoreIsSaidToBeSo) {

@@ -46,6 +46,15 @@ TEST(Findings, OneInitialStateDoesNotDecideWhetherAWorldFollows) {
   EXPECT_THAT(finding.answer, HasSubstr("1 initial state of a task, wanted at least 2"));
 }
 
+/// The page said "sim follows real closely: Pearson 1.00 [1.00, 1.00]"; one replicate of three had no Pearson at all.
+TEST(Findings, OneFailureInAllDoesNotDecideWhetherAWorldFollows) {
+  const std::string all(20, 's'), one = std::string(19, 's') + "f";
+  const Finding finding =
+      FirstOf({{"a", "pick", "1", all, all}, {"a", "pick", "2", all, all}, {"a", "pick", "3", one, one}});
+  EXPECT_EQ(finding.decision, Decision::kNotDecided);
+  EXPECT_THAT(finding.answer, HasSubstr("of 2000 replicates have none: where they would lie nobody knows"));
+}
+
 TEST(Findings, TooFewPointsAreNotDecidedAndNoNumberIsGiven) {
   const Finding finding = FirstOf({{"a", "pick", "1", "ssf", "ssf"}, {"a", "pick", "2", "fff", "fff"}});
   EXPECT_EQ(finding.decision, Decision::kNotDecided);

@@ -239,7 +239,7 @@ TEST(SummaryMarkdown, ANameOfSeveralLinesStaysInItsFold) {
   decision.name = "main";
   decision.rules = {rule};
   const std::string page = SummaryMarkdown(HostileRun(), {{decision, true}});
-  EXPECT_THAT(page, HasSubstr("<summary>not worse  # Passed : 1 initial state where"));
+  EXPECT_THAT(page, HasSubstr("<summary>not worse  # Passed : 1 pair where"));
   EXPECT_THAT(page, Not(HasSubstr("\n# Passed")));
 }
 

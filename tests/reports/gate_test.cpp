@@ -103,7 +103,10 @@ TEST(Gate, HolmHoldsTheFalseAlarmsOfTheWholeFile) {
   EXPECT_EQ(corrected.outcome, GateOutcome::kInconclusive);
   EXPECT_DOUBLE_EQ(*corrected.rules[0].p, 0.03125);
   EXPECT_DOUBLE_EQ(*corrected.rules[0].p_adjusted, 0.0625);
-  EXPECT_EQ(Decided(Rules(two, "correction: none\n"), now, then).outcome, GateOutcome::kFail);
+  EXPECT_THAT(corrected.rules[0].statement, HasSubstr("; over 2 rules p = 0.06"));
+  const GateDecision each = Decided(Rules(two, "correction: none\n"), now, then);
+  EXPECT_EQ(each.outcome, GateOutcome::kFail);
+  EXPECT_THAT(each.rules[0].statement, Not(HasSubstr("over 2 rules"))) << "nothing was corrected";
 }
 
 TEST(Gate, NonInferiorityLooksAtTheMarginAlone) {
@@ -204,6 +207,34 @@ TEST(Gate, HowManyMoreIsPlannedFromWhatRepeatsTell) {
   EXPECT_THAT(unpaired.more, HasSubstr("about 2560 more episodes of each")) << "260 tell as much as 2600 such";
 }
 
+TEST(Gate, OneFailureMoreIsNoReasonToPass) {
+  const std::vector<std::string> perfect(4, Repeat(20, 's'));
+  std::vector<std::string> one_worse = perfect;
+  one_worse[0][7] = 'f';
+  for (const char* rule : {"test: paired_mcnemar, margin: 0.1", "test: noninferiority, margin: 0.1"}) {
+    EXPECT_EQ(DecidedOnRepeats(rule, perfect, perfect).decision.outcome, GateOutcome::kInconclusive) << rule;
+    EXPECT_EQ(DecidedOnRepeats(rule, one_worse, perfect).decision.outcome, GateOutcome::kInconclusive) << rule;
+  }
+  const std::vector<std::string> ten(4, Repeat(10, 's'));
+  std::vector<std::string> ten_but_one = ten;
+  ten_but_one[0][7] = 'f';
+  for (const char* rule : {"test: boschloo, margin: 0.15", "test: noninferiority, paired: false, margin: 0.15"}) {
+    EXPECT_EQ(DecidedOnRepeats(rule, ten, ten).decision.outcome, GateOutcome::kInconclusive) << rule;
+    EXPECT_EQ(DecidedOnRepeats(rule, ten_but_one, ten).decision.outcome, GateOutcome::kInconclusive) << rule;
+  }
+  for (const std::size_t states : {3, 10}) {
+    std::vector<std::string> now(4, Outcomes(states, 's'));
+    double lowest = 1;
+    for (std::size_t failures = 0; failures <= 4 * states; ++failures) {
+      const RuleDecision rule = DecidedOnRepeats("test: ci_lower, at_least: 0.85", now, {"s"}).decision.rules.at(0);
+      EXPECT_NE(rule.outcome, GateOutcome::kPass) << "all successes in so few states do not show it either";
+      EXPECT_LE(rule.value.interval->low, lowest + 1e-9) << failures << " of " << 4 * states;
+      lowest = rule.value.interval->low;
+      if (failures < 4 * states) now[failures / states][failures % states] = 'f';
+    }
+  }
+}
+
 TEST(Gate, ManyUnpairedEpisodesAreTestedAsEverywhere) {
   const Outcomes now = Repeat(330, 's') + Repeat(270, 'f'), then = Repeat(372, 's') + Repeat(228, 'f');
   const RuleDecision rule = DecidedOnRepeats("test: boschloo", {now}, {then}).decision.rules.at(0);
@@ -274,6 +305,50 @@ TEST(Gate, ACorrelationIsHeldAgainstItsFloorAndMmrvAgainstItsCeiling) {
   EXPECT_EQ(outcome("metric: mmrv, at_most: 0.5").outcome, GateOutcome::kPass);
   EXPECT_THAT(MessageOf([&] { outcome("metric: mmrv, at_least: 0.5"); }),
               HasSubstr("at_least: found '0.5', wanted none"));
+}
+
+/// Policies 0, 1, … of one task, in sim as in real unless said otherwise.
+RuleDecision Correlated(const std::string& rule, const std::vector<Outcomes>& real, std::vector<Outcomes> sim = {}) {
+  if (sim.empty()) sim = real;
+  std::vector<RepeatedCell> cells;
+  for (std::size_t i = 0; i < real.size(); ++i) cells.push_back({"take", "p" + std::to_string(i), {real[i]}, {sim[i]}});
+  const RunSummary run = Summarise(RepeatedRun(cells).data, {});  // resampled as often as usual
+  const GateRules rules = Rules("  - {name: r, test: correlation, world: sim, " + rule + "}\n");
+  return Decide(rules, {run, "out", {}}, nullptr).decision.rules.at(0);
+}
+
+TEST(Gate, RanksThatNothingPutAtRiskAreNotShownToBeRight) {
+  const std::string rule = "metric: mmrv, at_most: 0.1";
+  const RuleDecision two = Correlated(rule, {"ss", "ss"});
+  EXPECT_EQ(two.outcome, GateOutcome::kInconclusive) << two.statement;
+  EXPECT_THAT(two.statement, HasSubstr("mmrv of sim against real: 0.00 [0.00, 0.78] (90 %)"));
+  EXPECT_EQ(Correlated(rule, {Repeat(40, 's'), Repeat(40, 's')}).outcome, GateOutcome::kPass)
+      << "no rate is further than 7 points from another";
+  const std::vector<Outcomes> apart = {Repeat(40, 's'), Repeat(20, 's') + Repeat(20, 'f'), Repeat(40, 'f')};
+  EXPECT_EQ(Correlated(rule, apart).outcome, GateOutcome::kPass) << "no replicate differs, and no rank is near";
+  EXPECT_EQ(Correlated("metric: spearman, at_least: 0.9", apart).outcome, GateOutcome::kPass);
+}
+
+TEST(Gate, ACorrelationThatOneFailureDecidesIsNotDecided) {
+  const Outcomes all = Repeat(20, 's');
+  const RuleDecision decision = Correlated("at_least: 0.7", {all, all, Repeat(19, 's') + "f"});
+  EXPECT_EQ(decision.outcome, GateOutcome::kInconclusive) << decision.statement;
+  EXPECT_THAT(decision.statement, HasSubstr("of 2000 replicates have none: where they would lie nobody knows"));
+}
+
+TEST(Gate, ReplicatesThatWereDroppedAreCountedInTheSentence) {
+  const Outcomes all = Repeat(20, 's');
+  const RuleDecision decision =  // no failure is drawn in one replicate of 26, and then all rates are equal
+      Correlated("at_least: 0.7", {all, Repeat(18, 's') + "ff", "sssssf" + Repeat(14, 's')});
+  EXPECT_THAT(decision.statement, HasSubstr(" of 2000 replicates had none and were dropped"));
+}
+
+TEST(Gate, ABootstrapShowsNoSmallerPThanItHasReplicates) {
+  const Outcomes all = Repeat(40, 's'), none = Repeat(40, 'f');
+  const RuleDecision turned = Correlated("at_least: 0.7", {all, Repeat(20, 's') + Repeat(20, 'f'), none},
+                                         {none, Repeat(20, 'f') + Repeat(20, 's'), all});
+  EXPECT_EQ(turned.outcome, GateOutcome::kFail);
+  EXPECT_DOUBLE_EQ(*turned.p, 1.0 / 2001) << "it was 1e-9";
 }
 
 TEST(Gate, ACorrelationIsOfTheTaskThatIsNamed) {

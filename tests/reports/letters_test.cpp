@@ -6,6 +6,7 @@
 #include <map>
 
 #include "reports/methods.h"
+#include "reports/page.h"
 #include "reports/report_data.h"
 #include "tests/reports/repeated_run.h"
 #include "tests/reports/sample_run.h"
@@ -64,6 +65,20 @@ TEST(Letters, PoliciesThatShareFewStatesAreComparedAsTwoSamples) {
   const ReportData report = ReportDataOf(SampleRun(cells).Summary());
   EXPECT_THAT(report.letters.unpaired_tests, testing::ElementsAre("Boschloo"));
   EXPECT_EQ(LettersOf(report, "real"), (Letters{{"a pick@1", "a"}, {"a pick@2", "b"}}));
+}
+
+TEST(Letters, ThePageNamesTheTestsThatWereMade) {
+  const auto page = [](const Outcomes& one, const Outcomes& two) {
+    const SampleRun run({{"a", "pick", "1", one, "u"}, {"a", "pick", "2", two, "u"}});
+    return ReportPage(run.Summary(), {"", "evac test"});
+  };
+  const std::string apart = page("ssssssssss----------", "----------ffffffffff"), together = page("ssss", "fsfs");
+  EXPECT_THAT(apart, testing::HasSubstr("exact McNemar over shared initial states, Boschloo where fewer than 80 % are "
+                                        "shared"));
+  EXPECT_THAT(together, testing::Not(testing::HasSubstr("Boschloo")));
+  EXPECT_THAT(apart, testing::HasSubstr("with the first one, on the same initial states where at least 80 % of them are "
+                                        "shared"))
+      << "of two checkpoints without one such state";
 }
 
 TEST(Letters, MoreUnpairedEpisodesThanAnExactTestTakesAreComparedAllTheSame) {

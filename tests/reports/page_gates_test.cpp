@@ -5,6 +5,8 @@
 
 #include "reports/gate.h"
 #include "reports/page.h"
+#include "reports/summary_md.h"
+#include "tests/reports/repeated_run.h"
 #include "tests/reports/sample_run.h"
 
 namespace evac {
@@ -13,6 +15,22 @@ namespace {
 using testing::AllOf;
 using testing::HasSubstr;
 using testing::Not;
+
+TEST(GatesOnThePage, MoreCounterExamplesThanAreKeptAreCountedAllTheSame) {
+  const std::string all(210, 's'), none(210, 'f');
+  const PinnedResult pinned = Pin(RepeatedRun({{"take", "p", {}, {all}}}), "out/main");
+  const GateRules rules =
+      ReadGateRules(Config::FromText("gates:\n  - {name: r, test: paired_mcnemar, world: sim}\n", "gate.yaml"));
+  const RunSummary now = RepeatedRun({{"take", "p", {}, {none}}});
+  const GateDecision decision = Decide(rules, {now, "out/candidate", {}}, &pinned).decision;
+  ASSERT_EQ(decision.rules.at(0).counter_examples.size(), 200u);
+  EXPECT_EQ(decision.rules.at(0).flips_worse, 210);
+  ReportData report = ReportDataOf(SampleRun({{"take", "p", "c", "s", "s"}}).Summary());
+  report.gates = {{decision, true}};
+  EXPECT_THAT(ReportPage(report, {"", "evac test"}), HasSubstr("210 counter-examples, the first 12"));
+  EXPECT_THAT(SummaryMarkdown(now, report.gates),
+              HasSubstr("r: 210 pairs where only the baseline succeeded, the first 200<"));
+}
 
 /// The page of a run that failed a gate in all its six states. @param run  as whoever asked for the decision named it.
 std::string PageOfAFailedGate(const std::string& run, const std::string& run_folder) {

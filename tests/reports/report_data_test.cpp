@@ -34,8 +34,12 @@ std::string AllText(const std::vector<Headline>& headlines) {
 }
 
 TEST(Stages, TheSharesOfAFunnelNeverRise) {
-  for (const StageFunnel& funnel : LargeReport().stages.funnels) {
+  const ReportData report = LargeReport();
+  ASSERT_EQ(report.stages.funnels.size(), 8u) << "four policies, two tasks";
+  for (const StageFunnel& funnel : report.stages.funnels) {
+    ASSERT_EQ(funnel.worlds.size(), 2u);
     for (const StageRow& row : funnel.worlds) {
+      ASSERT_FALSE(row.reached.empty());
       ASSERT_EQ(row.reached.size(), funnel.stages.size());
       for (std::size_t i = 1; i < row.reached.size(); ++i) EXPECT_LE(*row.reached[i].value, *row.reached[i - 1].value);
     }
@@ -55,6 +59,17 @@ TEST(Stages, AWorldThatGraspsWhatRealDropsIsKinderAtGraspAndNowhereElse) {
   EXPECT_THAT(PartingInWords(grasp, "real"),
               HasSubstr("sim is kinder than real at grasp: of 20 pairs, 12 went on in sim alone"));
   EXPECT_THAT(PartingInWords(reach, "real"), HasSubstr("not decided at reach"));
+}
+
+TEST(Stages, APIsSaidBesideTheNumberOfPairsItIsOf) {
+  std::vector<SampleCell> cells;  // in two states of ten all four policies go on in sim alone
+  for (const char* checkpoint : {"1", "2", "3", "4"})
+    cells.push_back({"take_bottle", "pick", checkpoint, "ffssssssss", "ssssssssss"});
+  const StageReport stages = StagesOf(SampleRun(cells).Summary());
+  ASSERT_EQ(stages.partings.size(), 2u);
+  EXPECT_EQ(stages.partings[1].pairs, 40);
+  EXPECT_THAT(PartingInWords(stages.partings[1], "real"),
+              HasSubstr("of 40 pairs, 8 went on in sim alone and 0 in real alone (exact McNemar on 9 effective pairs"));
 }
 
 TEST(Stages, WithoutVerdictsThereIsNoFunnel) {
@@ -146,6 +161,20 @@ TEST(Headlines, AClearLossIsWorseWithItsNumbersAndASmallOneIsNotDecided) {
   EXPECT_THAT(small_text, Not(HasSubstr("[worse]")));
 }
 
+/// Better at either task, and run more often on the hard one: the rates of all episodes say the opposite.
+TEST(Headlines, ADifferenceOverTasksIsSaidToBeTaskByTask) {
+  const std::string easy = "sssssssssf--", hard = "ff----------", easy_new = "----------ss", hard_new = "--sffffffffs";
+  const SampleRun run({{"a", "pick", "good", easy, easy},
+                       {"b", "pick", "good", hard, hard},
+                       {"a", "pick", "new", easy_new, easy_new},
+                       {"b", "pick", "new", hard_new, hard_new}});
+  const ReportData report = ReportDataOf(run.Summary(), {.baseline = "pick@good"});
+  const std::string text = AllText(HeadlinesOf(report));
+  EXPECT_THAT(text, HasSubstr("pick@new: 33 % against 75 %, +")) << text;
+  EXPECT_THAT(text, HasSubstr("] task by task (12 and 12 episodes, p = "));
+  EXPECT_THAT(AllText(HeadlinesOf(LargeReport())), Not(HasSubstr("task by task"))) << "pairs stay within their task";
+}
+
 TEST(Headlines, WhereHoldsATaskToAllCandidatesAsTheFirstAnswerDoes) {
   // Six flips to none: p = .031 alone, and not significant as one of three.
   const std::string good = "ssssssffff", bad = "ffffffffff";
@@ -196,7 +225,9 @@ TEST(Headlines, TheBaselineCanBeNamedAndMustBeAPolicyOfTheRun) {
 TEST(Headlines, EveryRunHasAllFourAnswers) {
   for (const char* outcomes : {"s", "u", "e", "?"}) {
     const ReportData report = ReportDataOf(SampleRun({{"a", "pick", "1", outcomes, outcomes}}).Summary());
-    for (const Headline& headline : HeadlinesOf(report)) EXPECT_FALSE(headline.items.empty()) << outcomes;
+    const std::vector<Headline> headlines = HeadlinesOf(report);
+    ASSERT_EQ(headlines.size(), 4u);
+    for (const Headline& headline : headlines) EXPECT_FALSE(headline.items.empty()) << outcomes;
   }
 }
 

@@ -3,6 +3,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
+
 #include "core/error.h"
 #include "reports/plan.h"
 #include "reports/trust_output.h"
@@ -83,6 +85,19 @@ TEST(TrustIn, FewerThanFourPoliciesGiveNoCorrelation) {
   EXPECT_TRUE(four.correlation.interval);
 }
 
+TEST(TrustIn, ReplicatesWithoutACorrelationAreCounted) {
+  TrustInput input;
+  for (const char* policy : {"a", "b", "c", "d"}) {
+    const std::string outcomes = *policy == 'd' ? "sssssssfff" : "ssssssssss";
+    Add(policy, outcomes, input.real);
+    Add(policy, outcomes, input.model);
+  }
+  const TrustReport report{"sim", "the world real", "oracle", {}, TrustOf(input)};
+  EXPECT_GT(report.tasks[0].undefined_replicates, 0) << "one draw in 35 holds no failure";
+  EXPECT_THAT(TrustText(report), HasSubstr(" replicates without one dropped"));
+  EXPECT_EQ(TrustJson(report).at("tasks").at(0).at("undefined_replicates"), report.tasks[0].undefined_replicates);
+}
+
 TEST(TrustIn, PoliciesThatShareStatesAreNotCountedAsIndependent) {
   TrustInput input;
   for (const char* policy : {"a", "b", "c", "d"}) {  // the model is wrong in the same states for all
@@ -95,6 +110,22 @@ TEST(TrustIn, PoliciesThatShareStatesAreNotCountedAsIndependent) {
   const TaskTrust alone = TrustOf(Input(Times(5, "ssssf"), Times(5, "fsssf")))[0];
   EXPECT_NEAR(task.bias.interval->high - task.bias.interval->low, alone.bias.interval->high - alone.bias.interval->low,
               0.03);
+}
+
+TEST(TrustIn, OneWrongOutcomeDoesNotMakeUnknownAYes) {
+  TrustInput perfect;
+  for (const char* policy : {"a", "b", "c"}) {
+    Add(policy, Times(15, "sf"), perfect.real);
+    Add(policy, Times(15, "sf"), perfect.model);
+  }
+  TrustInput one_wrong = perfect;
+  one_wrong.model.back().success = !one_wrong.model.back().success;
+  EXPECT_EQ(TrustOf(perfect)[0].trust, Trust::kUnknown) << "90 of 90 pairs agree, on 30 states";
+  const TaskTrust task = TrustOf(one_wrong)[0];
+  EXPECT_EQ(task.trust, Trust::kUnknown) << "89 of 90 said yes";
+  EXPECT_EQ(task.effective_pairs, 36);
+  EXPECT_THAT(task.bias.method, HasSubstr("Tango on 36 effective pairs"));
+  EXPECT_EQ(*task.more, 14) << "35 states without a flip would do: 105 such pairs";
 }
 
 TEST(TrustIn, FewRealAndManyImaginedTrialsGiveOneRate) {
@@ -196,6 +227,18 @@ TEST(TrustOutput, JsonHoldsEveryNumberWithItsReason) {
   EXPECT_EQ(none.value("mcnemar_p_exact_reason", ""), "no pairs");
 }
 
+TEST(TrustOutput, NoShareIsAboveAHundredPercent) {
+  // 6 succeed in both, 2 only for real, 1 in neither, and all 14 further ones in the model: 102 % by the formula.
+  const TrustReport report{"sim", "the world real", "oracle", {},
+                           TrustOf(Input("ssssssssf", "ssssssfff" + Times(14, "s")))};
+  EXPECT_GT(*report.tasks[0].policies[0].tuned.value, 1);
+  EXPECT_THAT(TrustText(report), HasSubstr("100 % (weight "));
+  const auto policy = TrustJson(report).at("tasks").at(0).at("policies").at(0);
+  EXPECT_EQ(policy.at("ppi_plus_plus"), 1);
+  for (const char* rate : {"real", "model", "predicted", "predicted_by_betting"})
+    EXPECT_LE(policy.at(rate).at("value").get<double>(), 1) << rate;
+}
+
 TEST(PlanFor, AnswersInWordsAndATableForTheUsersNumbers) {
   const Plan plan = MakePlan({.rate = 0.28, .difference = 0.08, .trials = 25});
   EXPECT_THAT(PlanText(plan), HasSubstr("it takes 533 episodes of each"));
@@ -203,6 +246,34 @@ TEST(PlanFor, AnswersInWordsAndATableForTheUsersNumbers) {
   EXPECT_EQ(json.at("rows").at(0).at("key"), "interval_half_width");
   EXPECT_EQ(json.at("rows").size(), plan.rows.size());
   for (const PlanRow& row : plan.rows) EXPECT_FALSE(row.shown.empty()) << row.key;
+}
+
+TEST(PlanFor, ByDefaultNoMoreStatesFlipThanTheTwoRatesLeaveRoomFor) {
+  const Plan plan = MakePlan({.rate = 0.9});  // the other always succeeds, and loses no state
+  EXPECT_NEAR(*plan.options.flips, 0.1, 1e-12);
+  const auto value = [&](const std::string& key) { return *std::ranges::find(plan.rows, key, &PlanRow::key)->value; };
+  EXPECT_EQ(value("paired_states"), 78) << "it was 168";
+  EXPECT_NEAR(value("paired_power"), 0.206, 0.001);
+  EXPECT_EQ(*MakePlan({}).options.flips, 0.2);
+  EXPECT_EQ(*MakePlan({.difference = 0.3}).options.flips, 0.3) << "fewer make no such difference";
+  EXPECT_EQ(*MakePlan({.rate = 0.9, .flips = 0.1}).options.flips, 0.1);
+  const auto message = [](const PlanOptions& options) -> std::string {
+    try {
+      MakePlan(options);
+    } catch (const Error& error) {
+      EXPECT_EQ(error.exit_code(), ExitCode::kInvalidInput);
+      return error.what();
+    }
+    return "nothing was thrown";
+  };
+  EXPECT_EQ(message({.rate = 0.9, .flips = 0.15}),
+            "plan: --flips is 0.15, wanted at most 0.1: of 100 % against 90 % no more can differ");
+  EXPECT_EQ(message({.rate = 0.5, .difference = 0.6, .flips = 0.7}),
+            "plan: --difference is 0.6, wanted at most 0.5, as far as a rate can be from 0.5");
+}
+
+TEST(PlanFor, AModelThatNeverAgreesIsPlannedForToo) {
+  for (const double rate : {0.25, 0.5, 0.75, 0.05}) EXPECT_FALSE(MakePlan({.rate = rate, .agreement = 0}).rows.empty());
 }
 
 TEST(PlanFor, WhatCannotBeIsRefusedAndWhatCannotBeKnownIsUndefined) {

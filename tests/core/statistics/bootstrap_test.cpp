@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
 
 #include "core/error.h"
 #include "core/seed.h"
@@ -112,6 +113,60 @@ TEST(PairedStateBootstrap, OneInitialStateOfATaskGivesNoInterval) {
     EXPECT_FALSE(bootstrap.mmrv);
   }
   EXPECT_TRUE(PairedStateBootstrap({RandomTask(3, 5, 2)}, {}, kFew).mmrv);
+}
+
+/// `policies` that succeed in every one of `states` in both worlds, the last but for its first `failures`.
+TaskOutcomes NearlyPerfect(std::size_t policies, std::size_t states, std::size_t failures) {
+  TaskOutcomes task;
+  for (std::size_t p = 0; p < policies; ++p) {
+    PointOutcomes& point = task.points.emplace_back();
+    for (std::size_t s = 0; s < states; ++s) point.real.push_back({p + 1 < policies || s >= failures, 1});
+    point.sim = point.real;
+  }
+  return task;
+}
+
+/// Two states in which two policies succeed in both worlds rank nothing; it was MMRV 0 [0, 0], and a gate passed.
+TEST(PairedStateBootstrap, WhereNoReplicateDiffersItsIntervalHoldsWhatTheStatesLeaveOpen) {
+  const auto high = [](std::size_t states, double confidence) {
+    const PairedBootstrap bootstrap = PairedStateBootstrap({NearlyPerfect(2, states, 0)}, {}, kFew);
+    EXPECT_EQ(bootstrap.mmrv->intervals.percentile->high, 0);
+    EXPECT_EQ(bootstrap.mmrv->not_as_drawn, "no replicate differs");
+    EXPECT_EQ(bootstrap.mmrv->of_record(confidence)->low, 0);
+    return bootstrap.mmrv->of_record(confidence)->high;
+  };
+  EXPECT_NEAR(high(2, 0.9), 1 - std::sqrt(0.05), 1e-12) << "one policy may fail in 78 % of such states";
+  EXPECT_NEAR(high(40, 0.9), 1 - std::pow(0.05, 1.0 / 40), 1e-12);
+  EXPECT_GT(high(40, 0.99), high(40, 0.9));
+}
+
+TEST(PairedStateBootstrap, ItsIntervalOfRecordIsThePercentileIntervalWhereReplicatesDifferOrNothingIsAllAlike) {
+  const PairedBootstrap ordinary = PairedStateBootstrap({RandomTask(4, 4, 20)}, {}, kFew);
+  for (const Defined<BootstrapOf>& one : {ordinary.pearson, ordinary.spearman, ordinary.mmrv}) {
+    EXPECT_EQ(one->of_record(0.95)->low, one->intervals.percentile->low);
+    EXPECT_EQ(one->of_record(0.95)->high, one->intervals.percentile->high);
+    EXPECT_EQ(one->not_as_drawn, "");
+  }
+  TaskOutcomes copy;  // rates 1/2, 1/4 and 3/4: the worlds agreed in every state
+  for (const std::size_t period : {2, 4, 1}) {
+    PointOutcomes& point = copy.points.emplace_back();
+    for (std::size_t s = 0; s < 16; ++s) point.real.push_back({period == 1 ? s % 4 != 0 : s % period == 0, 1});
+    point.sim = point.real;
+  }
+  EXPECT_EQ(PairedStateBootstrap({copy}, {}, kFew).pearson->of_record(0.95)->low, 1);
+}
+
+/// One failure of twenty decides in a third of the replicates that there is no correlation at all; the others say 1.
+TEST(PairedStateBootstrap, WhereTooManyReplicatesAreDroppedNobodyKnowsWhereTheyWouldLie) {
+  const PairedBootstrap bootstrap = PairedStateBootstrap({NearlyPerfect(3, 20, 1)}, {}, kFew);
+  ASSERT_GT(bootstrap.pearson->undefined, 60);
+  EXPECT_EQ(bootstrap.pearson->intervals.percentile->low, 1);
+  EXPECT_FALSE(bootstrap.pearson->of_record(0.95));
+  EXPECT_EQ(bootstrap.pearson->of_record(0.9).reason(),
+            std::to_string(bootstrap.pearson->undefined) +
+                " of 300 replicates have none: where they would lie nobody knows");
+  EXPECT_EQ(bootstrap.pearson->not_as_drawn, bootstrap.pearson->of_record(0.95).reason());
+  EXPECT_TRUE(bootstrap.pearson->of_record(0.2)) << "which leaves four fifths outside";
 }
 
 TEST(PairedStateBootstrap, ItsThetaIsTheStatisticOfTheRates) {

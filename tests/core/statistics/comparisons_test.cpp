@@ -76,6 +76,43 @@ TEST(EffectivePairs, OneStateIsOnePairHoweverOftenItIsRepeated) {
   EXPECT_EQ(EffectivePairs(Clusters{{{1, 0}, 1}}).flips.only_first, 1) << "nothing is repeated";
 }
 
+/// `worse` pairs in which only the second succeeds, one a state until all have one, then two.
+std::vector<PairedOutcomes> SpreadOver(std::size_t states, std::int64_t repeats, std::size_t worse) {
+  std::vector<PairedOutcomes> clusters(states, PairedOutcomes{{0, 0}, repeats});
+  for (std::size_t flip = 0; flip < worse; ++flip) ++clusters[flip % states].flips.only_second;
+  return clusters;
+}
+
+/// Of 90 pairs in 30 states that all agree each state counted once, with one flip each pair: "unknown" became "yes".
+TEST(RateDifference, OneFlipMoreIsNoBetterEvidence) {
+  for (const double confidence : {0.8, 0.9, 0.95, 0.99}) {
+    for (const std::size_t states : {2, 3, 5, 10, 30}) {
+      for (const std::int64_t repeats : {1, 2, 3, 4, 8}) {
+        double lowest = 1;
+        for (std::size_t worse = 0; worse <= states * static_cast<std::size_t>(repeats); ++worse) {
+          const Estimate difference = TangoOfClusters(SpreadOver(states, repeats, worse), confidence);
+          EXPECT_LE(difference.interval->low, lowest + 1e-9) << states << " " << repeats << " " << worse;
+          EXPECT_LE(difference.interval->low, *difference.value + 1e-9);
+          EXPECT_GE(difference.interval->high, *difference.value - 1e-9);
+          lowest = difference.interval->low;
+        }
+      }
+    }
+  }
+}
+
+TEST(RateDifference, ItsIntervalRestsOnAsManyPairsAsTheFlipsVouchFor) {
+  EXPECT_EQ(PairsOfInterval(SpreadOver(30, 3, 0)).effective, 30) << "nothing shows that the three are not one";
+  EXPECT_EQ(PairsOfInterval(SpreadOver(30, 3, 1)).effective, 36);
+  EXPECT_EQ(PairsOfInterval(SpreadOver(30, 3, 6)).effective, 90) << "six flips in six states show it";
+  EXPECT_EQ(PairsOfInterval(SpreadOver(30, 3, 6)).all, 90);
+  EXPECT_EQ(EffectivePairs(SpreadOver(30, 3, 6)).flips.only_second, 6) << "to the test all six are flips";
+  const std::vector<PairedOutcomes> single = SpreadOver(30, 1, 1);
+  EXPECT_EQ(TangoOfClusters(single).interval->low, TangoDifference({{0, 1}, 30}).interval->low);
+  EXPECT_EQ(TangoOfClusters({}).interval->low, -1);
+  EXPECT_FALSE(TangoOfClusters({}).value);
+}
+
 TEST(RateDifference, NewcombeOfRatesIsNewcombeWhereNoStateRepeats) {
   const Estimate counts = NewcombeDifference({7, 10}, {3, 12});
   const Estimate rates = NewcombeOfRates(WilsonInterval(7, 10), WilsonInterval(3, 12));

@@ -103,6 +103,19 @@ TEST(PpiByState, FewStatesAreFewHoweverOftenTheyAreTried) {
   EXPECT_FALSE(PpiMeanByState({{{4, 1, 0, 5}}, {{1, 1}, {0, 1}}}, PpiWeight::kTuned).se);
 }
 
+/// All forty real trials succeed, so that the model's five failures explain nothing: weight 0, 100 % [100, 100].
+TEST(Ppi, AnIntervalOfNoWidthIsNotAllowed) {
+  const PpiEstimate tuned = PpiMean({35, 5, 0, 0}, {85, 100}, PpiWeight::kTuned);
+  EXPECT_EQ(*tuned.value, 1);
+  EXPECT_EQ(*tuned.se, 0);
+  EXPECT_EQ(tuned.normal->low, 1) << "what other programs give";
+  EXPECT_EQ(tuned.allowed.reason(), "the estimated spread is 0");
+  PpiStates states;  // the same with two trials of each state
+  for (int i = 0; i < 40; ++i) states.paired.push_back({i < 35 ? 2 : 0, i < 35 ? 0 : 2, 0, 0});
+  states.more = {{8, 10}, {9, 10}};
+  EXPECT_EQ(PpiMeanByState(states, PpiWeight::kTuned).allowed.reason(), "the estimated spread is 0");
+}
+
 TEST(Ppi, WithoutFurtherOutcomesTheRealTrialsStandAlone) {
   const PpiEstimate tuned = PpiMean({5, 1, 2, 2}, {0, 0}, PpiWeight::kTuned);
   EXPECT_EQ(tuned.lambda, 0);
