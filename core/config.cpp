@@ -373,10 +373,10 @@ std::filesystem::path Config::Path(const std::string& key) const {
   return path.is_absolute() ? path : file_.parent_path() / path;
 }
 
-void Config::AllowOnly(std::initializer_list<const char*> known) const {
+void Config::AllowOnly(std::span<const char* const> known) const {
   for (const std::string& key : Keys()) {
     if (std::find(known.begin(), known.end(), key) != known.end()) continue;
-    if (known.size() == 0) throw InvalidInput("{}: there is no such field", Where(key));
+    if (known.empty()) throw InvalidInput("{}: there is no such field", Where(key));
     const auto nearest = std::min_element(known.begin(), known.end(), [&](const char* a, const char* b) {
       return EditDistance(key, a) < EditDistance(key, b);
     });

@@ -4,6 +4,7 @@
 
 #include <filesystem>
 #include <initializer_list>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -50,7 +51,8 @@ class Config {
   std::filesystem::path Path(const std::string& key) const;
 
   /// @throws InvalidInput naming the first key that is not among `known`, and the known one nearest to it.
-  void AllowOnly(std::initializer_list<const char*> known) const;
+  void AllowOnly(std::initializer_list<const char*> known) const { AllowOnly(std::span(known.begin(), known.size())); }
+  void AllowOnly(std::span<const char* const> known) const;
 
   /// "FILE:LINE: field a.b.c" for messages about a field of this mapping: `throw InvalidInput("{}: found …, wanted …", Where("c"))`.
   std::string Where(const std::string& key = "") const;

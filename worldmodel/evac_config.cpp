@@ -1,10 +1,15 @@
 #include "worldmodel/evac_config.h"
 
+#include <map>
+#include <optional>
+#include <string>
+#include <type_traits>
 #include <utility>
 #include <vector>
 
 #include "core/config.h"
 #include "core/tensor_file.h"
+#include "worldmodel/nn/model_sizes.h"
 
 namespace evac {
 namespace {
@@ -54,92 +59,35 @@ void ReadResampler(const Config& page, nn::ResamplerConfig& resampler) {
   Read(page, "ff_mult", resampler.ff_mult);
 }
 
-void ReadOurUNet(const Config& page, nn::UNetConfig& unet) {
-  page.AllowOnly({"in_channels", "out_channels", "model_channels", "channel_mult", "num_res_blocks",
-                  "attention_resolutions", "num_head_channels", "transformer_depth", "context_dim",
-                  "init_attention_heads", "domains", "frame_actions", "hand_views"});
-  ReadUNet(page, unet);
-  Read(page, "init_attention_heads", unet.init_attention_heads);
-  Read(page, "domains", unet.domains);
-  Read(page, "frame_actions", unet.frame_actions);
-  Read(page, "hand_views", unet.hand_views);
+void Read(const Config& page, const nn::Size& size) {
+  std::visit(
+      [&](auto* field) {
+        if constexpr (std::is_same_v<decltype(field), std::optional<double>*>) {
+          if (page.Has(size.name)) *field = page.Get<double>(size.name);
+        } else {
+          Read(page, size.name.c_str(), *field);
+        }
+      },
+      size.field);
 }
 
-void ReadOurVae(const Config& page, nn::VaeConfig& vae) {
-  page.AllowOnly({"channels", "channel_mult", "num_res_blocks", "z_channels", "scale_factor", "patch_px"});
-  Read(page, "channels", vae.channels);
-  Read(page, "channel_mult", vae.channel_mult);
-  Read(page, "num_res_blocks", vae.num_res_blocks);
-  Read(page, "z_channels", vae.z_channels);
-  Read(page, "scale_factor", vae.scale_factor);
-  Read(page, "patch_px", vae.patch_px);
-}
-
-void ReadOurResampler(const Config& page, nn::ResamplerConfig& resampler) {
-  page.AllowOnly({"embedding_dim", "queries", "dim", "depth", "dim_head", "heads", "output_dim", "ff_mult"});
-  ReadResampler(page, resampler);
-  Read(page, "queries", resampler.queries);
-}
-
-void ReadOurEncoder(const Config& page, nn::ImageEncoderConfig& encoder) {
-  page.AllowOnly({"width", "layers", "head_width", "patch_px", "image_px", "embed_dim", "vocabulary", "text_length"});
-  Read(page, "width", encoder.width);
-  Read(page, "layers", encoder.layers);
-  Read(page, "head_width", encoder.head_width);
-  Read(page, "patch_px", encoder.patch_px);
-  Read(page, "image_px", encoder.image_px);
-  Read(page, "embed_dim", encoder.embed_dim);
-  Read(page, "vocabulary", encoder.vocabulary);
-  Read(page, "text_length", encoder.text_length);
-}
-
-void ReadOurSchedule(const Config& page, nn::ScheduleConfig& schedule) {
-  page.AllowOnly(
-      {"steps", "linear_start", "linear_end", "zero_terminal_snr", "dynamic_rescale", "base_scale", "turning_step",
-       "from_last_frame", "carry_plane_m", "carry_frames", "carry_unless_changed", "carry_first",
-       "unchanged_below"});
-  Read(page, "steps", schedule.steps);
-  Read(page, "linear_start", schedule.linear_start);
-  Read(page, "linear_end", schedule.linear_end);
-  Read(page, "zero_terminal_snr", schedule.zero_terminal_snr);
-  Read(page, "dynamic_rescale", schedule.dynamic_rescale);
-  Read(page, "base_scale", schedule.base_scale);
-  Read(page, "turning_step", schedule.turning_step);
-  Read(page, "from_last_frame", schedule.from_last_frame);
-  Read(page, "carry_frames", schedule.carry_frames);
-  Read(page, "carry_unless_changed", schedule.carry_unless_changed);
-  Read(page, "carry_first", schedule.carry_first);
-  Read(page, "unchanged_below", schedule.unchanged_below);
-  if (page.Has("carry_plane_m")) schedule.carry_plane_m = page.Get<double>("carry_plane_m");
-}
-
-void ReadPoseMap(const Config& page, nn::PoseMapConfig& pose_map) {
-  page.AllowOnly({"scaled", "drop_line_m", "tool_length_m", "lag_frames"});
-  Read(page, "scaled", pose_map.scaled);
-  Read(page, "tool_length_m", pose_map.tool_length_m);
-  Read(page, "lag_frames", pose_map.lag_frames);
-  if (page.Has("drop_line_m")) pose_map.drop_line_m = page.Get<double>("drop_line_m");
-}
-
+/// Our page: the fields of nn::SizesOf, by section.
 nn::ModelConfig ReadOurs(const Config& page) {
-  page.AllowOnly({"chunk", "memory", "views", "image_height_px", "image_width_px", "fps", "domain", "schedule", "unet",
-                  "vae", "action_resampler", "image_resampler", "image_encoder", "pose_map", "object_forecast"});
   nn::ModelConfig config;
-  Read(page, "chunk", config.chunk);
-  Read(page, "memory", config.memory);
-  Read(page, "views", config.views);
-  Read(page, "image_height_px", config.image_height_px);
-  Read(page, "image_width_px", config.image_width_px);
-  Read(page, "fps", config.fps);
-  Read(page, "domain", config.domain);
-  Read(page, "object_forecast", config.object_forecast);
-  if (page.Has("pose_map")) ReadPoseMap(page.Section("pose_map"), config.pose_map);
-  if (page.Has("schedule")) ReadOurSchedule(page.Section("schedule"), config.schedule);
-  if (page.Has("unet")) ReadOurUNet(page.Section("unet"), config.unet);
-  if (page.Has("vae")) ReadOurVae(page.Section("vae"), config.vae);
-  if (page.Has("action_resampler")) ReadOurResampler(page.Section("action_resampler"), config.action_resampler);
-  if (page.Has("image_resampler")) ReadOurResampler(page.Section("image_resampler"), config.image_resampler);
-  if (page.Has("image_encoder")) ReadOurEncoder(page.Section("image_encoder"), config.image_encoder);
+  const std::vector<nn::Size> sizes = nn::SizesOf(config);
+  std::map<std::string, std::vector<const char*>> fields;  // by section; of the page itself: its sections too
+  for (const nn::Size& size : sizes) fields[size.section].push_back(size.name.c_str());
+  for (const auto& [section, names] : fields) {
+    if (!section.empty()) fields[""].push_back(section.c_str());
+  }
+  page.AllowOnly(fields[""]);
+  for (const auto& [section, names] : fields) {
+    if (!section.empty() && page.Has(section)) page.Section(section).AllowOnly(names);
+  }
+  for (const nn::Size& size : sizes) {
+    if (size.section.empty()) Read(page, size);
+    else if (page.Has(size.section)) Read(page.Section(size.section), size);
+  }
   return config;
 }
 

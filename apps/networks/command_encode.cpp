@@ -17,6 +17,7 @@
 #include "core/file.h"
 #include "core/hash.h"
 #include "worldmodel/evac_config.h"
+#include "worldmodel/nn/library.h"
 #include "worldmodel/nn/threads.h"
 #include "worldmodel/nn/weights.h"
 #include "worldmodel/train/encode_shards.h"
@@ -33,11 +34,18 @@ struct EncodeArguments {
   std::int64_t steps = 2;
   int threads = 0;
   bool bf16 = false;
+  std::string device = "cpu";
 };
 
 int ThreadsOf(const EncodeArguments& arguments) {
   const auto cores = static_cast<int>(std::thread::hardware_concurrency());
   return arguments.threads > 0 ? arguments.threads : std::max(1, cores);
+}
+
+at::Device DeviceOf(const EncodeArguments& arguments) {
+  if (arguments.device == "cuda" && !nn::HasCuda())
+    throw InvalidInput("--device cuda: the libtorch that evac was built with has no CUDA; wanted cpu");
+  return arguments.device == "cuda" ? at::kCUDA : at::kCPU;
 }
 
 /// Calls `work` with 0 … count - 1. Each thread takes a shard of its own: threads that share a picture's layers wait for
@@ -55,19 +63,22 @@ void ForEachShard(const EncodeArguments& arguments, std::size_t count, const std
   for (std::future<void>& other : others) other.get();
 }
 
-const char* ProductsOf(const EncodeArguments& arguments) { return arguments.bf16 ? "bfloat16" : "float32"; }
+std::string ProductsOf(const EncodeArguments& arguments) {
+  return std::string(arguments.bf16 ? "bfloat16" : "float32") + (arguments.device == "cpu" ? "" : " on cuda");
+}
 
 ExitCode Encode(const EncodeArguments& arguments) {
   const nn::ModelConfig config = ReadEvacConfig(arguments.config);
   train::CheckpointWeights file(arguments.codec);
-  train::TrainableWeights weights(file, arguments.bf16 ? at::kBFloat16 : at::kFloat);
+  const at::Device device = DeviceOf(arguments);
+  train::TrainableWeights weights(file, arguments.bf16 ? at::kBFloat16 : at::kFloat, device);
   const nn::Vae vae(nn::Scope(weights, train::kCodecPrefix), config.vae);
   const std::string codec = CodecSha256(arguments.codec);
   const std::vector<std::filesystem::path> shards = train::ShardPaths(arguments.shards);
   std::atomic<std::size_t> encoded = 0;
   ForEachShard(arguments, shards.size(), [&](std::size_t i) {
     const train::EncodeOptions options{codec, Sha256HexOfFile(shards[i]), ProductsOf(arguments),
-                                       config.vae.scale_factor};
+                                       config.vae.scale_factor, device};
     if (train::IsEncoded(shards[i], options)) return;
     train::EncodeShard(vae, shards[i], options);
     fmt::print(stderr, "{}: encoded, {} of {}\n", train::LatentsPath(shards[i]).string(), ++encoded, shards.size());
@@ -158,6 +169,10 @@ void AddEncode(CLI::App& app, ExitCode& exit_code) {
       "--imagined", arguments->imagined,
       "a folder that becomes the same shards with other latents: what the world model beside the codec imagines of each "
       "recording, told what was told, from its first picture on");
+  command->add_option("--device", arguments->device, "cpu, or cuda where libtorch has it")
+      ->check(CLI::IsMember({"cpu", "cuda"}))
+      ->capture_default_str()
+      ->excludes(imagined);
   command->add_option("--steps", arguments->steps, "with --imagined: calls of the network per chunk")
       ->check(CLI::Range(1, 1000))
       ->capture_default_str()

@@ -12,6 +12,7 @@
 #include "core/file.h"
 #include "worldmodel/train/train_forecast.h"
 #include "worldmodel/train/train_world.h"
+#include "worldmodel/train/training_job.h"
 
 namespace evac {
 namespace {
@@ -20,7 +21,32 @@ namespace fs = std::filesystem;
 
 using Arguments = std::shared_ptr<TrainArguments>;
 
+/// --job: the pages are read and the files hashed, as if the training began; it is done elsewhere.
+/// @param options  of the job, of its kind
+template <class Options>
+ExitCode WriteJob(const TrainArguments& arguments, const std::string& section, train::TrainingJob& job,
+                  Options& options) {
+  ReadTrainingPage(arguments.training, section, arguments.settings, SettingsOf(options));
+  Override(arguments, options.job.trainer);
+  TrainingProgress progress(stderr);
+  const train::JobPlace place = PlaceOf(arguments, progress);
+  CheckHoldouts(place.shards);
+  job.config = place.config;
+  job.begun_with = place.begun_with;
+  job.wants_init = !arguments.init.empty();
+  job.wants_forecast = !arguments.forecast.empty();
+  train::WriteTrainingJob(arguments.job, job);
+  fmt::print("{}: carry it, the shards and the weights that were named. There: evac-train {} SHARDS --out OUT\n",
+             arguments.job, fs::path(arguments.job).filename().string());
+  return ExitCode::kOk;
+}
+
 ExitCode RunCodec(const TrainArguments& arguments) {
+  if (!arguments.job.empty()) {
+    train::TrainingJob job;
+    job.kind = train::TrainingKind::kCodec;
+    return WriteJob(arguments, "codec", job, job.codec);
+  }
   const auto run = [&](const train::JobPlace& place, const train::CodecOptions& options) {
     return TrainCodec(place, options, arguments.init);
   };
@@ -47,6 +73,11 @@ void WriteStrips(const fs::path& out, std::int64_t step, const train::Strips& st
 ExitCode RunWorld(const TrainArguments& arguments) {
   const train::WorldStart start{arguments.codec,      arguments.init,     arguments.init_except,
                                 arguments.init_widen, arguments.forecast, CodecSha256(arguments.codec)};
+  if (!arguments.job.empty()) {
+    train::TrainingJob job;
+    job.start = start;
+    return WriteJob(arguments, "world", job, job.world);
+  }
   const auto look = [&](std::int64_t step, const train::Strips& strips) { WriteStrips(arguments.out, step, strips); };
   const auto run = [&](const train::JobPlace& place, const train::WorldOptions& options) {
     return TrainWorld(place, options, start, look);
@@ -63,6 +94,7 @@ void AddCodec(CLI::App& group, ExitCode& exit_code) {
   CLI::App* command = group.add_subcommand("codec", "Train the latent codec on pictures and pose maps.");
   AddShared(*command, arguments);
   AddConfig(*command, arguments)->required();
+  AddElsewhere(*command, arguments);
   AddInit(*command, *arguments, "a file with a codec (alone or in a whole model) to go on from; every key must fit");
   command->footer(
       "Examples:\n"
@@ -93,6 +125,7 @@ void AddWorld(CLI::App& group, ExitCode& exit_code) {
   CLI::App* command = group.add_subcommand("world", "Train the world model on encoded shards.");
   AddShared(*command, arguments);
   AddConfig(*command, arguments)->required();
+  AddElsewhere(*command, arguments);
   command->add_option("--codec", arguments->codec, "the codec's weights, which encoded the shards")
       ->required()
       ->check(CLI::ExistingFile);

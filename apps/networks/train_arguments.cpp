@@ -6,10 +6,14 @@
 #include <thread>
 
 #include "apps/interrupts.h"
+#include "apps/number_range.h"
+#include "apps/warnings.h"
 #include "core/config.h"
 #include "core/file.h"
 #include "core/hash.h"
+#include "core/version.h"
 #include "worldmodel/evac_config.h"
+#include "worldmodel/nn/library.h"
 
 namespace evac {
 namespace {
@@ -51,7 +55,7 @@ void AddTraining(CLI::App& command, const std::shared_ptr<TrainArguments>& argum
   command.add_option("--set", arguments->settings, "NAME=VALUE, one option of that page; may be given again");
   CLI::Option* minutes =
       command.add_option("--minutes", arguments->minutes, "as many steps as fit, counted once after the first");
-  minutes->check(CLI::Range(0.001, 1e6));
+  minutes->check(Within(0.001, 1e6));
   command.add_option("--steps", arguments->steps, "so many steps")
       ->check(CLI::Range(std::int64_t{1}, std::int64_t{1} << 40))
       ->excludes(minutes);
@@ -60,6 +64,19 @@ void AddTraining(CLI::App& command, const std::shared_ptr<TrainArguments>& argum
       ->check(CLI::Range(1, 1024));
   command.add_option("-o,--out", arguments->out, "the folder to write; if it holds this training, it goes on")
       ->required();
+}
+
+void AddElsewhere(CLI::App& command, const std::shared_ptr<TrainArguments>& arguments) {
+  command.add_option("--device", arguments->device, "cpu, or cuda where libtorch has it")
+      ->check(CLI::IsMember({"cpu", "cuda"}))
+      ->capture_default_str();
+  CLI::Option* out = command.get_option("--out");
+  out->required(false);
+  command
+      .add_option("--job", arguments->job,
+                  "a file to write instead of training: what this command says, for evac-train on a machine that has "
+                  "libtorch alone")
+      ->excludes(out);
 }
 
 CLI::Option* AddConfig(CLI::App& command, const std::shared_ptr<TrainArguments>& arguments) {
@@ -74,6 +91,8 @@ void Override(const TrainArguments& arguments, train::TrainerOptions& options) {
 }
 
 train::JobPlace PlaceOf(const TrainArguments& arguments, TrainingProgress& progress) {
+  if (arguments.device == "cuda" && !nn::HasCuda())
+    throw InvalidInput("--device cuda: the libtorch that evac was built with has no CUDA; wanted cpu");
   const int cores = std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
   return {train::ShardFolders(arguments.shards.begin(), arguments.shards.end()),
           arguments.out,
@@ -82,12 +101,22 @@ train::JobPlace PlaceOf(const TrainArguments& arguments, TrainingProgress& progr
           IsInterrupted,
           [&](const train::TrainerProgress& at) { progress.Show(at); },
           [&](const std::string& sentence) { progress.Say(sentence); },
-          BegunWith(arguments)};
+          BegunWith(arguments),
+          arguments.device == "cuda" ? at::Device(at::kCUDA) : at::Device(at::kCPU)};
 }
 
 RunLock HoldFolder(const std::filesystem::path& out) {
+  if (out.empty()) throw InvalidInput("--out is required");  // where --job may stand in its place
   MakeFolders(out);
   return RunLock(out / "lock");
+}
+
+void KeepWhoBegan(const std::filesystem::path& out) {
+  const std::filesystem::path file = out / "begun_by";
+  if (!std::filesystem::exists(out / "training.safetensors")) return WriteFileAtomically(file, EVAC_VERSION "\n");
+  std::string began = std::filesystem::exists(file) ? ReadFile(file) : "";
+  std::erase(began, '\n');
+  SayIfAnotherVersionBegan(out, began);
 }
 
 int LibraryThreadsOf(const train::JobPlace& place, const train::JobOptions& options) {

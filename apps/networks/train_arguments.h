@@ -17,7 +17,7 @@ namespace evac {
 /// What every `evac train …` is told.
 struct TrainArguments {
   std::vector<std::string> shards;
-  std::string config, training, out, codec, forecast, init;
+  std::string config, training, out, codec, forecast, init, job, device = "cpu";
   std::vector<std::string> settings, init_except;
   std::vector<std::int64_t> keep_steps;
   std::optional<double> minutes;
@@ -31,6 +31,9 @@ void AddTraining(CLI::App& command, const std::shared_ptr<TrainArguments>& argum
 /// The same and SHARDS.
 void AddShared(CLI::App& command, const std::shared_ptr<TrainArguments>& arguments);
 
+/// Adds --device, and --job, with which --out is not wanted: of trainings that can be carried to another machine.
+void AddElsewhere(CLI::App& command, const std::shared_ptr<TrainArguments>& arguments);
+
 /// Adds --config, the page of the network's sizes.
 CLI::Option* AddConfig(CLI::App& command, const std::shared_ptr<TrainArguments>& arguments);
 
@@ -38,11 +41,16 @@ CLI::Option* AddConfig(CLI::App& command, const std::shared_ptr<TrainArguments>&
 void Override(const TrainArguments& arguments, train::TrainerOptions& options);
 
 /// @param arguments, progress  outlive what is returned. Its `config` is read from --config, if that was given.
+/// @throws InvalidInput for a --device that libtorch has not
 train::JobPlace PlaceOf(const TrainArguments& arguments, TrainingProgress& progress);
 
 /// Makes OUT and holds it for this process: two trainings would write one another's files.
-/// @throws InvalidInput naming the process that holds it
+/// @throws InvalidInput naming the process that holds it, or if no OUT was given
 RunLock HoldFolder(const std::filesystem::path& out);
+
+/// Writes into OUT/begun_by which version of evac begins the training; where another began the one that is there, a note
+/// on stderr says so. Needs HoldFolder.
+void KeepWhoBegan(const std::filesystem::path& out);
 
 /// Threads that share the parts of a step use one core each.
 int LibraryThreadsOf(const train::JobPlace& place, const train::JobOptions& options);

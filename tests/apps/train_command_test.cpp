@@ -13,6 +13,7 @@
 #include "core/store_lock.h"
 #include "tests/apps/learning_shards.h"
 #include "tests/apps/printed.h"
+#include "tests/support/command.h"
 #include "tests/support/temp_folder.h"
 
 /// What `evac train` and `evac judge train` take and refuse, before and when they go on.
@@ -83,6 +84,20 @@ TEST_F(TrainCommand, GoesOnWithTheSamePageAndFilesAlone) {
               HasSubstr("is planned for 1 steps and has done them; more --steps go on"));
   Replace("page.yaml", "steps: 1000", "steps: 900");  // no shape depends on it
   EXPECT_THAT([&] { TrainCodec(); }, refused);
+}
+
+TEST_F(TrainCommand, SaysThatAnotherVersionOfEvacBeganTheTraining) {
+  const auto note = [&] {
+    testing::internal::CaptureStderr();
+    TrainCodec();
+    return testing::internal::GetCapturedStderr();
+  };
+  EXPECT_THAT(note(), Not(HasSubstr("was begun by")));
+  EXPECT_THAT(note(), Not(HasSubstr("was begun by"))) << "this one did";
+  WriteFileAtomically(Path("codec/begun_by"), "0.0.1\n");
+  EXPECT_THAT(note(), HasSubstr("evac: note: " + Path("codec") + " was begun by evac 0.0.1; evac "));
+  std::filesystem::remove(Path("codec/begun_by"));
+  EXPECT_THAT(note(), HasSubstr("was begun by an evac that did not write down its version"));
 }
 
 TEST_F(TrainCommand, AFolderThatAnotherTrainingWritesIsRefusedWithItsProcess) {
@@ -172,6 +187,24 @@ TEST_F(TrainCommand, OptionsThatDoNothingAreRefused) {
         << option;
 }
 
+/// The trained judge was replaced, and its training put it back uncalibrated.
+TEST_F(TrainCommand, CalibratingTakesNoStepsAndNoFolderOfATraining) {
+  const std::vector<std::string> words = {"judge",            Path("shards"), "--init",     Path("page.yaml"),
+                                          "--calibrate-only", "--out",        Path("judge")};
+  for (const std::vector<std::string>& option : {std::vector<std::string>{"--steps", "5"}, {"--minutes", "5"}}) {
+    std::vector<std::string> more = words;
+    more.insert(more.end(), option.begin(), option.end());
+    EXPECT_THROW(Train(more), CLI::ExcludesError) << option.front();
+  }
+  MakeFolders(Path("judge"));
+  for (const char* file : {"judge/training.safetensors", "judge/judge.safetensors"})
+    WriteFileAtomically(Path(file), "trained");
+  EXPECT_THAT([&] { Train(words); },
+              ThrowsMessage<Error>(AllOf(HasSubstr("--out: " + Path("judge") + " holds a training"),
+                                         HasSubstr("wanted another folder"))));
+  EXPECT_EQ(ReadFile(Path("judge/judge.safetensors")), "trained");
+}
+
 TEST_F(TrainCommand, ASideThatIsNoMultipleOfEightIsSaidToBeNone) {
   const auto judge = [&](const char* option, const char* side) {
     const std::vector<std::string> words = {"train", Path("shards"), option, side, "--out", Path("out")};
@@ -183,6 +216,43 @@ TEST_F(TrainCommand, ASideThatIsNoMultipleOfEightIsSaidToBeNone) {
                   ThrowsMessage<CLI::ValidationError>(
                       AllOf(HasSubstr(option), HasSubstr("found " + std::string(side) + ", wanted a multiple of 8"))));
   }
+}
+
+TEST_F(TrainCommand, AJobThatIsCarriedElsewhereTrainsTheSameWeights) {
+  TrainCodec({"--threads", "1"});
+  EXPECT_THAT(Train({"codec", Path("shards"), "--config", Path("page.yaml"), "--job", Path("job"), "--set", "batch=2", "--steps", "1"}),
+              HasSubstr("There: evac-train job SHARDS --out OUT"));
+  EXPECT_FALSE(std::filesystem::exists(Path("job.tmp")));
+  const auto there = [&](const std::vector<std::string>& more) {
+    std::vector<std::string> words = {Binary("evac-train"), Path("job"), Path("shards"), "--threads", "1"};
+    words.insert(words.end(), more.begin(), more.end());
+    return RunCommand(words);
+  };
+  const CommandResult trained = there({"--out", Path("there")});
+  EXPECT_EQ(trained.exit_code, 0) << trained.err;
+  EXPECT_THAT(trained.out, HasSubstr("there/codec.safetensors: done after 1 steps"));
+  EXPECT_EQ(ReadFile(Path("there/codec.safetensors")), ReadFile(Path("codec/codec.safetensors")));
+
+  const auto refused = [&](const std::vector<std::string>& more, const std::string& why) {
+    const CommandResult result = there(more);
+    EXPECT_EQ(result.exit_code, 2) << why;
+    EXPECT_THAT(result.err, HasSubstr("evac-train: " + why));
+  };
+  refused({}, "--out is missing");
+  refused({"--out", Path("x"), "--init", Path("codec/codec.safetensors")}, "--init: the job was written without it");
+  refused({"--out", Path("x"), "--device", "gpu"}, "--device: found 'gpu', wanted cpu, cuda or cuda:N");
+  refused({"--out", Path("x"), "--steps", "0"}, "--steps: found '0', wanted 1 to ");
+  refused({"--out", Path("there"), "--steps", "2", "--threads", "2"}, Path("there/training.safetensors") + " is a training with other options");
+}
+
+TEST_F(TrainCommand, WantsAFolderToWriteOrAJobAndNotBoth) {
+  const std::vector<std::string> codec = {"codec", Path("shards"), "--config", Path("page.yaml")};
+  EXPECT_THAT([&] { Train(codec); }, ThrowsMessage<Error>(HasSubstr("--out is required")));
+  std::vector<std::string> both = codec;
+  both.insert(both.end(), {"--out", Path("out"), "--job", Path("job")});
+  EXPECT_THROW(Train(both), CLI::ExcludesError);
+  EXPECT_FALSE(std::filesystem::exists(Path("out")));
+  EXPECT_FALSE(std::filesystem::exists(Path("job")));
 }
 
 }  // namespace

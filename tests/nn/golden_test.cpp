@@ -10,6 +10,7 @@
 #include <string>
 
 #include "core/tensor_file.h"
+#include "tests/support/temp_folder.h"
 
 namespace evac {
 namespace {
@@ -46,9 +47,8 @@ TEST(GoldenCheck, EveryFileOfTheReferenceAgrees) {
 
 class OddFolder : public testing::Test {
  protected:
-  void SetUp() override { fs::create_directories(folder_); }
-  void TearDown() override { fs::remove_all(folder_); }
-  fs::path folder_ = fs::temp_directory_path() / ("golden_check_" + std::to_string(::getpid()));
+  const TempFolder temp_;
+  const fs::path folder_ = temp_.path();
 };
 
 TEST_F(OddFolder, AFileOfAnUnknownKindIsSkippedAndThatIsNoSuccess) {

@@ -258,5 +258,22 @@ TEST_F(Weights, CutOffAnywhereEndInAMessage) {
   }
 }
 
+/// They were taken without a word: what is imagined was wrong, and nothing said so.
+TEST_F(Weights, SayWhichSizesTheyWereTrainedWithThatNoShapeShows) {
+  config_.schedule.from_last_frame = true;
+  const fs::path path = Saved(1, {.metadata = {{"sizes", SizesNobodySees(config_)}}});
+  EXPECT_EQ(Refusal(path), "nothing was thrown");
+  config_.schedule.from_last_frame = false;
+  EXPECT_THAT(Refusal(path), AllOf(HasSubstr("seed1.safetensors: was trained with schedule.from_last_frame true"),
+                                   HasSubstr("the page of sizes says false")));
+  config_.schedule.from_last_frame = true;
+  config_.vae.scale_factor = 1;
+  EXPECT_THAT(Refusal(path), HasSubstr("vae.scale_factor 0.18215"));
+  EXPECT_NO_THROW(CompareSizes(TensorFile::Open(path), config_, {"unet."})) << "the codec's own is not asked";
+  config_.unet.num_head_channels = 8;
+  EXPECT_THROW(CompareSizes(TensorFile::Open(path), config_, {"unet."}), TensorError);
+  EXPECT_NO_THROW(CompareSizes(TensorFile::Open(Saved(2)), config_)) << "of earlier versions it is not known";
+}
+
 }  // namespace
 }  // namespace evac::nn

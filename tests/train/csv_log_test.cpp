@@ -1,10 +1,12 @@
 #include "worldmodel/train/csv_log.h"
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <fstream>
 #include <iterator>
 
+#include "core/tensor_file.h"
 #include "tests/support/temp_folder.h"
 
 namespace evac::train {
@@ -36,6 +38,13 @@ TEST(CsvLog, ARowThatWasCutOffGoes) {
   CsvLog::Trim(table, "step,loss", 2);
   CsvLog::Add(table, "1,2");
   EXPECT_EQ(Text(table), "step,loss\n0,3\n1,2\n");
+}
+
+/// It was somebody's wrong input, without the reason.
+TEST(CsvLog, ADiskThatTakesNoMoreIsTheMachines) {
+  EXPECT_THAT([] { CsvLog::Add("/dev/full", "0,3"); },
+              testing::ThrowsMessage<TensorWriteError>(
+                  testing::AllOf(testing::HasSubstr("/dev/full: cannot be written: "), testing::HasSubstr("No space left"))));
 }
 
 }  // namespace

@@ -103,16 +103,23 @@ TEST(TrainForecast, EndsInTheSameBytesWhenItWasKilled) {
   EXPECT_TRUE(at::equal(weights("whole"), weights("killed")));
 }
 
-/// A file of variants: of each of the training shard's clips one, told the same, of that outcome.
-void WriteVariants(const std::filesystem::path& shards, std::int8_t outcome, const std::string& recipe, std::int64_t of = 0) {
-  const std::filesystem::path shard = shards / "shard_00000.safetensors";
+/// A file of variants: of each of a shard's clips one, told the same, of that outcome.
+void WriteVariantsOf(const std::filesystem::path& shard, std::int8_t outcome, TensorMetadata metadata,
+                     std::int64_t of = 0) {
   nn::MappedTensors file(TensorFile::Open(shard));
   const Tensor start = file.Get("clip_start"), clip = at::arange(start.size(0) - 1) + of,
                outcomes = at::full({clip.size(0)}, outcome, at::kChar), actions = file.Get("actions"),
                places = file.Get("object_px");
   const TensorView views[] = {nn::ViewOf("clip", clip), nn::ViewOf("start", start), nn::ViewOf("actions", actions),
                               nn::ViewOf("object_px", places), nn::ViewOf("outcome", outcomes)};
-  WriteTensorFile(VariantsPath(shard), views, {{"format", "evac-variants"}, {"version", "1"}, {"recipe", recipe}});
+  metadata.merge(TensorMetadata{{"format", "evac-variants"}, {"version", "1"}});
+  WriteTensorFile(VariantsPath(shard), views, metadata);
+}
+
+/// Of the training shard.
+void WriteVariants(const std::filesystem::path& shards, std::int8_t outcome, const std::string& recipe,
+                   std::int64_t of = 0) {
+  WriteVariantsOf(shards / "shard_00000.safetensors", outcome, {{"recipe", recipe}}, of);
 }
 
 std::string RecipeOf(const std::filesystem::path& shards) {
@@ -223,6 +230,34 @@ TEST(Variants, OfOtherShardsOrOfClipsThatAreNotThereAreRefused) {
   EXPECT_THAT(opened, ThrowsMessage<TensorError>(HasSubstr("recipe is 'another'")));
   WriteVariants(folder / "shards", 1, recipe, 1);
   EXPECT_THAT(opened, ThrowsMessage<TensorError>(HasSubstr("variant 5 is of clip 6 of 6")));
+}
+
+/// `evac vary` with another seed, killed half way, left a mixture, and forecasts were trained on it.
+TEST(Variants, OfAnotherSeedOrOfSomeShardsAloneAreRefused) {
+  const TempFolder folder;
+  WriteSyntheticShards(folder / "shards", {});
+  const std::filesystem::path first = folder / "shards/shard_00000.safetensors",
+                              second = folder / "shards/shard_00001.safetensors";
+  const TensorMetadata said = TensorFile::Open(second).metadata();
+  std::filesystem::copy_file(first, second, std::filesystem::copy_options::overwrite_existing);  // two of one split
+  ASSERT_EQ(said.at("recipe"), RecipeOf(folder / "shards"));
+  const auto vary = [&](const std::filesystem::path& shard, const char* count, const char* seed) {
+    WriteVariantsOf(shard, 1, {{"recipe", said.at("recipe")}, {"count", count}, {"seed", seed}});
+  };
+  const auto opened = [&] {
+    ShardSet set(folder / "shards", Split::kTrain);
+    set.OpenVariants();
+    return set.variants().size();
+  };
+  vary(first, "4", "1");
+  const std::string others = ", shard_00000.safetensors has variants of count 4 and seed 1: wanted the same of all";
+  EXPECT_THAT(opened, ThrowsMessage<TensorError>(HasSubstr("shard_00001.safetensors has no variants" + others)));
+  vary(second, "4", "2");
+  EXPECT_THAT(opened, ThrowsMessage<TensorError>(HasSubstr("has variants of count 4 and seed 2" + others)));
+  vary(second, "3", "1");
+  EXPECT_THAT(opened, ThrowsMessage<TensorError>(HasSubstr("count 3 and seed 1")));
+  vary(second, "4", "1");
+  EXPECT_EQ(opened(), 12u);
 }
 
 TEST(TrainForecast, RefusesShardsThatDoNotSayWhereTheirObjectIs) {

@@ -135,6 +135,14 @@ TEST(Curves, OfNothingOrOfOneNumberAreStillAPicture) {
   EXPECT_EQ(Occurrences(svg, "nan"), 0U);
 }
 
+TEST(Curves, ARowOfAStepBelowZeroIsLeftOut) {
+  const TempFolder folder;
+  std::ofstream(folder / "metrics.csv") << "step,loss\n1,3\n20,2\n";
+  const std::string svg = CurvesSvg(folder.path());
+  std::ofstream(folder / "metrics.csv", std::ios::app) << "-5,4\n";
+  EXPECT_EQ(CurvesSvg(folder.path()), svg);
+}
+
 TEST(Trainer, GoesOnAfterAnyKillAsIfNothingHadHappened) {
   const TempFolder whole_folder, killed_folder;
   Regression whole;
@@ -164,6 +172,28 @@ TEST(Trainer, GoesOnAfterAnyKillAsIfNothingHadHappened) {
 std::string Text(const std::filesystem::path& path) {
   std::ifstream file(path);
   return {std::istreambuf_iterator<char>(file), {}};
+}
+
+/// It was cut to its header.
+TEST(Trainer, RefusesATableOfSomebodysWhereNothingWasTrainedYet) {
+  for (const char* name : {"metrics.csv", "holdout.csv"}) {
+    const TempFolder folder;
+    std::ofstream(folder / name) << "week,sales\n1,2\n";
+    Regression regression;
+    EXPECT_THAT([&] { Trainer(regression.Parameters(), QuickTrainer(10), folder.path()); },
+                testing::ThrowsMessage<TensorError>(testing::HasSubstr((folder / name).string())));
+    EXPECT_EQ(Text(folder / name), "week,sales\n1,2\n");
+  }
+}
+
+TEST(Trainer, GoesOnFromItsTablesWhereItWasKilledBeforeItsFirstCheckpoint) {
+  const TempFolder folder;
+  std::ofstream(folder / "metrics.csv") << "step,loss,learning_rate,gradient_norm,seconds\n0,1,1,1,1\n";
+  std::ofstream(folder / "holdout.csv") << "";  // of a power cut
+  Regression regression;
+  Trainer(regression.Parameters(), QuickTrainer(10), folder.path());
+  EXPECT_EQ(Text(folder / "metrics.csv"), "step,loss,learning_rate,gradient_norm,seconds\n");
+  EXPECT_EQ(Text(folder / "holdout.csv"), "step,holdout\n");
 }
 
 TEST(Trainer, KeepsTheBestOfTheHoldoutAndStopsWhenItGetsNoBetter) {
@@ -244,26 +274,33 @@ TEST(Trainer, RefusesTheCheckpointOfAnotherTraining) {
   TrainerOptions other = QuickTrainer(3);
   other.learning_rate = 0.1;
   Regression again;
-  EXPECT_THROW(Trainer(again.Parameters(), other, folder.path()), TensorError);
-  EXPECT_THROW(Trainer({{"weight", at::zeros({3, 1})}}, QuickTrainer(3), folder.path()), TensorError);
+  using testing::HasSubstr;
+  using testing::ThrowsMessage;
+  EXPECT_THAT([&] { Trainer(again.Parameters(), other, folder.path()); },
+              ThrowsMessage<TensorError>(HasSubstr("is a training with other options")));
+  EXPECT_THAT([&] { Trainer({{"weight", at::zeros({3, 1})}}, QuickTrainer(3), folder.path()); },
+              ThrowsMessage<TensorError>(HasSubstr("is a training of other parameters")));
 }
 
 TEST(Trainer, AStepWhoseLossIsNotFiniteMovesNothing) {
   const TempFolder folder;
   Regression regression;
   Trainer trainer(regression.Parameters(), QuickTrainer(30), folder.path());
+  std::vector<Tensor> before;  // each step
   trainer.Run({.loss = [&](const StepPlace& place) {
+    before.push_back(regression.All());
     const Tensor loss = regression.Loss(place);
     return place.step % 3 == 1 ? loss / 0.0 : loss;
   }});
-  EXPECT_TRUE(std::isfinite(regression.All().sum().item<double>()));
+  ASSERT_EQ(before.size(), 30U);
+  for (std::size_t step = 0; step + 1 < before.size(); ++step)
+    EXPECT_EQ(at::equal(before[step + 1], before[step]), step % 3 == 1) << step;
   TrainerOptions hopeless = QuickTrainer(200);
   const TempFolder other;
   Regression second;
-  EXPECT_THROW(Trainer(second.Parameters(), hopeless, other.path()).Run({.loss = [&](const StepPlace& place) {
-    return second.Loss(place) / 0.0;
-  }}),
-               TensorError);
+  Trainer in_vain(second.Parameters(), hopeless, other.path());
+  EXPECT_THAT([&] { in_vain.Run({.loss = [&](const StepPlace& place) { return second.Loss(place) / 0.0; }}); },
+              testing::ThrowsMessage<TensorError>(testing::HasSubstr("loss or gradient is not finite for ")));
 }
 
 TEST(Trainer, CountsTheStepsThatFitIntoTheMinutesOnceAndKeepsThem) {

@@ -302,5 +302,62 @@ TEST_F(WorldStartTest, AHoldoutOfNothingIsRefused) {
   EXPECT_THAT([&] { TrainCodec(Place("none"), codec); }, refused);
 }
 
+/// The one inside a whole model was not looked at: it looked into the wrong view, and the denoiser learned from its maps.
+TEST_F(WorldStartTest, AForecastOfOtherCamerasInsideTheFirstWeightsIsRefusedToo) {
+  WorldStart start{.codec = Codec()};
+  start.forecast = Forecast();
+  ASSERT_EQ(Train(Place("world"), start), "done");
+  const std::filesystem::path other = folder_ / "other.safetensors";
+  {
+    const TensorFile file = TensorFile::Open(Weights("world"));
+    TensorMetadata metadata = file.metadata();
+    metadata["cameras"] = "hand_right,head";
+    WriteTensorFile(other, file.tensors(), metadata);
+  }
+  start.forecast.clear();
+  start.init = other;
+  EXPECT_THAT([&] { Train(Place("refused"), start); },
+              ThrowsMessage<TensorError>(HasSubstr("other.safetensors: the forecast was trained for cameras 'hand_right,head'")));
+}
+
+TEST_F(WorldStartTest, AForecastIsNotDrawnAnewInPart) {
+  WorldStart start{.codec = Codec()};
+  start.forecast = Forecast();
+  ASSERT_EQ(Train(Place("world"), start), "done");
+  start = {.codec = Codec(), .init = Weights("world"), .init_except = {"object_forecast.ends"}};
+  EXPECT_THAT([&] { Train(Place("again"), start); },
+              ThrowsMessage<TensorError>(HasSubstr("object_forecast: true and no forecast is given: wanted --forecast")));
+}
+
+/// Fingertips were read 23 cm off, and the card said the shards' words.
+TEST_F(WorldStartTest, AForecastIsNotTrainedWithAnotherToolThanTheMapsWereDrawnWith) {
+  JobPlace place = Place("forecast");
+  place.config.pose_map.tool_length_m = 0;
+  EXPECT_THAT([&] { TrainForecast(place, QuickForecast(1)); },
+              ThrowsMessage<TensorError>(HasSubstr("the page's pose_map wants 'radius_px=50 thickness_px=8 tool_length_m=0'")));
+}
+
+TEST_F(WorldStartTest, AForecastOfAnotherPlaneIsRefused) {
+  WorldStart start{.codec = Codec()};
+  start.forecast = Forecast();
+  JobPlace place = Place("refused");
+  place.config.schedule.carry_plane_m = 0.75;
+  EXPECT_THAT([&] { Train(place, start); },
+              ThrowsMessage<TensorError>(HasSubstr("the forecast was trained for carry_plane_m '0', wanted '0.75'")));
+}
+
+/// The best step was chosen on recordings that meant something else.
+TEST_F(WorldStartTest, AHoldoutOfOtherRecordingsThanThoseToLearnFromIsRefused) {
+  const std::filesystem::path shard = folder_ / "shards" / "shard_00001.safetensors";  // the hold-out
+  const TensorFile file = TensorFile::Open(shard);
+  TensorMetadata metadata = file.metadata();
+  metadata["period_s"] = "0.2";
+  WriteTensorFile(folder_ / "changed", file.tensors(), metadata);
+  std::filesystem::rename(folder_ / "changed", shard);
+  EXPECT_THAT([&] { TrainCodec(Place("codec2"), QuickCodec(1)); },
+              ThrowsMessage<TensorError>(AllOf(HasSubstr("shard_00001.safetensors: period_s differs from that of"),
+                                               HasSubstr("shard_00000.safetensors"))));
+}
+
 }  // namespace
 }  // namespace evac::train

@@ -5,7 +5,7 @@
 
 #include "worldmodel/nn/layers.h"
 
-/// The convolutional blocks of the denoiser (spec 6.1 to 6.3).
+/// The convolutional blocks of the denoiser, as the reference has them (docs/evac_quirks.md).
 namespace evac::nn {
 
 /// How the first axis of a picture tensor is to be read: rows are (scene, view, frame), frame fastest.

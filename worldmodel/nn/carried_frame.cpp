@@ -252,7 +252,7 @@ Tensor PointOnPlane(const Tensor& places, const Tensor& direction, const Tensor&
   const Tensor ray = RaysThrough(places, direction, at);
   const Tensor camera = origin.select(2, at).select(3, 0).select(2, 0).to(at::kDouble);  // [BV, 3]
   const Tensor distance = (plane_m - camera.narrow(1, 2, 1)) / ray.narrow(1, 2, 1);
-  return at::where(distance > 0, camera + distance * ray, at::full({1, 1}, std::nan(""), at::kDouble));
+  return at::where(distance > 0, camera + distance * ray, at::full({1, 1}, std::nan(""), ray.options()));
 }
 
 }  // namespace evac::nn

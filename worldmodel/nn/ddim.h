@@ -4,7 +4,7 @@
 
 #include "worldmodel/nn/sampler.h"
 
-/// DDIM (Song et al. 2021) as EVAC samples: trailing steps, stochastic by default (spec 8.5).
+/// DDIM (Song et al. 2021) as the reference samples (docs/evac_quirks.md): trailing steps, stochastic by default.
 namespace evac::nn {
 
 struct DdimOptions {
@@ -27,7 +27,7 @@ struct DdimStep {
 /// @throws TensorError unless 1 <= steps <= the schedule's, and eta in [0, 1].
 std::vector<DdimStep> DdimTable(const NoiseSchedule& schedule, const DdimOptions& options);
 
-/// @param noise  called once per step if eta > 0
+/// @param noise  if eta > 0 called once per step that ends in noise: not for the last, unless `end_at_first_step`
 /// @returns [BV, z, T, h, w], memory frames as given
 Tensor SampleDdim(const NoiseSchedule& schedule, const DdimOptions& options, const SampleStart& start,
                   const Denoise& denoise, const DrawNoise& noise, const StepObserver* observer = nullptr);

@@ -157,7 +157,7 @@ struct CausalPadFunction : Function<CausalPadFunction> {
   }
   static Tensors backward(AutogradContext*, const Tensors& gradients) {
     const Tensor& gradient = gradients[0];
-    Tensor dx = gradient.narrow(1, 2, gradient.size(1) - 2).contiguous();
+    Tensor dx = gradient.narrow(1, 2, gradient.size(1) - 2).clone(at::MemoryFormat::Contiguous);
     dx.narrow(1, 0, 1).add_(gradient.narrow(1, 0, 1)).add_(gradient.narrow(1, 1, 1));
     return {dx};
   }

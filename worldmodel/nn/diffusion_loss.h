@@ -4,7 +4,8 @@
 
 #include "worldmodel/nn/evac_model.h"
 
-/// The denoiser's training objective (spec 8.3), and how its input is put together (spec 4).
+/// The denoiser's training objective, the error of v (noise_schedule.h) in the chunk's frames, and how its input is put
+/// together, both as the reference has them (docs/evac_quirks.md).
 namespace evac::nn {
 
 /// What stands beside the noisy latents.

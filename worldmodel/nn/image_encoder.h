@@ -8,7 +8,7 @@
 namespace evac::nn {
 
 /// A picture of any size as the encoder's input: blurred against aliasing where it shrinks, bicubic with corners
-/// aligned, normalised (spec 5).
+/// aligned, normalised: as the reference does (docs/evac_quirks.md).
 /// @param images  [N, 3, H, W] in [-1, 1]
 /// @returns       [N, 3, side_px, side_px]
 Tensor PreprocessForEncoder(const Tensor& images, std::int64_t side_px);

@@ -134,7 +134,7 @@ Tensor GroupNorm::operator()(const Tensor& x, Activation activation) const {
   const bool silu = activation == Activation::kSilu;
   if (!CanUseKernels(x)) {
     if (HasFastGradient(x)) return FastGroupNorm(x, weight, bias, {kGroups, epsilon_, silu});
-    const Tensor y = DifferentiableGroupNorm(x, *this, epsilon_);
+    const Tensor y = DifferentiableGroupNorm(x.to(weight.scalar_type()), *this, epsilon_).to(x.scalar_type());
     return silu ? at::silu(y) : y;
   }
   Tensor y = at::empty(x.sizes(), x.options());
@@ -150,7 +150,8 @@ LayerNorm::LayerNorm(const Scope& at, std::int64_t channels)
 
 Tensor LayerNorm::operator()(const Tensor& x) const {
   if (x.scalar_type() == at::kBFloat16 && HasFastGradient(x)) return FastLayerNorm(x, weight, bias, kLayerNormEpsilon);
-  return at::layer_norm(x, weight.sizes(), weight, bias, kLayerNormEpsilon);
+  const Tensor y = at::layer_norm(x.to(weight.scalar_type()), weight.sizes(), weight, bias, kLayerNormEpsilon);
+  return y.to(x.scalar_type());
 }
 
 Tensor UpsampleNearest(const Tensor& x) {

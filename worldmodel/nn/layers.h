@@ -61,7 +61,7 @@ class Conv2d {
 };
 
 /// A convolution over time that sees the frame itself and the two before it; the first frame stands in for those
-/// before the first (EVAC's causal 3x1x1 convolution, spec 6.3).
+/// before the first (the reference's causal 3x1x1 convolution).
 class CausalConv {
  public:
   CausalConv(const Scope& at, std::int64_t channels);

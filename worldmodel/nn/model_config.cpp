@@ -71,6 +71,33 @@ std::string Number(double value) {
 
 std::string Field(const char* name, double value) { return std::string(" ") + name + "=" + Number(value); }
 
+void RequireBetween(const char* name, double found, double from, double to, const char* wanted) {
+  if (!(found > from && found < to))
+    throw TensorError(std::string(name) + ": found " + Number(found) + ", wanted " + wanted);
+}
+
+/// Numbers by which others are multiplied and divided.
+void CheckFactors(const ModelConfig& config) {
+  RequireBetween("vae.scale_factor", config.vae.scale_factor, 0, 1e6, "above 0");
+  RequireBetween("schedule.linear_start", config.schedule.linear_start, 0, 1, "between 0 and 1");
+  RequireBetween("schedule.linear_end", config.schedule.linear_end, 0, 1, "between 0 and 1");
+  RequireBetween("schedule.base_scale", config.schedule.base_scale, 0, 1e6, "above 0");
+  constexpr std::int64_t kMostSteps = 1'000'000;
+  Require(config.schedule.steps <= kMostSteps, "schedule.steps", config.schedule.steps, "at most a million");
+  Require(config.schedule.turning_step >= 1 && config.schedule.turning_step <= kMostSteps, "schedule.turning_step",
+          config.schedule.turning_step, "1 … a million");
+}
+
+/// Rays are told from the corners of the latent: one place high or wide, it has none.
+void CheckCorners(const ModelConfig& config) {
+  const bool reads_rays = config.schedule.carry_plane_m || config.unet.hand_views > 0 || config.object_forecast;
+  if (!reads_rays || (config.LatentHeight() >= 2 && config.LatentWidth() >= 2)) return;
+  throw TensorError("image_height_px and image_width_px: found " + std::to_string(config.image_height_px) + " and " +
+                    std::to_string(config.image_width_px) + ", wanted twice the codec's stride of " +
+                    std::to_string(config.vae.Stride()) +
+                    " or more with schedule.carry_plane_m, unet.hand_views or object_forecast");
+}
+
 /// @param memory, views  the model's
 void CheckSchedule(const ScheduleConfig& schedule, std::int64_t memory, std::int64_t views) {
   if (schedule.zero_terminal_snr)  // the one step would be all noise and none
@@ -146,6 +173,7 @@ void ModelConfig::Check() const {
   if (object_forecast)
     Require(vae.Stride() % ObjectForecast::kCell_px == 0, "the codec's stride", vae.Stride(),
             "a multiple of " + std::to_string(ObjectForecast::kCell_px) + " with object_forecast");
+  CheckFactors(*this);
   CheckSchedule(schedule, memory, views);
   if (!(pose_map.lag_frames >= 0 && pose_map.lag_frames <= 1))
     throw TensorError("pose_map.lag_frames: found " + Number(pose_map.lag_frames) + ", wanted 0 … 1");
@@ -157,6 +185,7 @@ void ModelConfig::Check() const {
   const std::string wanted = "a multiple of " + std::to_string(multiple) + ", codec stride x 2^(levels - 1)";
   Require(image_height_px > 0 && image_height_px % multiple == 0, "image height", image_height_px, wanted);
   Require(image_width_px > 0 && image_width_px % multiple == 0, "image width", image_width_px, wanted);
+  CheckCorners(*this);
 }
 
 }  // namespace evac::nn

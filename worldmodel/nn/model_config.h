@@ -70,7 +70,7 @@ struct ImageEncoderConfig {
   std::int64_t Tokens() const { return image_px / patch_px * (image_px / patch_px) + 1; }
 };
 
-/// Diffusion noise (spec 8.1).
+/// Diffusion noise (noise_schedule.h).
 struct ScheduleConfig {
   std::int64_t steps = 1000;
   double linear_start = 0.00085;
@@ -102,13 +102,13 @@ struct ScheduleConfig {
   double unchanged_below = 0;
 };
 
-/// How pose maps are drawn (spec 2).
 /// What a pose map draws with, pixels.
 struct PoseMapSizes {
   int radius_px = 50;    ///< of the disc that shows the closure
   int thickness_px = 8;  ///< of the axes
 };
 
+/// How pose maps are drawn (EVAC, Sec. 3.2).
 struct PoseMapConfig {
   bool scaled =
       false;  ///< radius and thickness in parts of the picture's height: 50 and 8 of 320. Published: in pixels

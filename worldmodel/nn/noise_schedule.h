@@ -5,7 +5,7 @@
 #include "worldmodel/nn/model_config.h"
 #include "worldmodel/nn/tensor.h"
 
-/// How much noise there is at each diffusion step (spec 8.1, 8.2).
+/// How much noise there is at each diffusion step, as the reference has it (docs/evac_quirks.md).
 namespace evac::nn {
 
 /// Betas with square roots evenly spaced, stretched to end in pure noise (Lin et al. 2024, Alg. 1), kept in double.

@@ -44,7 +44,7 @@ class ObjectForecast {
 
   /// What leaves out numbers at random while it is trained.
   using Drop = std::function<Tensor(const Tensor&)>;
-  /// Of a hand that let go, what came later than 2.4 s after it is not looked at: where it is then, and how long ago. The
+  /// Of a hand that let go, what came later than 24 frames after it (2.4 s at 10 Hz) is not looked at: where it is then, and how long ago. The
   /// thing lies where it lies, and an episode may go on for longer than any that was learned from.
   Answer operator()(const Scenes& scenes, const Drop& drop = {}) const;
 

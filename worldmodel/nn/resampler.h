@@ -7,7 +7,7 @@
 
 namespace evac::nn {
 
-/// A Perceiver resampler (Flamingo, Sec. 2.2; spec 5): learned queries read any number of inputs. It knows no
+/// A Perceiver resampler (Alayrac et al. 2022, Flamingo): learned queries read any number of inputs. It knows no
 /// positions: the order of the inputs is invisible to it.
 class Resampler {
  public:

@@ -4,7 +4,7 @@
 
 #include "worldmodel/nn/blocks.h"
 
-/// The attention blocks of the denoiser (spec 5, 6.4, 6.5).
+/// The attention blocks of the denoiser, as the reference has them (docs/evac_quirks.md).
 namespace evac::nn {
 
 /// Keys and values of a context that does not change while a chunk is denoised.
@@ -35,7 +35,7 @@ class AttentionLayer {
   Linear to_q_, to_k_, to_v_, to_out_;
 };
 
-/// Which part of the context a spatial transformer attends to: they alternate (spec 5).
+/// Which part of the context a spatial transformer attends to: they alternate, the first one to the actions.
 enum class Listens { kActions, kImage };
 
 /// Attention over all pixels of all views of one frame, then to the context.

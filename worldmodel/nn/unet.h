@@ -8,7 +8,8 @@
 #include "worldmodel/nn/model_config.h"
 #include "worldmodel/nn/transformers.h"
 
-/// The denoiser of EVAC (spec 6): a latent video UNet whose frames are the memory followed by the chunk to imagine.
+/// The denoiser of EVAC (Sec. 3; layers as the reference, docs/evac_quirks.md): a latent video UNet whose frames are the
+/// memory followed by the chunk to imagine.
 namespace evac::nn {
 
 /// What does not change while a chunk is denoised, worked out once.

@@ -6,7 +6,7 @@
 #include "worldmodel/nn/layers.h"
 #include "worldmodel/nn/model_config.h"
 
-/// The latent codec: AutoencoderKL as in Stable Diffusion (Rombach et al. 2022; spec 7).
+/// The latent codec: AutoencoderKL as in Stable Diffusion (Rombach et al. 2022).
 namespace evac::nn {
 
 /// Mean and half the logarithm of the variance of what a picture may be as a latent.

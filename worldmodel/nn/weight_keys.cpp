@@ -44,7 +44,7 @@ void Say(std::string& text, const std::vector<std::string>& list, const char* on
 std::set<std::string> DeadKeys(const std::vector<ParameterShape>& keys) {
   std::set<std::string> dead;
   for (const auto& [prefix, transformer] : ContextAttentions(keys)) {
-    const char* unheard = transformer % 2 == 0 ? "_ip" : "_tp";  // actions first, then image, and so on (spec 5)
+    const char* unheard = transformer % 2 == 0 ? "_ip" : "_tp";  // actions first, then image, and so on
     for (const char* which : {"to_k", "to_v"}) {
       dead.insert(prefix + which + ".weight");
       dead.insert(prefix + which + unheard + ".weight");

@@ -9,7 +9,7 @@
 /// Which keys a checkpoint must have, may have and must not have.
 namespace evac::nn {
 
-/// Keys of the denoiser that lie in every checkpoint and that nothing reads (spec 10, item 8): `to_k` and `to_v` of the
+/// Keys of the denoiser that lie in every checkpoint and that nothing reads (docs/weights.md): `to_k` and `to_v` of the
 /// attention to the context, and of the pairs `*_ip` (image) and `*_tp` (actions) the one that a block does not listen
 /// to.
 std::set<std::string> DeadKeys(const std::vector<ParameterShape>& keys);

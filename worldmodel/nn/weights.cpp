@@ -2,8 +2,11 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <set>
+#include <sstream>
 
+#include "worldmodel/nn/model_sizes.h"
 #include "worldmodel/nn/weight_keys.h"
 
 namespace evac::nn {
@@ -28,10 +31,17 @@ void RequireSame(const MappedTensors& tensors, const NoiseSchedule::Buffer& ours
   }
 }
 
+constexpr const char* kNotInShapes[] = {
+    "fps",                         "domain",
+    "schedule.from_last_frame",    "schedule.carry_plane_m",
+    "unet.num_head_channels",      "unet.init_attention_heads",
+    "vae.scale_factor",            "action_resampler.heads",
+    "image_resampler.heads",       "image_encoder.head_width"};
+
 }  // namespace
 
 /// Of the buffers two are asked: how much noise there is, which decides the others, and what clean latents are scaled
-/// by (spec 8.1).
+/// by (noise_schedule.h).
 std::string CompareSchedule(const MappedTensors& tensors, const ModelConfig& config) {
   const std::int64_t last = config.schedule.steps - 1;
   const double end = tensors.Get("alphas_cumprod").to(at::kFloat)[last].item<double>();
@@ -45,10 +55,41 @@ std::string CompareSchedule(const MappedTensors& tensors, const ModelConfig& con
          "] is " + std::to_string(end) + ", wanted 0): the configuration's is used";
 }
 
+std::string SizesNobodySees(const ModelConfig& config) {
+  ModelConfig sizes = config;
+  std::string text;
+  for (const Size& size : SizesOf(sizes)) {
+    if (std::ranges::find(kNotInShapes, size.Key()) != std::end(kNotInShapes))
+      text += size.Key() + " " + TextOf(size) + "\n";
+  }
+  return text;
+}
+
+void CompareSizes(const TensorFile& file, const ModelConfig& config, const std::vector<std::string>& only) {
+  const auto card = file.metadata().find("sizes");
+  if (card == file.metadata().end()) return;
+  ModelConfig sizes = config;
+  const std::vector<Size> wanted = SizesOf(sizes);
+  std::istringstream lines(card->second);
+  for (std::string line; std::getline(lines, line);) {
+    const std::size_t space = std::min(line.find(' '), line.size());
+    const std::string key = line.substr(0, space), found = line.substr(std::min(space + 1, line.size()));
+    const auto begins = [&](const std::string& prefix) { return key.starts_with(prefix); };
+    if (!only.empty() && std::ranges::none_of(only, begins)) continue;
+    for (const Size& size : wanted) {
+      if (size.Key() != key || TextOf(size) == found) continue;
+      const auto shown = [](const std::string& text) { return text.empty() ? "none" : text; };
+      throw TensorError(file.name() + ": was trained with " + key + " " + shown(found) + ", the page of sizes says " +
+                        shown(TextOf(size)));
+    }
+  }
+}
+
 FileWeights::FileWeights(const std::filesystem::path& path, const ModelConfig& config, const LoadOptions& options)
     : tensors_(TensorFile::OpenCheckpoint(path)), options_(options) {
   KeyFit fit = CompareKeys(file(), config);
   if (!fit.Fits()) throw TensorError(file().name() + " does not fit the configuration: " + fit.Complaint());
+  CompareSizes(file(), config);
   report_ = {std::move(fit.unread), CompareSchedule(tensors_, config)};
   std::sort(report_.ignored_keys.begin(), report_.ignored_keys.end());
 }

@@ -13,7 +13,8 @@ namespace evac::nn {
 struct LoadOptions {
   at::ScalarType dtype = at::kFloat;  ///< of every parameter; the same as in the file: mapped, not copied
   at::Device device = at::kCPU;
-  /// Of products, and of the values between the denoiser's layers; nothing: floats, whatever the weights' type.
+  /// Of products, and of the values between the denoiser's layers. Nothing: products in the weights' type, and floats
+  /// between the layers.
   std::optional<at::ScalarType> products = std::nullopt;
   bool with_unread = false;  ///< also give what nothing reads, for copying a file: dead keys, leftovers of CLIP
 };
@@ -27,15 +28,25 @@ struct LoadReport {
 /// @param tensors  of a file whose keys fit (CompareKeys)
 /// @returns why the file's is put aside, in a sentence; empty: it is the configuration's own
 /// @throws TensorError naming the first number that differs: both end in pure noise and are not the same, or latents are
-///   scaled otherwise.
+///   scaled otherwise (`scale_arr`; of the codec's scale_factor CompareSizes knows).
 std::string CompareSchedule(const MappedTensors& tensors, const ModelConfig& config);
+
+/// Sizes that no tensor's shape shows, as the card of weights keeps them ("sizes"): how many heads attention has, what
+/// latents are scaled by, what the network's answer is counted from, the table's plane, robot and rate.
+/// @returns "unet.num_head_channels 64\n…"
+std::string SizesNobodySees(const ModelConfig& config);
+/// @param only  beginnings of the sizes to compare; none: all
+/// @throws TensorError naming the file, the first size that differs, what was found and what is wanted. A file that says
+///   none (of an earlier version, or published) is not compared
+void CompareSizes(const TensorFile& file, const ModelConfig& config, const std::vector<std::string>& only = {});
 
 /// The parameters of one file, as a network asks for them. Tensors keep the file mapped as long as they live.
 class FileWeights final : public ParameterSource {
  public:
   /// @param path  .safetensors, or .pt/.ckpt of torch.save
   /// @throws TensorError naming the file: unreadable; missing, extra and misshapen keys (ten of each, and how many);
-  ///   a schedule that ends in pure noise like the configuration's, and is another; latents scaled otherwise.
+  ///   a schedule that ends in pure noise like the configuration's, and is another; latents scaled otherwise; a size that
+  ///   its card says and the configuration has otherwise (CompareSizes).
   FileWeights(const std::filesystem::path& path, const ModelConfig& config, const LoadOptions& options = {});
 
   /// Undefined for a key that nothing reads, unless asked for with `with_unread`.

@@ -77,12 +77,12 @@ Tensor SquaredErrors(const nn::Vae& vae, const Tensor& pictures) {
 
 }  // namespace
 
-CodecQuality MeasureCodec(const nn::Vae& vae, const ShardSet& shards, std::int64_t pictures) {
+CodecQuality MeasureCodec(const nn::Vae& vae, const ShardSet& shards, std::int64_t pictures, at::Device device) {
   const at::NoGradGuard no_gradients;
   Errors whole, object, maps;
   const Sampled frames = Sample(shards, pictures, &Shard::frames);
   InBatches(frames.pictures, [&](std::int64_t from, std::int64_t count) {
-    const Tensor squares = SquaredErrors(vae, PicturesFrom(frames.pictures.narrow(0, from, count)));
+    const Tensor squares = SquaredErrors(vae, PicturesFrom(frames.pictures.narrow(0, from, count)).to(device));
     whole.Add(squares);
     for (std::int64_t i = 0; i < count; ++i) {
       const Tensor around = AroundObject(squares[i], frames.object_px[from + i]);
@@ -91,7 +91,7 @@ CodecQuality MeasureCodec(const nn::Vae& vae, const ShardSet& shards, std::int64
   });
   const Sampled drawn = Sample(shards, std::max<std::int64_t>(1, pictures / 4), &Shard::maps);
   InBatches(drawn.pictures, [&](std::int64_t from, std::int64_t count) {
-    maps.Add(SquaredErrors(vae, PicturesFrom(drawn.pictures.narrow(0, from, count))));
+    maps.Add(SquaredErrors(vae, PicturesFrom(drawn.pictures.narrow(0, from, count)).to(device)));
   });
   return {whole.Psnr(), object.Psnr(), maps.Psnr()};
 }
@@ -99,9 +99,11 @@ CodecQuality MeasureCodec(const nn::Vae& vae, const ShardSet& shards, std::int64
 void NormaliseLatents(const nn::Vae& vae, const ShardSet& shards, const std::vector<NamedTensor>& weights, bool point) {
   const at::NoGradGuard no_gradients;
   std::vector<Tensor> means;
+  const at::Device device = weights.front().tensor.device();
   const Sampled frames = Sample(shards, kNormaliseWith, &Shard::frames);
   InBatches(frames.pictures, [&](std::int64_t from, std::int64_t count) {
-    means.push_back(vae.Encode(PicturesFrom(frames.pictures.narrow(0, from, count))).Sample({}));
+    const Tensor pictures = PicturesFrom(frames.pictures.narrow(0, from, count)).to(device);
+    means.push_back(vae.Encode(pictures).Sample({}));
   });
   const Tensor latents = at::cat(means).transpose(0, 1).flatten(1);  // [z, all]
   const Tensor middle = latents.mean(1);

@@ -35,8 +35,9 @@ void Check(const CodecTrainingOptions& o) {
 
 }  // namespace
 
-CodecTraining::CodecTraining(const ShardSet& shards, const nn::VaeConfig& config, const CodecTrainingOptions& options)
-    : shards_(shards), config_(config), options_(options) {
+CodecTraining::CodecTraining(const ShardSet& shards, const nn::VaeConfig& config, const CodecTrainingOptions& options,
+                             at::Device device)
+    : shards_(shards), config_(config), options_(options), device_(device) {
   Check(options);
   for (std::size_t s = 0; s < shards.shards().size(); ++s) {
     const Tensor rows = shards.shards()[s].contact.nonzero().flatten();
@@ -71,8 +72,9 @@ CodecBatch CodecTraining::Batch(const StepPlace& place) const {
     }
   }
   const std::int64_t stride = config_.Stride();
-  return {PicturesFrom(at::stack(pictures)), at::stack(weights).unsqueeze(1),
-          noise.Normal({options_.batch, config_.z_channels, shards_.height_px() / stride, shards_.width_px() / stride})};
+  const Tensor random =
+      noise.Normal({options_.batch, config_.z_channels, shards_.height_px() / stride, shards_.width_px() / stride});
+  return {PicturesFrom(at::stack(pictures)).to(device_), at::stack(weights).unsqueeze(1).to(device_), random.to(device_)};
 }
 
 Tensor CodecTraining::Loss(const nn::Vae& vae, const CodecBatch& batch) const {

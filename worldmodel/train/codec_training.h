@@ -32,7 +32,9 @@ struct CodecBatch {
 class CodecTraining {
  public:
   /// @throws TensorError for options that make no training
-  CodecTraining(const ShardSet& shards, const nn::VaeConfig& config, const CodecTrainingOptions& options);
+  /// @param device  where the codec's weights are
+  CodecTraining(const ShardSet& shards, const nn::VaeConfig& config, const CodecTrainingOptions& options,
+                at::Device device = at::kCPU);
   CodecBatch Batch(const StepPlace& place) const;
   Tensor Loss(const nn::Vae& vae, const CodecBatch& batch) const;
 
@@ -46,6 +48,7 @@ class CodecTraining {
   const ShardSet& shards_;
   nn::VaeConfig config_;
   CodecTrainingOptions options_;
+  at::Device device_;
   std::vector<Row> contacts_;
 };
 
@@ -56,11 +59,13 @@ struct CodecQuality {
   double psnr_maps = 0;
 };
 /// @param pictures  how many of the set, evenly spaced
-CodecQuality MeasureCodec(const nn::Vae& vae, const ShardSet& shards, std::int64_t pictures);
+/// @param device    where the codec's weights are
+CodecQuality MeasureCodec(const nn::Vae& vae, const ShardSet& shards, std::int64_t pictures,
+                          at::Device device = at::kCPU);
 
 /// Makes the latents of pictures have mean 0 and deviation 1 / scale_factor per channel, by what the layers next to the
 /// latents do; what is decoded stays the same. With `point`: the posterior becomes its mean.
-/// @param weights  the codec's, all of them; changed
+/// @param weights  the codec's, all of them, on one device; changed
 void NormaliseLatents(const nn::Vae& vae, const ShardSet& shards, const std::vector<NamedTensor>& weights, bool point);
 
 }  // namespace evac::train

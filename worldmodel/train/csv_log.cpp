@@ -1,6 +1,8 @@
 #include "worldmodel/train/csv_log.h"
 
+#include <cerrno>
 #include <cstdlib>
+#include <cstring>
 #include <fstream>
 #include <iterator>
 #include <sstream>
@@ -20,14 +22,21 @@ std::string TextOf(const std::filesystem::path& path) {
 void Replace(const std::filesystem::path& path, const std::string& text) {
   const std::filesystem::path part = path.string() + ".part";
   std::ofstream written(part, std::ios::binary | std::ios::trunc);
-  if (!(written << text).flush()) throw TensorError(part.string() + ": cannot be written");
+  if (!(written << text).flush()) throw TensorWriteError(part.string() + ": cannot be written: " + std::strerror(errno));
   written.close();
   std::error_code error;
   std::filesystem::rename(part, path, error);
-  if (error) throw TensorError(path.string() + ": cannot be written: " + error.message());
+  if (error) throw TensorWriteError(path.string() + ": cannot be written: " + error.message());
 }
 
 }  // namespace
+
+void CsvLog::RequireOwn(const std::filesystem::path& path, const std::string& header) {
+  const std::string found = TextOf(path);
+  if (!found.empty() && !found.starts_with(header + "\n"))
+    throw TensorError(path.string() + ": is there and no training's (its first line is not '" + header +
+                      "'), wanted that name free, or another folder");
+}
 
 void CsvLog::Trim(const std::filesystem::path& path, const std::string& header, std::int64_t from) {
   const std::string before = TextOf(path);
@@ -45,7 +54,7 @@ void CsvLog::Trim(const std::filesystem::path& path, const std::string& header, 
 
 void CsvLog::Add(const std::filesystem::path& path, const std::string& row) {
   std::ofstream rows(path, std::ios::app);
-  if (!(rows << row << "\n").flush()) throw TensorError(path.string() + ": cannot be written");
+  if (!(rows << row << "\n").flush()) throw TensorWriteError(path.string() + ": cannot be written: " + std::strerror(errno));
 }
 
 }  // namespace evac::train

@@ -10,6 +10,8 @@ namespace evac::train {
 /// training goes on: they are done again.
 class CsvLog {
  public:
+  /// For a table where nothing was trained yet. @throws TensorError naming it if it has another header: it is somebody's
+  static void RequireOwn(const std::filesystem::path& path, const std::string& header);
   /// The file is written only where it changes, and replaced at once.
   /// @param from  rows of this step and later are dropped
   static void Trim(const std::filesystem::path& path, const std::string& header, std::int64_t from);

@@ -1,12 +1,15 @@
 #include "worldmodel/train/curves.h"
 
 #include <algorithm>
+#include <cerrno>
 #include <cmath>
 #include <cstdarg>
 #include <cstdio>
 #include <cstdlib>
+#include <cstring>
 #include <fstream>
 #include <limits>
+#include <system_error>
 #include <vector>
 
 #include "core/tensor_file.h"
@@ -34,7 +37,7 @@ Rows Read(const std::filesystem::path& path) {
     if (*end != ',') continue;
     const char* second = end + 1;
     const double value = std::strtod(second, &end);
-    if (end != second && std::isfinite(step) && std::isfinite(value)) rows.push_back({step, value});
+    if (end != second && std::isfinite(step) && step >= 0 && std::isfinite(value)) rows.push_back({step, value});
   }
   return rows;
 }
@@ -167,9 +170,11 @@ std::string CurvesSvg(const std::filesystem::path& folder) {
 void WriteCurves(const std::filesystem::path& folder) {
   const std::filesystem::path path = folder / "curves.svg", beside = folder / "curves.svg.part";
   std::ofstream file(beside, std::ios::trunc);
-  if (!(file << CurvesSvg(folder)).flush()) throw TensorError(beside.string() + ": cannot be written");
+  if (!(file << CurvesSvg(folder)).flush()) throw TensorWriteError(beside.string() + ": cannot be written: " + std::strerror(errno));
   file.close();
-  std::filesystem::rename(beside, path);
+  std::error_code error;
+  std::filesystem::rename(beside, path, error);
+  if (error) throw TensorWriteError(path.string() + ": cannot be written: " + error.message());
 }
 
 }  // namespace evac::train

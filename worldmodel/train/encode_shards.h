@@ -16,6 +16,7 @@ struct EncodeOptions {
   std::string products = "float32";  ///< what the codec computes with, kept likewise; or "bfloat16"
   /// Of the page, for IsEncoded; empty: not asked. What EncodeShard keeps is its codec's.
   std::optional<double> scale_factor = {};
+  at::Device device = at::kCPU;  ///< where the codec's weights are
 };
 
 /// Writes a shard's latents beside it (docs/formats/shards.md): the posterior's mean of every picture and map, scaled.

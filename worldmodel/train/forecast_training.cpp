@@ -40,7 +40,7 @@ Tensor IsWithin(const Tensor& place, std::int64_t w, std::int64_t h) {
 Tensor Shares(const Tensor& place, std::int64_t w, std::int64_t h) {
   const auto near = [&](std::int64_t axis, std::int64_t side) {  // [..., side]
     const Tensor along = place.select(-1, axis).clamp(0, static_cast<double>(side - 1)).unsqueeze(-1);
-    return (1 - (at::arange(side, at::kFloat) - along).abs()).clamp_min(0);
+    return (1 - (at::arange(side, along.options().dtype(at::kFloat)) - along).abs()).clamp_min(0);
   };
   const Tensor within = IsWithin(place, w, h).unsqueeze(-1);
   const Tensor each = (near(1, h).unsqueeze(-1) * near(0, w).unsqueeze(-2)).flatten(-2);

@@ -20,8 +20,8 @@ struct ImagineOptions {
 /// @param shards  with latents open, whole pictures or crops
 /// @param clips   of them, each of at least one picture and one chunk
 /// @returns per clip [frames, V, z, h, w], float: the first picture's latents as they are, the others imagined chunk by chunk,
-///   remembering what rollouts do (spec 4.6). Where frames are left over behind the last whole chunk, the last chunk
-///   begins earlier.
+///   remembering what rollouts do (RolloutMemory). Where frames are left over behind the last whole chunk, the last
+///   chunk begins earlier.
 /// @throws TensorError naming a clip's shard if it is too short
 std::vector<Tensor> ImagineClips(const nn::EvacModel& model, const ShardSet& shards, const std::vector<Clip>& clips,
                                  const ImagineOptions& options);

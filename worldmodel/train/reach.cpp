@@ -22,7 +22,7 @@ Tensor Fingertips(const WorldBatch& batch, double tool_length_m) {
     const Tensor x = number(3), y = number(4), z = number(5), w = number(6), xyz = rows.narrow(2, 0, 3);
     const Tensor along = at::stack({2 * (x * z + w * y), 2 * (y * z - w * x), 1 - 2 * (x * x + y * y)}, 2);
     const Tensor is_there = (xyz != 0).any(2, true);
-    points.push_back(at::where(is_there, xyz + tool_length_m * along, at::full({1}, std::nanf(""))));
+    points.push_back(at::where(is_there, xyz + tool_length_m * along, at::full({1}, std::nanf(""), xyz.options())));
   }
   return at::cat(points, 1);
 }
@@ -31,7 +31,7 @@ Tensor Fingertips(const WorldBatch& batch, double tool_length_m) {
 /// @param places  [BV, K, P, 2]: x, y in latent pixels, the first one's middle at .5; not a number: nowhere
 Tensor Near(const Tensor& places, std::int64_t h, std::int64_t w, double radius) {
   const auto apart = [&](std::int64_t side, std::int64_t which) {
-    return (at::arange(side, at::kFloat) + 0.5 - places.select(3, which).unsqueeze(3)).square();  // [BV, K, P, side]
+    return (at::arange(side, places.options()) + 0.5 - places.select(3, which).unsqueeze(3)).square();  // [BV, K, P, side]
   };
   const Tensor distance = apart(w, 0).unsqueeze(3) + apart(h, 1).unsqueeze(4);  // [BV, K, P, h, w]
   return (distance * (-0.5 / (radius * radius))).exp().nan_to_num(0).amax(2).unsqueeze(1);
@@ -52,7 +52,7 @@ Tensor WithinReach(const WorldBatch& batch, const nn::ModelConfig& config, doubl
   }
   const auto later = [&](const Tensor& of) { return of.narrow(2, first, chunk); };
   const Tensor seen = nn::SeenAt(points, later(batch.direction), later(batch.origin));  // [BV, K, P, 3]
-  const Tensor nowhere = at::full({1}, std::nan(""), at::kDouble);
+  const Tensor nowhere = at::full({1}, std::nan(""), seen.options());
   Tensor places = at::where(seen.narrow(3, 2, 1) > 0, seen.narrow(3, 0, 2) + 0.5, nowhere).to(at::kFloat);
   if (!on_plane) {
     const Tensor stays = object.reshape({-1, 1, 1, 2}).expand({-1, chunk, -1, -1});

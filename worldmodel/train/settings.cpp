@@ -1,10 +1,13 @@
 #include "worldmodel/train/settings.h"
 
+#include <charconv>
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
 #include <set>
 #include <sstream>
+#include <type_traits>
+#include <utility>
 
 namespace evac::train {
 namespace {
@@ -43,18 +46,52 @@ std::string Text(double number) {
   return text;
 }
 
-std::string Text(const Setting& setting) {
+/// As trainings are told apart by: what is said of a flag is 0 or 1 there.
+std::string IdentityText(const Setting& setting) {
+  const auto* flag = std::get_if<bool*>(&setting.field);
+  return flag ? std::to_string(**flag) : TextOf(setting);
+}
+
+bool Parse(const std::string& text, std::string& field) {
+  field = text;
+  return true;
+}
+bool Parse(const std::string& text, bool& field) {
+  if (text != "true" && text != "false") return false;
+  field = text == "true";
+  return true;
+}
+template <typename Number>
+bool Parse(const std::string& text, Number& field) {
+  Number found{};
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), found);
+  if (error != std::errc() || end != text.data() + text.size()) return false;
+  if constexpr (std::is_floating_point_v<Number>) {
+    if (!std::isfinite(found)) return false;
+  } else if constexpr (std::is_signed_v<Number>) {
+    if (found < 0 || found >= Number{1} << 40) return false;  // as on the page
+  }
+  field = found;
+  return true;
+}
+
+}  // namespace
+
+std::string TextOf(const Setting& setting) {
   return std::visit(
       [](const auto* field) -> std::string {
         using Type = std::decay_t<decltype(*field)>;
         if constexpr (std::is_same_v<Type, std::string>) return *field;
+        else if constexpr (std::is_same_v<Type, bool>) return *field ? "true" : "false";
         else if constexpr (std::is_same_v<Type, double>) return Text(*field);
         else return std::to_string(*field);
       },
       setting.field);
 }
 
-}  // namespace
+bool SetFromText(const Setting& setting, const std::string& text) {
+  return std::visit([&](auto* field) { return Parse(text, *field); }, setting.field);
+}
 
 Settings SettingsOf(TrainerOptions& t) {
   return {{"steps", &t.steps},
@@ -160,7 +197,7 @@ void WorldOptions::Resolve() {
 std::string IdentityOf(const Settings& settings) {
   std::string text;
   for (const Setting& setting : settings) {
-    if (!IsLengthOrLook(setting.name)) text += setting.name + " " + Text(setting) + "\n";
+    if (!IsLengthOrLook(setting.name)) text += setting.name + " " + IdentityText(setting) + "\n";
   }
   return text;
 }

@@ -49,6 +49,11 @@ struct WorldOptions {
   void Resolve();
 };
 
+/// What a setting says: "16", "0.001" with all its digits, "true"; words as they are.
+std::string TextOf(const Setting& setting);
+/// The other way round. @returns false, with the field as it was, if the text says no such thing
+bool SetFromText(const Setting& setting, const std::string& text);
+
 /// What every training has.
 Settings SettingsOf(TrainerOptions& options);
 Settings SettingsOf(CodecOptions& options);

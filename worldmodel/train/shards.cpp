@@ -215,6 +215,31 @@ std::vector<Clip> ClipsOf(const Shard& shard, std::size_t index, const std::vect
   return clips;
 }
 
+/// What lies beside a shard: "no variants", "variants of count 4 and seed 1".
+std::string HowVaried(const std::filesystem::path& shard) {
+  const std::filesystem::path path = VariantsPath(shard);
+  if (!std::filesystem::exists(path)) return "no variants";
+  const TensorFile file = TensorFile::Open(path);
+  const auto said = [&](const char* key) {
+    const auto found = file.metadata().find(key);
+    return found == file.metadata().end() ? std::string("unknown") : found->second;
+  };
+  return "variants of count " + said("count") + " and seed " + said("seed");
+}
+
+/// Killed half way, one that varies a folder otherwise than it was leaves some shards as they were.
+void RequireVariedAlike(const std::vector<Shard>& shards) {
+  std::map<std::filesystem::path, std::pair<std::filesystem::path, std::string>> first;  // of each folder
+  for (const Shard& shard : shards) {
+    const std::string how = HowVaried(shard.path);
+    const auto [found, is_first] = first.try_emplace(shard.path.parent_path(), shard.path, how);
+    const auto& [other, wanted] = found->second;
+    if (how == wanted) continue;
+    throw TensorError(shard.path.string() + " has " + how + ", " + other.filename().string() + " has " + wanted +
+                      ": wanted the same of all shards of a folder, as an `evac vary` leaves it that came to its end");
+  }
+}
+
 }  // namespace
 
 std::string ScaleText(double scale_factor) {
@@ -254,15 +279,20 @@ std::vector<std::filesystem::path> ShardPaths(const std::filesystem::path& folde
   return paths;
 }
 
-ShardSet::ShardSet(const ShardFolders& folders, Split split) {
-  std::string recipes, names, tasks;
+std::string ShardSet::FolderNames() const {
+  std::string names;
+  for (const std::filesystem::path& folder : folders_) names += (names.empty() ? "" : ", ") + folder.string();
+  return names;
+}
+
+ShardSet::ShardSet(const ShardFolders& folders, Split split) : folders_(folders), split_(split) {
+  std::string recipes, tasks;
   const auto append = [](std::string& list, const char* separator, const std::string& one) {
     if (!list.empty()) list += separator;
     list += one;
   };
   for (const std::filesystem::path& folder : folders) {
     const std::vector<std::filesystem::path> paths = ShardPaths(folder);
-    append(names, ", ", folder.string());
     const TensorFile first = TensorFile::Open(paths.front());
     append(recipes, ",", Text(first, "recipe"));
     for (const std::string& task : NamesOf(first, "tasks")) {  // whether this split has clips of it or not
@@ -272,7 +302,7 @@ ShardSet::ShardSet(const ShardFolders& folders, Split split) {
   }
   for (const std::string& task : tasks_) append(tasks, ",", task);
   if (shards_.empty())
-    throw TensorError(names + " has no shard with split " + NameOf(split));
+    throw TensorError(FolderNames() + " has no shard with split " + NameOf(split));
   metadata_["recipe"] = recipes;
   metadata_["tasks"] = tasks;
 }
@@ -351,6 +381,7 @@ std::string ShardSet::LatentsIdentity() const {
 void ShardSet::OpenVariants() {
   variants_.clear();
   variants_hash_ = 0;
+  RequireVariedAlike(shards_);
   for (std::size_t index = 0; index < shards_.size(); ++index) {
     Shard& shard = shards_[index];
     const std::filesystem::path path = VariantsPath(shard.path);

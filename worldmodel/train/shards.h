@@ -65,11 +65,17 @@ class ShardSet {
   ///   another file than shards.json says the shard is, or say that they were multiplied by another factor
   void OpenLatents(std::int64_t z, std::int64_t stride, std::optional<double> scale_factor = {});
 
-  /// Reads the variants of those shards that have some.
+  /// Reads the variants of the shards, where there are some.
   /// @throws TensorError if they are of another packing, misshapen, of clips that are not there, with an outcome that
-  ///   is none, or with actions that are not finite
+  ///   is none, or with actions that are not finite; or if one shard of a folder has none while others have, or has
+  ///   them of another count or seed
   void OpenVariants();
 
+  /// @throws TensorError if what shards of one set must share (see the constructor) is otherwise in the other split
+  void CheckLike(const ShardSet& other) const { CheckSame(other.shards_.front().path.string(), other.metadata_); }
+
+  Split split() const { return split_; }
+  std::string FolderNames() const;  ///< with commas between them
   const std::vector<Variant>& variants() const { return variants_; }
   const std::vector<Shard>& shards() const { return shards_; }
   const std::vector<Clip>& clips() const { return clips_; }
@@ -93,6 +99,8 @@ class ShardSet {
   void Add(const std::filesystem::path& path, Split split);
   void CheckSame(const std::string& name, const TensorMetadata& metadata) const;
 
+  ShardFolders folders_;
+  Split split_;
   std::vector<Shard> shards_;
   std::vector<Clip> clips_;
   std::vector<Variant> variants_;

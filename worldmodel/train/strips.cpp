@@ -14,9 +14,9 @@ namespace {
 
 enum Stream : std::uint32_t { kStart = 21, kSteps };
 
-/// Latents [V, z, K, h, w] as pictures [V K, 3, H, W] in [-1, 1].
+/// Latents [V, z, K, h, w] as pictures [V K, 3, H, W] in [-1, 1], on the CPU.
 Tensor Pictures(const nn::EvacModel& model, const Tensor& latents) {
-  return nn::DecodeLatents(model, latents.transpose(1, 2).flatten(0, 1)).clamp(-1, 1);
+  return nn::DecodeLatents(model, latents.transpose(1, 2).flatten(0, 1)).clamp(-1, 1).cpu();
 }
 
 /// What one window's chunk looks like to the network: [V K, 3, H, W] in [-1, 1].
@@ -32,12 +32,12 @@ Tensor Imagine(const nn::EvacModel& model, const WorldBatch& batch, const StripO
                                  batch.arms,
                                  batch.turns};
   std::vector<std::int64_t> shape = batch.latents.sizes().vec();
-  const auto step = [&] { return steps.Normal(batch.latents.sizes()); };
+  const auto step = [&] { return steps.Normal(batch.latents.sizes()).to(options.device); };
   shape[2] = chunk;
   nn::ImagineOptions sampler;
   sampler.solver = nn::Solver::kDpmSolver;
   sampler.steps = options.steps;
-  const Tensor latents = nn::ImagineChunk(model, request, {start.Normal(shape), step}, sampler);
+  const Tensor latents = nn::ImagineChunk(model, request, {start.Normal(shape).to(options.device), step}, sampler);
   return Pictures(model, latents.narrow(2, n, chunk));
 }
 
@@ -82,7 +82,7 @@ Strips DrawStrips(const nn::EvacModel& model, const ShardSet& shards, const std:
   Tensor error = at::zeros({model.config().views}), copy_error = at::zeros_like(error),
          carried_error = at::zeros_like(error);
   for (std::size_t i = 0; i < windows.size(); ++i) {
-    const WorldBatch batch = MakeWorldBatch(shards, {windows[i]});
+    const WorldBatch batch = MakeWorldBatch(shards, {windows[i]}).To(options.device);
     const std::int64_t views = batch.views, chunk = windows[i].chunk;
     const Tensor truth = Truth(shards, windows[i]).unflatten(0, {views, chunk + 1});
     const Tensor imagined = Imagine(model, batch, options, static_cast<std::int64_t>(i)).unflatten(0, {views, chunk});

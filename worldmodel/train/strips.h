@@ -20,6 +20,7 @@ struct StripOptions {
   std::int64_t steps = 6;  ///< of DPM-Solver++(2M)
   std::int64_t every = 5;  ///< the first frame and then every so-manieth is drawn; all are measured
   std::uint64_t seed = 0;
+  at::Device device = at::kCPU;  ///< where the model's weights are
 };
 
 /// @param windows  of the shards, one clip's at a time; at least one

@@ -24,8 +24,10 @@ void CheckSizes(const ShardSet& shards, const nn::ModelConfig& config) {
 
 void WriteCodec(const std::filesystem::path& path, const std::vector<NamedTensor>& weights,
                 const CodecQuality& quality) {
+  std::vector<NamedTensor> on_cpu;
+  for (const NamedTensor& weight : weights) on_cpu.push_back({weight.name, weight.tensor.detach().cpu()});
   std::vector<TensorView> views;
-  for (const NamedTensor& weight : weights) views.push_back(nn::ViewOf(weight.name, weight.tensor.detach()));
+  for (const NamedTensor& weight : on_cpu) views.push_back(nn::ViewOf(weight.name, weight.tensor));
   WriteTensorFile(path, views,
                   {{"format", "pt"},
                    {"psnr", Decibel(quality.psnr)},
@@ -36,10 +38,10 @@ void WriteCodec(const std::filesystem::path& path, const std::vector<NamedTensor
 /// One copy of the codec that is trained, and its loss.
 struct CodecWorker {
   CodecWorker(nn::ParameterSource& source, const ShardSet& shards, const nn::ModelConfig& config,
-              const CodecOptions& options)
-      : weights(source, options.job.bf16 ? at::kBFloat16 : at::kFloat),
+              const CodecOptions& options, at::Device device)
+      : weights(source, options.job.bf16 ? at::kBFloat16 : at::kFloat, device),
         vae(nn::Scope(weights, kCodecPrefix), config.vae),
-        training(shards, config.vae, options.codec) {}
+        training(shards, config.vae, options.codec, device) {}
   Tensor Loss(const StepPlace& at) const { return training.Loss(vae, training.Batch(at)); }
 
   TrainableWeights weights;
@@ -56,7 +58,7 @@ std::int64_t Workers(const JobPlace& place, const JobOptions& options) {
 std::string IdentityOf(const JobPlace& place, const JobOptions& options) {
   const std::int64_t workers = Workers(place, options);
   return " workers " + std::to_string(workers) + (workers > 1 ? "" : " threads " + std::to_string(place.threads)) +
-         place.begun_with;
+         (place.device.is_cpu() ? "" : " device " + place.device.str()) + place.begun_with;
 }
 
 void CheckHoldoutSize(const JobOptions& options) {
@@ -69,13 +71,14 @@ TrainerSummary TrainCodec(const JobPlace& place, const CodecOptions& given, cons
   CheckHoldoutSize(options.job);
   const ShardSet shards(place.shards, Split::kTrain), holdout(place.shards, Split::kHoldout);
   CheckSizes(shards, place.config);
+  shards.CheckLike(holdout);
   nn::RandomWeights random(options.job.trainer.seed);
   std::optional<CheckpointWeights> start;
   if (!init.empty()) start.emplace(init);
   nn::ParameterSource& source = start ? static_cast<nn::ParameterSource&>(*start) : random;
   std::deque<CodecWorker> workers;
   for (std::int64_t i = 0; i < Workers(place, options.job); ++i)
-    workers.emplace_back(source, shards, place.config, options);
+    workers.emplace_back(source, shards, place.config, options, place.device);
   const TrainableWeights& weights = workers.front().weights;
   const nn::Vae& vae = workers.front().vae;
   options.job.trainer.identity =
@@ -94,7 +97,7 @@ TrainerSummary TrainCodec(const JobPlace& place, const CodecOptions& given, cons
                                         .holdout =
                                             [&] {
                                               const CodecQuality quality =
-                                                  MeasureCodec(vae, holdout, options.job.holdout_size);
+                                                  MeasureCodec(vae, holdout, options.job.holdout_size, place.device);
                                               say("codec", quality);
                                               return -quality.psnr;
                                             },
@@ -103,7 +106,7 @@ TrainerSummary TrainCodec(const JobPlace& place, const CodecOptions& given, cons
   if (!summary.IsDone()) return summary;
   trainer.WithBest([&] {
     NormaliseLatents(vae, shards, weights.all(), options.codec.latent_noise > 0);
-    const CodecQuality quality = MeasureCodec(vae, holdout, options.job.holdout_size);
+    const CodecQuality quality = MeasureCodec(vae, holdout, options.job.holdout_size, place.device);
     say("codec, latents normalised", quality);
     WriteCodec(place.out / "codec.safetensors", weights.all(), quality);
   });

@@ -16,12 +16,15 @@ struct JobPlace {
   std::function<void(const TrainerProgress&)> on_progress = {};
   std::function<void(const std::string& sentence)> say = {};
   std::string begun_with = {};  ///< page of sizes and files of first weights, by hash: with others it is another training
+  at::Device device = at::kCPU;  ///< where it is computed; what is random is the same everywhere, sums are not
 };
 
 /// How many threads share the parts of a step; what the sums' last digits depend on.
 std::int64_t Workers(const JobPlace& place, const JobOptions& options);
 /// What of a place decides the numbers of each step: its threads, and what it was begun with.
 std::string IdentityOf(const JobPlace& place, const JobOptions& options);
+/// @throws TensorError if the shards' pose maps were drawn in another way than the page says, with both
+void CheckPoseMaps(const ShardSet& shards, const nn::ModelConfig& config);
 /// @throws TensorError if a hold-out of no picture or window is wanted
 void CheckHoldoutSize(const JobOptions& options);
 

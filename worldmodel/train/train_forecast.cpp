@@ -40,6 +40,8 @@ TrainerSummary TrainForecast(const JobPlace& place, const ForecastOptions& given
   const ShardSet holdout(place.shards, Split::kHoldout);
   nn::CheckShape("the shards' pictures", shards.shards().front().frames,
                  {-1, place.config.views, place.config.image_height_px, place.config.image_width_px, 3});
+  CheckPoseMaps(shards, place.config);  // with them the page says how long the tool is
+  shards.CheckLike(holdout);
   nn::RandomWeights random(options.job.trainer.seed);
   std::deque<ForecastWorker> workers;
   for (std::int64_t i = 0; i < Workers(place, options.job); ++i)
@@ -78,7 +80,7 @@ TrainerSummary TrainForecast(const JobPlace& place, const ForecastOptions& given
                            {"agreement", Text("%.3f", quality.agreement)},
                            {"finder_px", Text("%.2f", quality.finder_px)}};
     card.merge(summary.CardOfSteps());
-    card.merge(WhatFor(shards.metadata()));
+    card.merge(WhatForecastIsFor(shards.metadata(), place.config));
     WriteTensorFile(place.out / "forecast.safetensors", views, card);
   });
   return summary;

@@ -43,6 +43,17 @@ struct Sources {
   RoutedWeights routed;
 };
 
+}  // namespace
+
+void CheckPoseMaps(const ShardSet& shards, const nn::ModelConfig& config) {
+  const std::string &drawn = shards.metadata().at("pose_map"), wanted = config.pose_map.Words(config.image_height_px);
+  if (drawn != wanted)
+    throw TensorError("the shards' pose maps were drawn with '" + drawn + "', the page's pose_map wants '" + wanted +
+                      "': pack again with this page, or say on it how they were drawn (pose_map.scaled)");
+}
+
+namespace {
+
 /// Leaves out what nothing reads: a lean checkpoint lacks it too.
 class OnlyRead final : public nn::ParameterSource {
  public:
@@ -60,10 +71,10 @@ class OnlyRead final : public nn::ParameterSource {
 /// One copy of the model that is trained, and its loss.
 struct WorldWorker {
   WorldWorker(nn::ParameterSource& source, const ShardSet& shards, const nn::ModelConfig& config,
-              const WorldOptions& options)
-      : weights(source, options.job.bf16 ? at::kBFloat16 : at::kFloat),
+              const WorldOptions& options, at::Device device)
+      : weights(source, options.job.bf16 ? at::kBFloat16 : at::kFloat, device),
         model(weights, config),
-        training(model, shards, options.world) {}
+        training(model, shards, options.world, device) {}
 
   TrainableWeights weights;
   nn::EvacModel model;
@@ -87,10 +98,7 @@ void Save(const std::filesystem::path& path, const TrainableWeights& weights, co
 void CheckShards(const ShardSet& shards, const nn::ModelConfig& config, const WorldStart& start) {
   nn::CheckShape("the shards' pictures", shards.shards().front().frames,
                  {-1, config.views, config.image_height_px, config.image_width_px, 3});
-  const std::string &drawn = shards.metadata().at("pose_map"), wanted = config.pose_map.Words(config.image_height_px);
-  if (drawn != wanted)
-    throw TensorError("the shards' pose maps were drawn with '" + drawn + "', the page's pose_map wants '" + wanted +
-                      "': pack again with this page, or say on it how they were drawn (pose_map.scaled)");
+  CheckPoseMaps(shards, config);
   if (!start.codec_sha256.empty() && shards.codec() != start.codec_sha256)
     throw TensorError(start.codec.string() + " did not make the shards' latents (they are of codec " + shards.codec() +
                       "): wanted `evac encode` with this codec");
@@ -134,13 +142,15 @@ std::string Numbers(const std::vector<double>& values) {
 }
 
 /// What is written beside the weights.
-TensorMetadata CardOf(const TrainerSummary& summary, const ShardSet& shards, std::uint64_t seed) {
+TensorMetadata CardOf(const TrainerSummary& summary, const ShardSet& shards, const nn::ModelConfig& config,
+                      std::uint64_t seed) {
   TensorMetadata card = WhatFor(shards.metadata());
   card.merge(summary.CardOfSteps());
   card.insert({{"seed", std::to_string(seed)},
                {"holdout", summary.best ? Number(*summary.best) : ""},
                {"recipe", shards.metadata().at("recipe")},
-               {"codec", shards.codec()}});
+               {"codec", shards.codec()},
+               {"sizes", nn::SizesNobodySees(config)}});
   return card;
 }
 
@@ -171,17 +181,20 @@ TrainerSummary TrainWorld(const JobPlace& place, const WorldOptions& given, cons
     CheckShards(*set, place.config, start);
   }
   CheckHoldout(holdout, shards);
-  if (!start.forecast.empty()) CheckForecastFor(start.forecast, WhatFor(shards.metadata()));
+  shards.CheckLike(holdout);
+  if (place.config.object_forecast)
+    CheckForecastFor(start.forecast.empty() ? start.init : start.forecast,
+                     WhatForecastIsFor(shards.metadata(), place.config));
   Sources sources(start, place.config, options.job.trainer.seed);
   OnlyRead read(sources.routed, place.config);
   std::deque<WorldWorker> workers;
   for (std::int64_t i = 0; i < Workers(place, options.job); ++i)
-    workers.emplace_back(read, shards, place.config, options);
+    workers.emplace_back(read, shards, place.config, options, place.device);
   const TrainableWeights& weights = workers.front().weights;
   const nn::EvacModel& model = workers.front().model;
   WorldTrainingOptions all = options.world;
   all.windows.successes_only = false;  // what is measured is the same, whatever was learned from
-  const WorldTraining measuring(model, holdout, all);
+  const WorldTraining measuring(model, holdout, all, place.device);
   const std::vector<Window> windows = measuring.sampler().Spread(options.job.holdout_size),
                             drawn = measuring.sampler().Spread(kStripWindows);
   options.job.trainer.identity = IdentityOf(SettingsOf(options)) + shards.metadata().at("recipe") + " " +
@@ -191,7 +204,7 @@ TrainerSummary TrainWorld(const JobPlace& place, const WorldOptions& given, cons
     trainer.AddReplica({TrainedParameters(workers[i].weights, place.config, options.world),
                         [&worker = workers[i]](const StepPlace& at) { return worker.training.Loss(at); }});
   const auto draw = [&](std::int64_t step) {
-    const Strips strips = DrawStrips(model, holdout, drawn, {.steps = options.strip_steps});
+    const Strips strips = DrawStrips(model, holdout, drawn, {.steps = options.strip_steps, .device = place.device});
     if (place.say)
       place.say("step " + std::to_string(step) + ": by view, imagined " + Numbers(strips.psnr) + " dB, a frozen copy " +
                 Numbers(strips.psnr_copy) + " dB" +
@@ -207,7 +220,7 @@ TrainerSummary TrainWorld(const JobPlace& place, const WorldOptions& given, cons
   if (!summary.IsDone()) return summary;
   trainer.WithBest([&] {
     Save(place.out / "weights.safetensors", weights, place.config,
-         CardOf(summary, shards, options.job.trainer.seed));
+         CardOf(summary, shards, place.config, options.job.trainer.seed));
   });
   return summary;
 }

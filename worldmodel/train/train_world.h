@@ -20,7 +20,8 @@ struct WorldStart {
 
 /// @throws TensorError if the sizes have an `object_forecast` and nothing gives one, or one is given that they have not;
 ///   if an exception begins no key that `init` gives; if a key of `init` that is not excepted is missing, is none of the
-///   network's or has another shape, by name; or if its noise schedule is another (nn::CompareSchedule).
+///   network's or has another shape, by name; or if its noise schedule is another (nn::CompareSchedule), or heads of
+///   attention are (nn::CompareSizes).
 void CheckStart(const nn::ModelConfig& config, const WorldStart& start);
 
 /// What weights are for, as the shards that they learned from say, for the weights' metadata: period_s, cameras, arms,
@@ -28,10 +29,14 @@ void CheckStart(const nn::ModelConfig& config, const WorldStart& start);
 /// statistics; arms_read says which arms of recordings are their actions (worldmodel/trained_for.h).
 TensorMetadata WhatFor(const TensorMetadata& shards);
 
+/// Of a forecast: the same, and the plane that it looks for the thing on ("carry_plane_m"; empty: none).
+TensorMetadata WhatForecastIsFor(const TensorMetadata& shards, const nn::ModelConfig& config);
+
 /// A forecast counts turns in frames, knows views by their order, and looks where hands are: it is of no use to a network
 /// that sees otherwise. What either does not say is not compared.
 /// @param what_for  of the network, as WhatFor says it
-/// @throws TensorError naming the file and what differs: period, cameras, arms (and which are read), or how maps are drawn
+/// @throws TensorError naming the file and what differs: period, cameras, arms (and which are read), how maps are drawn, or
+///   the plane
 void CheckForecastFor(const std::filesystem::path& forecast, const TensorMetadata& what_for);
 
 /// Trains the denoiser and its resamplers (EVAC's first stage of training is the codec) and writes

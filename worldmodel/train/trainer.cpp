@@ -18,6 +18,8 @@ namespace {
 constexpr std::int64_t kPlanFrom = 4;  ///< steps that are not timed: caches and buffers are still cold
 constexpr double kPlanSeconds = 10;    ///< timing takes about as long
 constexpr std::int64_t kNotFiniteAtMost = 100;
+constexpr const char* kMetrics = "step,loss,learning_rate,gradient_norm,seconds";
+constexpr const char* kHoldouts = "step,holdout";
 constexpr std::int64_t kUnplanned = std::int64_t{1} << 40;  ///< steps, so many that those done are no part of them
 
 void Require(bool holds, const char* name, double found, const char* wanted) {
@@ -105,9 +107,12 @@ Trainer::Trainer(std::vector<NamedTensor> parameters, const TrainerOptions& opti
   if (options_.average_decay > 0) state_.average = parameters_.values().clone();
   planned_ = options_.minutes <= 0;
   std::filesystem::create_directories(folder_);
-  Load();
-  CsvLog::Trim(folder_ / "metrics.csv", "step,loss,learning_rate,gradient_norm,seconds", step_);
-  CsvLog::Trim(folder_ / "holdout.csv", "step,holdout", step_ + 1);
+  if (!Load()) {
+    CsvLog::RequireOwn(folder_ / "metrics.csv", kMetrics);
+    CsvLog::RequireOwn(folder_ / "holdout.csv", kHoldouts);
+  }
+  CsvLog::Trim(folder_ / "metrics.csv", kMetrics, step_);
+  CsvLog::Trim(folder_ / "holdout.csv", kHoldouts, step_ + 1);
 }
 
 void Trainer::AddReplica(Replica replica) {

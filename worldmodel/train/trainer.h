@@ -18,7 +18,7 @@
 /// and no data; codec, world model, policies and judges are trained by it alike.
 namespace evac::train {
 
-/// The defaults are EVAC's (spec 8.4).
+/// The defaults are the paper's (docs/train.md, the column `paper`).
 struct TrainerOptions {
   std::int64_t steps = 100'000;
   /// Above 0: as many steps as fit into so many minutes. Counted once, after the first steps, and written into the
@@ -99,7 +99,8 @@ struct TrainerSummary {
 class Trainer {
  public:
   /// @param parameters  floats; they stay where their holders see them (FlatParameters)
-  /// @throws TensorError for options that make no training, or if the folder holds another training's checkpoint
+  /// @throws TensorError for options that make no training, or if the folder holds another training's checkpoint, or
+  /// none and a metrics.csv or holdout.csv of somebody's
   Trainer(std::vector<NamedTensor> parameters, const TrainerOptions& options, std::filesystem::path folder);
 
   /// From now on the parts of a step (`accumulate`) are shared out among the trainer's own loss and its replicas', each
@@ -121,7 +122,7 @@ class Trainer {
     double loss = 0, gradient_norm = 0, learning_rate = 0;
   };
 
-  void Load();
+  bool Load();  ///< @returns false if there is no checkpoint
   void Save() const;
   std::string Identity() const;
   double LossOfParts(std::size_t worker, const TrainerCallbacks& callbacks, double done) const;

@@ -69,9 +69,9 @@ std::string Trainer::Identity() const {
   return text + "seed " + std::to_string(o.seed) + " " + o.identity;
 }
 
-void Trainer::Load() {
+bool Trainer::Load() {
   const std::filesystem::path path = folder_ / kFile;
-  if (!std::filesystem::exists(path)) return;
+  if (!std::filesystem::exists(path)) return false;
   const at::NoGradGuard no_gradients;
   const nn::MappedTensors file(TensorFile::Open(path));
   const Metadata metadata(file.file());
@@ -97,10 +97,11 @@ void Trainer::Load() {
   }
   holdouts_since_best_ = metadata.WholeOr0("holdouts_since_best");
   // An earlier version took a first hold-out for the best though it was no number.
-  if (!metadata.Has("best_score") || !std::isfinite(metadata.Number("best_score"))) return;
+  if (!metadata.Has("best_score") || !std::isfinite(metadata.Number("best_score"))) return true;
   best_ = file.Get("best").clone().to(state_.values.device());
   best_score_ = metadata.Number("best_score");
   best_step_ = metadata.Whole("best_step");
+  return true;
 }
 
 void Trainer::Save() const {

@@ -53,7 +53,8 @@ WindowSampler::WindowSampler(const ShardSet& shards, const WindowOptions& option
     if (!options.successes_only || clip.outcome == 1) AddClip(shards, clip);
   }
   if (all_.any.empty())
-    throw TensorError("no clip of " + shards.shards().front().path.parent_path().string() + " has " +
+    throw TensorError(std::string("no clip ") +
+                      (shards.split() == Split::kHoldout ? "of the hold-out of " : "to learn from of ") + shards.FolderNames() + " has " +
                       std::to_string(options.chunk + 1) + " frames" +
                       (options.successes_only ? " and ended in success" : ""));
 }

@@ -6,7 +6,8 @@
 #include "worldmodel/train/dice.h"
 #include "worldmodel/train/shards.h"
 
-/// Which frames a training sample of the world model is made of (spec 4.6, 9.2).
+/// Which frames a training sample of the world model is made of: as the reference (docs/evac_quirks.md) draws them, and
+/// what was added (docs/train.md).
 namespace evac::train {
 
 /// Frames of one clip, counted from its first.
@@ -21,8 +22,9 @@ struct Window {
 struct WindowOptions {
   std::int64_t chunk = 16;          ///< K
   std::int64_t memory = 4;          ///< N
-  std::int64_t history = 48;        ///< how far back memory reaches when it is picked at random (9.2)
-  /// Of the samples that begin where rollouts do (frame 0, K, 2K, …) and remember what rollouts do (4.6). The paper: 0.
+  std::int64_t history = 48;        ///< how far back memory reaches when it is picked at random
+  /// Of the samples that begin where rollouts do (frame 0, K, 2K, …) and remember what rollouts do (RolloutMemory).
+  /// The paper: 0.
   double rollout_share = 0;
   double contact_share = 0;         ///< of the samples whose chunk holds a frame in contact. The paper: 0
   /// Of the samples in which a hand is told to close, in the chunk's first half or half a chunk before it: what comes of
@@ -38,7 +40,7 @@ struct WindowOptions {
 };
 
 /// The memory of a rollout that has shown `last + 1` frames: the first N times, then every frame; of these the first,
-/// others evenly spaced, and the newest (4.6).
+/// others evenly spaced, and the newest, as when imagining (frame_memory.h).
 std::vector<std::int64_t> RolloutMemory(std::int64_t last, std::int64_t memory);
 
 class WindowSampler {

@@ -54,6 +54,15 @@ Rays RaysOf(const Tensor& c2w, const Tensor& k, const std::vector<std::int64_t>&
   return {(in_base / length).reshape({n, 3, h, w}), origin};
 }
 
+WorldBatch WorldBatch::To(at::Device device) const {
+  WorldBatch moved = *this;
+  for (Tensor WorldBatch::*tensor : {&WorldBatch::latents, &WorldBatch::pose_maps, &WorldBatch::direction,
+                                     &WorldBatch::origin, &WorldBatch::images, &WorldBatch::deltas, &WorldBatch::arms,
+                                     &WorldBatch::turns, &WorldBatch::object})
+    moved.*tensor = (moved.*tensor).to(device);
+  return moved;
+}
+
 WorldBatch MakeWorldBatch(const ShardSet& shards, const std::vector<Window>& windows) {
   const Window& first = windows.front();
   const auto memory = static_cast<std::int64_t>(first.memory.size());

@@ -17,12 +17,16 @@ struct WorldBatch {
   Tensor arms;       ///< [B, T, 16]: rows of nn::FrameActions
   Tensor turns;      ///< [B, T, nn::kTurnRow]: nn::HandTurns since the oldest memory
   Tensor object;     ///< [BV, 2, T]: x, y of the object in latent pixels; not a number where unknown
+
+  /// The same numbers where the network is.
+  WorldBatch To(at::Device device) const;
 };
 
 /// @param shards  with latents open
+/// @returns on the CPU
 WorldBatch MakeWorldBatch(const ShardSet& shards, const std::vector<Window>& windows);
 
-/// Rays through the centres of latent pixels (spec 3).
+/// Rays through the centres of latent pixels (EVAC, Sec. 3.2).
 /// @param c2w  [N, 4, 4] base_from_camera
 /// @param k    [N, 3, 3] pixels of the picture
 /// @returns    direction [N, 3, h, w] of unit length and origin [N, 3, h, w], base frame

@@ -1,6 +1,7 @@
 #include <algorithm>
 #include <utility>
 
+#include "worldmodel/nn/model_sizes.h"
 #include "worldmodel/nn/weight_keys.h"
 #include "worldmodel/nn/weights.h"
 #include "worldmodel/train/train_world.h"
@@ -13,13 +14,17 @@ bool BeginsWithAny(const std::string& key, const std::vector<std::string>& prefi
   return std::ranges::any_of(prefixes, [&](const std::string& prefix) { return key.starts_with(prefix); });
 }
 
-/// Whether `init` gives a forecast, and not all of it is excepted.
+/// Whether `init` gives a forecast, and none of it is excepted: what is drawn anew would stay as it was drawn.
 bool GivesForecast(const WorldStart& start) {
   if (start.init.empty()) return false;
   const TensorFile init = TensorFile::OpenCheckpoint(start.init);
-  return std::ranges::any_of(init.tensors(), [&](const TensorView& tensor) {
-    return tensor.name.starts_with(nn::kForecastPrefix) && !BeginsWithAny(tensor.name, start.init_except);
-  });
+  bool gives = false;
+  for (const TensorView& tensor : init.tensors()) {
+    if (!tensor.name.starts_with(nn::kForecastPrefix)) continue;
+    if (BeginsWithAny(tensor.name, start.init_except)) return false;
+    gives = true;
+  }
+  return gives;
 }
 
 /// What is drawn at random is not trained here: a forecast is one that was.
@@ -82,9 +87,18 @@ void CheckSchedule(const nn::ModelConfig& config, const WorldStart& start, const
 
 }  // namespace
 
+TensorMetadata WhatForecastIsFor(const TensorMetadata& shards, const nn::ModelConfig& config) {
+  TensorMetadata what = WhatFor(shards);
+  nn::ModelConfig sizes = config;
+  for (const nn::Size& size : nn::SizesOf(sizes)) {
+    if (size.Key() == "schedule.carry_plane_m") what["carry_plane_m"] = nn::TextOf(size);
+  }
+  return what;
+}
+
 void CheckForecastFor(const std::filesystem::path& forecast, const TensorMetadata& what_for) {
   const TensorFile file = TensorFile::OpenCheckpoint(forecast);
-  for (const char* key : {"period_s", "cameras", "arms", "arms_read", "pose_map"}) {
+  for (const char* key : {"period_s", "cameras", "arms", "arms_read", "pose_map", "carry_plane_m"}) {
     const auto own = file.metadata().find(key), wanted = what_for.find(key);
     if (own == file.metadata().end() || wanted == what_for.end() || own->second == wanted->second) continue;
     throw TensorError(forecast.string() + ": the forecast was trained for " + key + " '" + own->second + "', wanted '" +
@@ -98,6 +112,9 @@ void CheckStart(const nn::ModelConfig& config, const WorldStart& start) {
   const nn::MappedTensors init(TensorFile::OpenCheckpoint(start.init));
   CheckExceptions(config, start, init.file());
   CheckKeys(config, start, init.file());
+  nn::CompareSizes(init.file(), config,  // the rest may be another robot's
+                   {"unet.num_head_channels", "unet.init_attention_heads", "action_resampler.", "image_resampler.",
+                    "image_encoder."});
   CheckSchedule(config, start, init);
 }
 

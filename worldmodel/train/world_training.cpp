@@ -18,13 +18,6 @@ enum Stream : std::uint32_t { kWindows = 1, kSteps, kDropouts, kNoise, kSelf, kM
 constexpr std::int64_t kMeasureSteps[] = {999, 700, 400, 150};  ///< of 1000: how the hold-out is noised, in turn
 constexpr std::int64_t kMeasureBatch = 8;
 
-/// Numbers per row, to be multiplied with [rows, …].
-Tensor PerRow(const std::vector<float>& values, std::int64_t dims) {
-  std::vector<std::int64_t> shape(static_cast<std::size_t>(dims), 1);
-  shape[0] = static_cast<std::int64_t>(values.size());
-  return at::tensor(values).reshape(shape);
-}
-
 void CheckRanges(const WorldTrainingOptions& o) {
   constexpr const char* kTraining = "world training";
   RequireShares(kTraining, {{"rollout_share", o.windows.rollout_share},
@@ -79,14 +72,21 @@ std::vector<NamedTensor> TrainedParameters(const TrainableWeights& weights, cons
   });
 }
 
-/// What is kept (1) and dropped (0) of each scene's conditions (4.3).
+/// What is kept (1) and dropped (0) of each scene's conditions.
 struct WorldTraining::Drops {
   std::vector<float> actions, image, mask, maps;
 };
 
-WorldTraining::WorldTraining(const nn::EvacModel& model, const ShardSet& shards, const WorldTrainingOptions& options)
-    : model_(model), shards_(shards), options_(options), sampler_(shards, options.windows) {
+WorldTraining::WorldTraining(const nn::EvacModel& model, const ShardSet& shards, const WorldTrainingOptions& options,
+                             at::Device device)
+    : model_(model), shards_(shards), options_(options), sampler_(shards, options.windows), device_(device) {
   Check(options_, model.config());
+}
+
+Tensor WorldTraining::PerRow(const std::vector<float>& values, std::int64_t dims) const {
+  std::vector<std::int64_t> shape(static_cast<std::size_t>(dims), 1);
+  shape[0] = static_cast<std::int64_t>(values.size());
+  return at::tensor(values).reshape(shape).to(device_);
 }
 
 std::int64_t WorldTraining::DrawStep(Dice& dice) const {
@@ -122,7 +122,7 @@ WorldTraining::Drops WorldTraining::DrawDrops(const WorldBatch& batch, Dice& dic
 }
 
 nn::UNet::Context WorldTraining::ContextOf(const Tensor& tokens, const WorldBatch& batch) const {
-  const auto constant = [&](std::int64_t value) { return at::full({batch.scenes}, value, at::kLong); };
+  const auto constant = [&](std::int64_t value) { return at::full({batch.scenes}, value, at::kLong).to(device_); };
   nn::UNet::Context context{tokens, constant(model_.config().fps), constant(model_.config().domain), batch.views};
   if (model_.config().unet.frame_actions) context.frames = nn::FrameActions(batch.arms, batch.memory);
   if (model_.config().unet.hand_views > 0)
@@ -149,15 +149,15 @@ Tensor WorldTraining::TokensOf(const WorldBatch& batch) const {
 Tensor WorldTraining::Weight(const WorldBatch& batch, const Tensor& still, const Tensor& t) const {
   const std::int64_t n = batch.memory, chunk = batch.latents.size(2) - n, h = batch.latents.size(3),
                      w = batch.latents.size(4);
-  Tensor weight = at::ones({batch.latents.size(0), 1, chunk, h, w});
+  Tensor weight = at::ones({batch.latents.size(0), 1, chunk, h, w}, batch.latents.options());
   const Tensor frames = batch.latents.narrow(2, n, chunk);
   if (options_.reach_weight > 0)
     weight += options_.reach_weight * WithinReach(batch, model_.config(), options_.object_radius);
   if (options_.change_weight > 0) weight += options_.change_weight * (frames - still).abs().mean(1, true);
   if (options_.object_weight > 0) {
     const Tensor object = batch.object.narrow(2, n, chunk);                                // [BV, 2, K]
-    const Tensor x = at::arange(w, at::kFloat) + 0.5 - object.select(1, 0).unsqueeze(-1);  // [BV, K, w]
-    const Tensor y = at::arange(h, at::kFloat) + 0.5 - object.select(1, 1).unsqueeze(-1);
+    const Tensor x = at::arange(w, batch.latents.options()) + 0.5 - object.select(1, 0).unsqueeze(-1);  // [BV, K, w]
+    const Tensor y = at::arange(h, batch.latents.options()) + 0.5 - object.select(1, 1).unsqueeze(-1);
     const Tensor distance = x.square().unsqueeze(2) + y.square().unsqueeze(3);  // [BV, K, h, w]
     const Tensor bell = (distance * (-0.5 / (options_.object_radius * options_.object_radius))).exp();
     weight += options_.object_weight * bell.nan_to_num(0).unsqueeze(1);
@@ -170,7 +170,8 @@ Tensor WorldTraining::Weight(const WorldBatch& batch, const Tensor& still, const
   }
   weight = weight / weight.mean();
   std::vector<float> by_step;
-  const std::int64_t* steps = t.data_ptr<std::int64_t>();
+  const Tensor on_cpu = t.cpu();
+  const std::int64_t* steps = on_cpu.data_ptr<std::int64_t>();
   for (std::int64_t i = 0; i < weight.size(0); ++i) {
     const double alpha_bar = model_.schedule().AlphaBar(steps[i / batch.views]), noise = 1 - alpha_bar;
     double factor = 1;
@@ -187,13 +188,14 @@ Tensor WorldTraining::LossOf(const WorldBatch& given, const Drops& drops, const 
   const std::int64_t rows = batch.latents.size(0), n = batch.memory;
   batch.images = batch.images * PerRow(drops.image, 4);
   batch.deltas = batch.deltas * PerRow(drops.actions, 3);
-  const Tensor kept = at::ones({rows, 1, batch.latents.size(2), batch.latents.size(3), batch.latents.size(4)});
+  const Tensor kept =
+      at::ones({rows, 1, batch.latents.size(2), batch.latents.size(3), batch.latents.size(4)}, batch.latents.options());
   kept.narrow(2, n, kept.size(2) - n).mul_(PerRow(drops.mask, 5));
   nn::DiffusionBatch step{batch.latents,
                           {{}, kept, batch.pose_maps * PerRow(drops.maps, 5), batch.direction, batch.origin},
                           ContextOf(TokensOf(batch), batch),
                           t,
-                          dice.Normal(batch.latents.sizes()),
+                          Noise(dice, batch.latents.sizes()),
                           n,
                           std::nullopt};
   if (model_.object_forecast()) step.concat.object = ObjectMapsOf(given) * PerRow(drops.image, 5);
@@ -204,7 +206,7 @@ Tensor WorldTraining::LossOf(const WorldBatch& given, const Drops& drops, const 
     for (std::int64_t i = 0; i < rows * n; ++i) angles.push_back(static_cast<float>(dice.Uniform(-1.57, 1.57)));
     std::vector<std::int64_t> shape = {rows * n, batch.latents.size(1), batch.latents.size(3), batch.latents.size(4)};
     step.teacher_forcing =
-        nn::TeacherForcing{at::tensor(angles).reshape({rows, n}), 3 + dice.Below(18), dice.Normal(shape)};
+        nn::TeacherForcing{at::tensor(angles).reshape({rows, n}).to(device_), 3 + dice.Below(18), Noise(dice, shape)};
   } else if (noisy_memory) {
     std::vector<float> deviations;
     for (std::int64_t i = 0; i < rows; ++i)
@@ -212,7 +214,7 @@ Tensor WorldTraining::LossOf(const WorldBatch& given, const Drops& drops, const 
           dice.Chance(options_.memory_noise_share) ? static_cast<float>(dice.Uniform(0, options_.memory_noise)) : 0.0F);
     step.latents = batch.latents.clone();
     Tensor memory = step.latents.narrow(2, 0, n);
-    memory.add_(dice.Normal(memory.sizes()) * PerRow(deviations, 5));
+    memory.add_(Noise(dice, memory.sizes()) * PerRow(deviations, 5));
   }
   nn::Remember(model_, step.latents.narrow(2, 0, n), step.concat, batch.latents.narrow(2, 0, n));
   step.weight = Weight(batch, step.concat.still, t);
@@ -228,10 +230,10 @@ Tensor WorldTraining::ImagineOnce(const WorldBatch& batch, Dice& dice) const {
   nn::Concat concat{{}, mask, batch.pose_maps, batch.direction, batch.origin};
   concat.object = ObjectMapsOf(batch);
   nn::Remember(model_, memory, concat);
-  const Tensor noise = dice.Normal(batch.latents.sizes());
+  const Tensor noise = Noise(dice, batch.latents.sizes());
   const double scale = model_.schedule().Scale(last);
   const Tensor x = at::cat({memory * scale, noise.narrow(2, n, chunk)}, 2);
-  const Tensor t = at::full({batch.latents.size(0)}, last, at::kLong);
+  const Tensor t = at::full({batch.latents.size(0)}, last, at::kLong).to(device_);
   const nn::UNet::Input input{nn::DenoiserInput(x, concat), t, batch.views, n};
   const Tensor answer = model_.unet()(input, model_.unet().Prepare(ContextOf(TokensOf(batch), batch)));
   const Tensor v = nn::FromLastFrame(model_.schedule(), answer, concat, t);
@@ -255,7 +257,7 @@ void WorldTraining::RememberOwn(const std::vector<Window>& windows, double share
     scenes.push_back(static_cast<std::int64_t>(i));
   }
   if (before.empty()) return;
-  WorldBatch batch_before = MakeWorldBatch(shards_, before);
+  WorldBatch batch_before = BatchOf(before);
   if (chunks > 1) RememberOwn(before, 1, chunks - 1, batch_before, dice);
   const Tensor imagined = ImagineOnce(batch_before, dice);  // [B'V, z, K, h, w]
   for (std::size_t i = 0; i < before.size(); ++i) {
@@ -280,10 +282,10 @@ Tensor WorldTraining::Loss(const StepPlace& place) const {
     windows.push_back(sampler_.Pick(windows_dice));
     t.push_back(DrawStep(steps));
   }
-  WorldBatch batch = MakeWorldBatch(shards_, windows);
+  WorldBatch batch = BatchOf(windows);
   if (options_.self_memory_share > 0 && place.done >= options_.self_memory_from)
     RememberOwn(windows, options_.self_memory_share, options_.self_memory_chunks, batch, self);
-  return LossOf(batch, DrawDrops(batch, dropouts), at::tensor(t, at::kLong), noise, true);
+  return LossOf(batch, DrawDrops(batch, dropouts), at::tensor(t, at::kLong).to(device_), noise, true);
 }
 
 double WorldTraining::Measure(const std::vector<Window>& windows) const {
@@ -292,7 +294,7 @@ double WorldTraining::Measure(const std::vector<Window>& windows) const {
   const auto count = static_cast<std::int64_t>(windows.size());
   for (std::int64_t from = 0; from < count; from += kMeasureBatch) {
     const std::int64_t here = std::min(kMeasureBatch, count - from);
-    const WorldBatch batch = MakeWorldBatch(shards_, {windows.begin() + from, windows.begin() + from + here});
+    const WorldBatch batch = BatchOf({windows.begin() + from, windows.begin() + from + here});
     std::vector<std::int64_t> t;
     for (std::int64_t i = 0; i < here; ++i)
       t.push_back(kMeasureSteps[static_cast<std::size_t>((from + i) % 4)] * model_.schedule().steps() / 1000);
@@ -300,7 +302,8 @@ double WorldTraining::Measure(const std::vector<Window>& windows) const {
     const std::vector<float> kept(rows, 1.0F);
     const Drops all{std::vector<float>(static_cast<std::size_t>(here), 1.0F), kept, kept, kept};
     Dice dice({0, from, 0, 0}, kMeasure);
-    sum += LossOf(batch, all, at::tensor(t, at::kLong), dice, false).item<double>() * static_cast<double>(here);
+    const Tensor steps = at::tensor(t, at::kLong).to(device_);
+    sum += LossOf(batch, all, steps, dice, false).item<double>() * static_cast<double>(here);
   }
   return sum / static_cast<double>(count);
 }

@@ -4,12 +4,12 @@
 #include "worldmodel/train/trainable_weights.h"
 #include "worldmodel/train/world_batch.h"
 
-/// Training of the world model (EVAC, Sec. 3; spec 8.3), and what was added to it. The defaults are the paper's.
+/// Training of the world model (EVAC, Sec. 3), and what was added to it. The defaults are the paper's.
 namespace evac::train {
 
 /// What noise the memory is given, so that the network bears with its own mistakes later.
 enum class MemoryNoise {
-  kPublished,  ///< rising towards the newest frame, by a random angle (8.3)
+  kPublished,  ///< rising towards the newest frame, by a random angle: the reference's
   kUniform,    ///< one deviation per sample, uniform up to `memory_noise`, for `memory_noise_share` of them
 };
 
@@ -23,7 +23,7 @@ enum class StepWeight {
 struct WorldTrainingOptions {
   std::int64_t batch = 8;  ///< windows
   WindowOptions windows;   ///< chunk and memory are the model's
-  double drop = 0.1;       ///< p of the condition dropouts (4.3)
+  double drop = 0.1;       ///< p of the condition dropouts, drawn as the reference does
 
   MemoryNoise memory_noise_kind = MemoryNoise::kPublished;
   double memory_noise = 0.3, memory_noise_share = 0.7;  ///< of kUniform
@@ -63,9 +63,11 @@ std::vector<NamedTensor> TrainedParameters(const TrainableWeights& weights, cons
 
 class WorldTraining {
  public:
-  /// @param model  made from weights that are trained; it must outlive this, and so must the shards
+  /// @param model   made from weights that are trained; it must outlive this, and so must the shards
+  /// @param device  where its weights are. What is random is drawn on the CPU, so it is the same everywhere
   /// @throws TensorError for options that make no training, or that are out of range (option_limits.h)
-  WorldTraining(const nn::EvacModel& model, const ShardSet& shards, const WorldTrainingOptions& options);
+  WorldTraining(const nn::EvacModel& model, const ShardSet& shards, const WorldTrainingOptions& options,
+                at::Device device = at::kCPU);
 
   /// The loss at a place.
   Tensor Loss(const StepPlace& place) const;
@@ -81,6 +83,10 @@ class WorldTraining {
   Tensor LossOf(const WorldBatch& batch, const Drops& drops, const Tensor& t, Dice& dice, bool noisy_memory) const;
   Drops DrawDrops(const WorldBatch& batch, Dice& dice) const;
   std::int64_t DrawStep(Dice& dice) const;
+  /// Numbers per row, to be multiplied with [rows, …].
+  Tensor PerRow(const std::vector<float>& values, std::int64_t dims) const;
+  Tensor Noise(Dice& dice, at::IntArrayRef shape) const { return dice.Normal(shape).to(device_); }
+  WorldBatch BatchOf(const std::vector<Window>& windows) const { return MakeWorldBatch(shards_, windows).To(device_); }
   Tensor Weight(const WorldBatch& batch, const Tensor& still, const Tensor& t) const;
   nn::UNet::Context ContextOf(const Tensor& tokens, const WorldBatch& batch) const;
   /// Where the thing is likely to be, if the network is shown that; what says so is not trained here.
@@ -95,6 +101,7 @@ class WorldTraining {
   const ShardSet& shards_;
   WorldTrainingOptions options_;
   WindowSampler sampler_;
+  at::Device device_;
 };
 
 }  // namespace evac::train

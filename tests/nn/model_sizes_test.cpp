@@ -1,0 +1,118 @@
+#include "worldmodel/nn/model_sizes.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <set>
+
+#include "core/config.h"
+#include "tests/nn/support.h"
+#include "worldmodel/evac_config.h"
+
+namespace evac::nn {
+namespace {
+
+using testing::HasSubstr;
+using testing::ThrowsMessage;
+
+constexpr const char* kPage = EVAC_SOURCE_DIR "/apps/configs/evac_published.yaml";
+
+std::string AllOf(ModelConfig config) {
+  std::string text;
+  for (const Size& size : SizesOf(config)) text += size.Key() + " " + TextOf(size) + "\n";
+  return text;
+}
+
+/// Another value than it has.
+struct Otherwise {
+  void operator()(std::int64_t* field) const { *field += 3; }
+  void operator()(std::vector<std::int64_t>* field) const { field->push_back(7); }
+  void operator()(double* field) const { *field += 1.0 / 3; }
+  void operator()(std::optional<double>* field) const { *field = field->value_or(0) - 0.1; }
+  void operator()(bool* field) const { *field = !*field; }
+};
+
+TEST(Sizes, EveryFieldOfThePublishedPageIsOneAndHasItsDefault) {
+  const Config page = Config::FromFile(kPage);
+  std::set<std::string> keys;
+  for (const std::string& key : page.Keys()) {
+    if (key != "schedule" && key != "unet" && key != "pose_map" && key != "vae" && !key.starts_with("image_resampler") &&
+        key != "action_resampler" && key != "image_encoder")
+      keys.insert(key);
+    else
+      for (const std::string& name : page.Section(key).Keys()) keys.insert(key + "." + name);
+  }
+  ModelConfig config;
+  std::set<std::string> ours;
+  for (const Size& size : SizesOf(config)) EXPECT_TRUE(ours.insert(size.Key()).second) << size.Key() << " is there twice";
+  for (const std::string& key : keys) EXPECT_TRUE(ours.contains(key)) << key;
+  for (const char* commented :
+       {"schedule.carry_plane_m", "schedule.carry_frames", "schedule.carry_unless_changed", "schedule.carry_first",
+        "schedule.unchanged_below", "pose_map.drop_line_m", "pose_map.lag_frames"})
+    EXPECT_EQ(keys.insert(commented).second, true) << commented;
+  EXPECT_EQ(ours, keys);
+  EXPECT_EQ(AllOf(ReadEvacConfig(kPage)), AllOf(ModelConfig()));
+}
+
+TEST(Sizes, AsTextAreTheSameWhenReadAgain) {
+  ModelConfig other;
+  for (const Size& size : SizesOf(other)) std::visit(Otherwise(), size.field);
+  const std::string said = AllOf(other), published = AllOf({});
+  EXPECT_NE(said, published);
+  ModelConfig again;
+  const std::vector<Size> from = SizesOf(other), to = SizesOf(again);
+  for (std::size_t i = 0; i < from.size(); ++i) {
+    EXPECT_NE(TextOf(from[i]), TextOf(to[i])) << from[i].Key();
+    EXPECT_TRUE(SetFromText(to[i], TextOf(from[i]))) << from[i].Key();
+  }
+  EXPECT_EQ(AllOf(again), said);
+  EXPECT_EQ(again.vae.scale_factor, other.vae.scale_factor) << "to the last digit";
+}
+
+TEST(Sizes, TextThatIsNoneLeavesThemAsTheyWere) {
+  ModelConfig config;
+  const std::string before = AllOf(config);
+  for (const Size& size : SizesOf(config)) {
+    for (const char* text : {"x", "1.5.2", "nan", "1,", "truth", "1e999", "1 "})
+      EXPECT_FALSE(SetFromText(size, text)) << size.Key() << " '" << text << "'";
+    if (std::holds_alternative<std::int64_t*>(size.field)) {
+      EXPECT_FALSE(SetFromText(size, "99999999999999999999")) << size.Key();
+    }
+  }
+  EXPECT_EQ(AllOf(config), before);
+}
+
+TEST(Sizes, ByWhichOthersAreDividedAreAskedFor) {
+  const auto complaint = [](auto change) {
+    return [change] {
+      ModelConfig config = TinyConfig();
+      change(config);
+      config.Check();
+    };
+  };
+  EXPECT_NO_THROW(complaint([](ModelConfig&) {})());
+  for (const double none : {0.0, -0.18215})
+    EXPECT_THAT(complaint([none](ModelConfig& config) { config.vae.scale_factor = none; }),
+                ThrowsMessage<TensorError>(HasSubstr("vae.scale_factor: found ")));
+  EXPECT_THAT(complaint([](ModelConfig& config) { config.schedule.linear_end = 1.2; }),
+              ThrowsMessage<TensorError>(HasSubstr("schedule.linear_end: found 1.2, wanted between 0 and 1")));
+  EXPECT_THAT(complaint([](ModelConfig& config) { config.schedule.linear_start = 0; }),
+              ThrowsMessage<TensorError>(HasSubstr("schedule.linear_start: found 0")));
+  EXPECT_THAT(complaint([](ModelConfig& config) { config.schedule.base_scale = 0; }),
+              ThrowsMessage<TensorError>(HasSubstr("schedule.base_scale: found 0")));
+  EXPECT_THAT(complaint([](ModelConfig& config) { config.schedule.turning_step = 1 << 29; }),
+              ThrowsMessage<TensorError>(HasSubstr("schedule.turning_step is 536870912")));
+}
+
+TEST(Sizes, OfALatentThatHasNoCornersAreRefusedWhereRaysAreRead) {
+  ModelConfig config = TinyConfig();
+  config.unet.channel_mult = {1};
+  config.unet.attention_resolutions = {1};
+  config.image_height_px = config.vae.Stride();
+  EXPECT_NO_THROW(config.Check());
+  config.unet.hand_views = config.views;
+  EXPECT_THAT([&] { config.Check(); }, ThrowsMessage<TensorError>(HasSubstr("image_height_px and image_width_px: found")));
+}
+
+}  // namespace
+}  // namespace evac::nn

@@ -1,0 +1,202 @@
+#include <fcntl.h>
+#include <sys/file.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <charconv>
+#include <chrono>
+#include <csignal>
+#include <cstdio>
+#include <cstring>
+#include <fstream>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "worldmodel/nn/library.h"
+#include "worldmodel/nn/memory.h"
+#include "worldmodel/nn/threads.h"
+#include "worldmodel/train/training_job.h"
+
+/// evac-train: a training that `evac train … --job` wrote, on a machine that has a compiler and libtorch alone.
+namespace {
+
+using namespace evac;
+using namespace evac::train;
+
+constexpr const char* kUsage =
+    R"(evac-train JOB SHARDS... --out OUT [--codec FILE] [--init FILE] [--forecast FILE] [--device cpu|cuda|cuda:N]
+           [--threads N] [--steps N]
+
+Does the training that `evac train codec|world … --job JOB` wrote (docs/train_on_gpu.md), with the shards and the weights
+that were named then, wherever they lie now. Killed, the same command goes on from OUT/training.safetensors.
+OUT: codec.safetensors or weights.safetensors, metrics.csv, holdout.csv, curves.svg, strips/*.ppm (of a world model).
+Ends with 0, 2 where the input is wrong, 4 where the machine is or somebody interrupted.
+)";
+
+struct Arguments {
+  std::filesystem::path job, out, codec, init, forecast;
+  ShardFolders shards;
+  at::Device device = at::kCPU;
+  int threads = 0;
+  std::int64_t steps = 0;
+};
+
+std::int64_t Whole(const std::string& option, const std::string& text, std::int64_t most) {
+  std::int64_t value = 0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+  if (error != std::errc() || end != text.data() + text.size() || value < 1 || value > most)
+    throw TensorError(option + ": found '" + text + "', wanted 1 to " + std::to_string(most));
+  return value;
+}
+
+at::Device DeviceOf(const std::string& text) {
+  if (text == "cpu") return at::kCPU;
+  const std::string number = text.starts_with("cuda:") ? text.substr(5) : "0";
+  if (text != "cuda" && !text.starts_with("cuda:"))
+    throw TensorError("--device: found '" + text + "', wanted cpu, cuda or cuda:N");
+  if (!nn::HasCuda()) throw TensorError("--device " + text + ": this libtorch finds no GPU here; wanted cpu");
+  const std::int64_t index = number == "0" ? 0 : Whole("--device cuda:N", number, 127);
+  return at::Device(at::kCUDA, static_cast<at::DeviceIndex>(index));
+}
+
+Arguments Read(const std::vector<std::string>& words) {
+  Arguments arguments;
+  std::vector<std::filesystem::path> places;
+  for (std::size_t i = 0; i < words.size(); ++i) {
+    const std::string& word = words[i];
+    if (!word.starts_with("--")) {
+      places.emplace_back(word);
+      continue;
+    }
+    if (i + 1 == words.size()) throw TensorError(word + ": nothing follows it");
+    const std::string& value = words[++i];
+    if (word == "--out") arguments.out = value;
+    else if (word == "--codec") arguments.codec = value;
+    else if (word == "--init") arguments.init = value;
+    else if (word == "--forecast") arguments.forecast = value;
+    else if (word == "--device") arguments.device = DeviceOf(value);
+    else if (word == "--threads") arguments.threads = static_cast<int>(Whole(word, value, 1024));
+    else if (word == "--steps") arguments.steps = Whole(word, value, std::int64_t{1} << 40);
+    else throw TensorError(word + ": there is no such option; evac-train --help says which there are");
+  }
+  if (places.size() < 2) throw TensorError("found " + std::to_string(places.size()) + " names, wanted JOB and SHARDS");
+  if (arguments.out.empty()) throw TensorError("--out is missing: the folder to write");
+  arguments.job = places.front();
+  arguments.shards.assign(places.begin() + 1, places.end());
+  return arguments;
+}
+
+void RequireFile(const char* option, const std::filesystem::path& given, bool wanted) {
+  if (wanted && given.empty()) throw TensorError(std::string(option) + " is missing: the job begins with such weights");
+  if (!wanted && !given.empty()) throw TensorError(std::string(option) + ": the job was written without it");
+}
+
+/// One process in OUT, as long as it lives.
+class Hold {
+ public:
+  explicit Hold(const std::filesystem::path& out) {
+    std::error_code error;
+    std::filesystem::create_directories(out, error);
+    const std::string file = (out / "evac-train.lock").string();
+    descriptor_ = ::open(file.c_str(), O_CREAT | O_RDWR | O_CLOEXEC | O_NOFOLLOW, 0666);
+    if (descriptor_ < 0) throw TensorError(file + ": cannot be made: " + std::strerror(errno));
+    if (::flock(descriptor_, LOCK_EX | LOCK_NB) != 0) throw TensorError(out.string() + ": another process trains there");
+  }
+  ~Hold() { ::close(descriptor_); }
+  Hold(const Hold&) = delete;
+  Hold& operator=(const Hold&) = delete;
+
+ private:
+  int descriptor_ = -1;
+};
+
+volatile std::sig_atomic_t g_interrupted = 0;
+
+void CatchInterrupts() {
+  struct sigaction action = {};
+  action.sa_handler = [](int) { g_interrupted = 1; };
+  for (const int signal : {SIGINT, SIGTERM, SIGHUP}) {
+    struct sigaction before = {};
+    ::sigaction(signal, nullptr, &before);
+    if (before.sa_handler != SIG_IGN) ::sigaction(signal, &action, nullptr);  // nohup
+  }
+}
+
+void ShowNowAndThen(const TrainerProgress& progress) {
+  static std::chrono::steady_clock::time_point next;
+  if (std::chrono::steady_clock::now() < next) return;
+  next = std::chrono::steady_clock::now() + std::chrono::seconds(10);
+  std::fprintf(stderr, "%s\n", progress.Line().c_str());
+}
+
+/// OUT/strips/step_00001200.ppm
+void WriteStrips(const std::filesystem::path& out, std::int64_t step, const Strips& strips) {
+  std::filesystem::create_directories(out / "strips");
+  char name[40];
+  std::snprintf(name, sizeof name, "step_%08lld.ppm", static_cast<long long>(step));
+  const at::Tensor picture = strips.picture.contiguous();
+  std::ofstream file(out / "strips" / name, std::ios::binary | std::ios::trunc);
+  file << "P6\n" << picture.size(1) << " " << picture.size(0) << "\n255\n";
+  file.write(static_cast<const char*>(picture.data_ptr()), static_cast<std::streamsize>(picture.nbytes()));
+}
+
+int Train(const Arguments& arguments) {
+  TrainingJob job = ReadTrainingJob(arguments.job);
+  const bool is_codec = job.kind == TrainingKind::kCodec;
+  RequireFile("--codec", arguments.codec, !is_codec);
+  RequireFile("--init", arguments.init, job.wants_init);
+  RequireFile("--forecast", arguments.forecast, job.wants_forecast);
+  for (JobOptions* options : {&job.codec.job, &job.world.job}) {
+    if (arguments.steps == 0) continue;
+    options->trainer.steps = arguments.steps;
+    options->trainer.minutes = 0;
+  }
+  const int cores = static_cast<int>(std::max(1U, std::thread::hardware_concurrency()));
+  const int threads = arguments.threads > 0 ? arguments.threads : cores;
+  const JobPlace place{arguments.shards, arguments.out, job.config, threads, [] { return g_interrupted != 0; },
+                       ShowNowAndThen, [](const std::string& sentence) { std::fprintf(stderr, "%s\n", sentence.c_str()); },
+                       job.begun_with, arguments.device};
+  const Hold hold(arguments.out);
+  CatchInterrupts();
+  nn::KeepFreedMemory();
+  const nn::LibraryThreads library(Workers(place, job.options()) > 1 ? 1 : threads);
+  job.start.codec = arguments.codec;
+  job.start.init = arguments.init;
+  job.start.forecast = arguments.forecast;
+  const auto look = [&](std::int64_t step, const Strips& strips) { WriteStrips(arguments.out, step, strips); };
+  const TrainerSummary summary =
+      is_codec ? TrainCodec(place, job.codec, arguments.init) : TrainWorld(place, job.world, job.start, look);
+  const char* file = is_codec ? "codec.safetensors" : "weights.safetensors";
+  if (!summary.IsDone()) {
+    std::fprintf(stderr, "interrupted at step %lld: the same command goes on from there\n",
+                 static_cast<long long>(summary.step));
+    return 4;
+  }
+  std::printf("%s: %s after %lld steps\n", (arguments.out / file).c_str(), summary.why.c_str(),
+              static_cast<long long>(summary.step));
+  return 0;
+}
+
+}  // namespace
+
+int main(int count, char** words) {
+  const std::vector<std::string> given(words + 1, words + count);
+  if (given.size() == 1 && (given[0] == "--help" || given[0] == "-h")) {
+    std::fputs(kUsage, stdout);
+    return 0;
+  }
+  try {
+    return Train(Read(given));
+  } catch (const evac::TensorWriteError& error) {
+    std::fprintf(stderr, "evac-train: %s\n", error.what());
+    return 4;
+  } catch (const evac::TensorError& error) {
+    std::fprintf(stderr, "evac-train: %s\n", error.what());
+    return 2;
+  } catch (const std::exception& error) {
+    std::fprintf(stderr, "evac-train: %s\n", error.what());
+    return 4;
+  }
+}
