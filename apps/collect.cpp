@@ -9,10 +9,12 @@
 #include <nlohmann/json.hpp>
 
 #include "apps/collect_episode.h"
+#include "apps/warnings.h"
 #include "apps/work_share.h"
 #include "core/error.h"
 #include "core/file.h"
 #include "core/store_lock.h"
+#include "core/version.h"
 #include "judges/attempt.h"
 
 namespace evac {
@@ -21,12 +23,13 @@ namespace {
 namespace fs = std::filesystem;
 using Json = nlohmann::ordered_json;
 
-/// OUT/collection.json: which collection this is. @throws InvalidInput if there is another.
+/// OUT/collection.json: which collection this is, and which evac began it. @throws InvalidInput if there is another.
 void Claim(const CollectArguments& arguments, const Recipe& recipe) {
   const Json page = {{"format", "evac-collection"},
                      {"version", 1},
                      {"seed", std::to_string(arguments.seed)},
                      {"recipe_sha256", recipe.hash},
+                     {"evac_version", EVAC_VERSION},
                      {"recipe", recipe.text}};
   const fs::path path = arguments.out / "collection.json";
   if (!fs::exists(path)) return WriteFileAtomically(path, page.dump(2) + "\n");
@@ -37,6 +40,8 @@ void Claim(const CollectArguments& arguments, const Recipe& recipe) {
     throw InvalidInput("{}: holds another collection: {} is {}, wanted {}; choose another --out", path.string(), field,
                        found.dump(), page[field].dump());
   }
+  const auto began = before.find("evac_version");
+  SayIfAnotherVersionBegan(arguments.out, began != before.end() && began->is_string() ? began->get<std::string>() : "");
 }
 
 /// Collects what is still to do; each thread has a world of its own.

@@ -69,7 +69,10 @@ Behaviour ReadBehaviour(const Config& page) {
   page.Require(learned == page.Has("checkpoint"), "checkpoint", "it with policy learned, and only there");
   page.Require(!behaviour.unaware || behaviour.without_object, "unaware", "it with without_object: true");
   if (explores) ExplorationFromName(behaviour.does);
-  if (learned) behaviour.checkpoint = page.Path("checkpoint");
+  if (learned) {
+    behaviour.checkpoint = page.Path("checkpoint");
+    behaviour.checkpoint_sha256 = Sha256HexOfFile(behaviour.checkpoint);
+  }
   static const std::set<std::string> kOwn = {"name", "share", "policy", "does", "checkpoint", "without_object", "unaware"};
   for (const std::string& key : page.Keys()) {
     if (kOwn.contains(key)) continue;
@@ -133,7 +136,7 @@ std::string HashOf(Config page, const Recipe& recipe) {
     }
   }
   for (const Behaviour& behaviour : recipe.mix) {
-    if (!behaviour.checkpoint.empty()) all += Sha256HexOfFile(behaviour.checkpoint);
+    all += behaviour.checkpoint_sha256;
   }
   return Sha256Hex(all);
 }
@@ -184,10 +187,21 @@ VisualPickOptions PickOptions(const std::map<std::string, double>& parameters, i
   return options;
 }
 
+/// It is read anew for every episode, and the collection is called after the file as it was first: one that was written to
+/// meanwhile is refused, also if that was while it was read.
+std::unique_ptr<Policy> LoadCheckpoint(const Behaviour& behaviour, int chunk_size) {
+  std::unique_ptr<Policy> policy = MakeLearnedPolicy(behaviour.checkpoint, chunk_size);
+  const std::string found = Sha256HexOfFile(behaviour.checkpoint);
+  if (found != behaviour.checkpoint_sha256)
+    throw InvalidInput("{}: it is another file than when the recipe was read: found SHA-256 {}, wanted {}",
+                       behaviour.checkpoint.string(), found, behaviour.checkpoint_sha256);
+  return policy;
+}
+
 std::unique_ptr<Policy> MakeSteadyPolicy(const CollectJob& job, int chunk_size) {
   if (job.behaviour->policy == "visual_pick")
     return std::make_unique<VisualPick>(PickOptions(job.row.parameters, chunk_size));
-  if (job.behaviour->policy == "learned") return MakeLearnedPolicy(job.behaviour->checkpoint, chunk_size);
+  if (job.behaviour->policy == "learned") return LoadCheckpoint(*job.behaviour, chunk_size);
   const auto speed = job.row.parameters.find("speed");
   return std::make_unique<Explorer>(ExplorerOptions{ExplorationFromName(job.behaviour->does), chunk_size,
                                                     speed == job.row.parameters.end() ? 1.0 : speed->second});

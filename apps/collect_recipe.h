@@ -21,6 +21,7 @@ struct Behaviour {
   std::string policy;  ///< visual_pick, explorer, learned
   std::string does;    ///< explorer's: push, wrong_object, roam, random
   std::filesystem::path checkpoint;  ///< learned's weights
+  std::string checkpoint_sha256;     ///< of that file, when the recipe was read
   bool without_object = false;  ///< the task's object is taken away
   bool unaware = false;  ///< and the policy does what it does where it is there: its hand closes where the thing would be
   std::vector<std::pair<std::string, std::pair<double, double>>> parameters;  ///< uniform in [low, high], file's order
@@ -60,7 +61,7 @@ struct CollectJob {
 CollectJob JobAt(const Recipe& recipe, std::uint64_t seed, std::int64_t index);
 
 /// The policy of a job, with its parameters. @throws InvalidInput naming one that is out of its range, or a checkpoint
-/// that is none of a learned policy's.
+/// that is none of a learned policy's, or another file than when the recipe was read.
 std::unique_ptr<Policy> MakePolicy(const CollectJob& job, int chunk_size);
 
 }  // namespace evac

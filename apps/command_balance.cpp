@@ -68,11 +68,20 @@ void Write(const BalanceArguments& arguments, const TensorMetadata& card) {
   fmt::print("{}: {}\n", arguments.out, ClassifierName(arguments.out));
 }
 
+/// By a name that nobody has too few pairs would be all that is found, however many more there were.
+void DemandTruth(const BalanceArguments& arguments, const Store& store) {
+  const std::vector<std::string> judges = store.Judges();
+  if (std::ranges::find(judges, arguments.truth) != judges.end()) return;
+  throw InvalidInput("--truth: found '{}', wanted one who has judged {}: {}", arguments.truth, arguments.run,
+                     judges.empty() ? "nobody has yet" : fmt::format("{}", fmt::join(judges, ", ")));
+}
+
 ExitCode Balance(const BalanceArguments& arguments) {
   const WeightFile file(arguments.weights, kClassifierFormat);
   const double before = file.Number("threshold");
   const std::string judge = ClassifierName(arguments.weights);
   const Store store = Store::Open(arguments.run, Store::Mode::kReadOnly);
+  DemandTruth(arguments, store);
   const PairedClips paired = PairedClipsOf(store, judge, arguments.truth, arguments.world);
   const auto successes = std::ranges::count(paired.clips, true, &PairedClip::succeeded);
   const auto failures = static_cast<std::int64_t>(paired.clips.size()) - successes;

@@ -239,7 +239,10 @@ void AddCompare(CLI::App& app, ExitCode& exit_code) {
   command->add_option("--run", arguments->run, "the run that both are in")->type_name("RUN");
   command->add_option("--world", arguments->world, "only in this world; else in every world of both")
       ->type_name("NAME");
-  command->add_option("--judge", arguments->judge, "whose verdicts are counted")->capture_default_str();
+  command
+      ->add_option("--judge", arguments->judge,
+                   "whose verdicts are counted; with commas, of each episode the first who can tell: oracle,classifier")
+      ->capture_default_str();
   command->add_option("--alpha", arguments->options.alpha, "risk of a false decision, two-sided")
       ->capture_default_str();
   command->add_option("--power", arguments->options.power, "that 'how many more' promises")->capture_default_str();

@@ -62,7 +62,11 @@ void AddDashboard(CLI::App& app, ExitCode& exit_code) {
       ->check(CLI::Range(0, 65535))
       ->capture_default_str();
   const CLI::Option* judge =
-      command->add_option("--judge", options->summary.judge, "whose verdicts are counted")->capture_default_str();
+      command
+          ->add_option("--judge", options->summary.judge,
+                       "whose verdicts are counted; with commas, of each episode the first who can tell: "
+                       "oracle,classifier")
+          ->capture_default_str();
   command->footer(
       "Examples:\n"
       "  evac dashboard out/demo\n"

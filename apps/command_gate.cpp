@@ -148,6 +148,7 @@ void AddPin(CLI::App& gate, ExitCode& exit_code) {
   command->add_option("--out", arguments->out, "the file")->type_name("PINNED.json")->required();
   command->add_option("--judge", arguments->judge, "whose verdicts are pinned")->capture_default_str();
   command->callback([arguments, &exit_code] {
+    RefuseFolder(arguments->out);
     const PinnedResult pinned = PinRun(arguments->run, arguments->judge);
     DemandOutcomes(pinned, *arguments);
     MakeFolders(fs::path(arguments->out).parent_path());

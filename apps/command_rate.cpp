@@ -13,6 +13,7 @@
 
 #include "apps/interrupts.h"
 #include "apps/network_parts.h"
+#include "apps/number_range.h"
 #include "apps/progress_display.h"
 #include "apps/rate_resolve.h"
 #include "apps/rate_status.h"
@@ -127,13 +128,17 @@ void Serve(RateArguments& arguments) {
 
 void Export(const RateArguments& arguments) {
   if (arguments.csv.empty() == arguments.jsonl.empty()) throw InvalidInput("wanted either --csv FILE or --jsonl FILE");
+  const std::string& file = arguments.csv.empty() ? arguments.jsonl : arguments.csv;
+  if (file != "-") RefuseFolder(file);
   const StudyTable table = StudyStore::Open(arguments.study, StudyStore::Mode::kReadOnly).VerdictTable();
   const std::string text = arguments.csv.empty() ? RatingJsonLines(table) : RatingCsv(table);
-  const std::string& file = arguments.csv.empty() ? arguments.jsonl : arguments.csv;
-  if (file == "-")
+  if (file == "-") {
     std::fwrite(text.data(), 1, text.size(), stdout);
-  else
-    WriteFileAtomically(file, text), fmt::print("{}: {} verdicts\n", file, table.rows.size());
+    return;
+  }
+  MakeFolders(std::filesystem::path(file).parent_path());
+  WriteFileAtomically(file, text);
+  fmt::print("{}: {} verdicts\n", file, table.rows.size());
 }
 
 void Import(const RateArguments& arguments) {
@@ -195,7 +200,7 @@ void AddServe(CLI::App& rate, const std::shared_ptr<RateArguments>& shared, Exit
       ->capture_default_str();
   command->add_option("--url", a.serve.public_url, "of the reverse proxy in front of it: https://rate.lab.org");
   command->add_option("--cover", a.serve.desk.cover_share, "share of a clip that must be watched before its verdict")
-      ->check(CLI::Range(0.0, 1.0))
+      ->check(Within(0.0, 1.0))
       ->capture_default_str();
 }
 

@@ -51,7 +51,11 @@ void AddTrust(CLI::App& app, ExitCode& exit_code) {
   command->add_option("RUN", arguments->run, "folder of a run")->required();
   command->add_option("--world", arguments->world, "only this one; else every world beside the real one")
       ->type_name("NAME");
-  command->add_option("--judge", arguments->judge, "whose verdicts on episodes are counted")->capture_default_str();
+  command
+      ->add_option("--judge", arguments->judge,
+                   "whose verdicts on episodes are counted; with commas, of each the first who can tell: "
+                   "oracle,classifier")
+      ->capture_default_str();
   command->add_option("--margin", arguments->options.margin, "how far its rate may be from the real one")
       ->capture_default_str();
   command->add_option("--confidence", arguments->options.confidence, "of the intervals")->capture_default_str();

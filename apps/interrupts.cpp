@@ -1,7 +1,10 @@
 #include "apps/interrupts.h"
 
+#include <signal.h>
+
+#include <array>
 #include <atomic>
-#include <csignal>
+#include <cstddef>
 
 namespace evac {
 namespace {
@@ -13,24 +16,31 @@ static_assert(std::atomic<bool>::is_always_lock_free);
 /// How many are alive: one inside another is a part of its work.
 int g_catching = 0;
 
-constexpr int kInterrupts[] = {SIGINT, SIGTERM, SIGHUP};
+constexpr std::array kInterrupts = {SIGINT, SIGTERM, SIGHUP};
+
+/// What each of them did before the outermost was made.
+std::array<struct sigaction, kInterrupts.size()> g_before;
 
 }  // namespace
 
 CatchInterrupts::CatchInterrupts() {
   if (g_catching++ > 0) return;
   g_interrupted = false;
-  for (const int signal : kInterrupts) {
-    std::signal(signal, [](int caught) {
-      g_interrupted = true;
-      if (caught != SIGHUP) std::signal(caught, SIG_DFL);
-    });
+  struct sigaction catching {};
+  catching.sa_flags = SA_RESTART;
+  catching.sa_handler = [](int caught) {
+    g_interrupted = true;
+    if (caught != SIGHUP) ::signal(caught, SIG_DFL);
+  };
+  for (std::size_t i = 0; i < kInterrupts.size(); ++i) {
+    ::sigaction(kInterrupts[i], nullptr, &g_before[i]);
+    if (g_before[i].sa_handler != SIG_IGN) ::sigaction(kInterrupts[i], &catching, nullptr);
   }
 }
 
 CatchInterrupts::~CatchInterrupts() {
   if (--g_catching > 0) return;
-  for (const int signal : kInterrupts) std::signal(signal, SIG_DFL);
+  for (std::size_t i = 0; i < kInterrupts.size(); ++i) ::sigaction(kInterrupts[i], &g_before[i], nullptr);
 }
 
 bool IsInterrupted() { return g_interrupted; }

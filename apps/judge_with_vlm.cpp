@@ -9,9 +9,9 @@
 #include <iterator>
 #include <thread>
 
+#include "apps/judge_with_progress.h"
 #include "core/seed.h"
 #include "core/store_calls.h"
-#include "judges/judge_episodes.h"
 #include "judges/vlm_judge.h"
 
 namespace evac {
@@ -90,7 +90,8 @@ std::string Greet(const VlmConfig& config, VlmClient& client, CallCache& cache, 
   return fingerprint;
 }
 
-void ShowProgress(const Verdict& verdict) {
+/// Beside the counting, for who looks on; a log would be full of it.
+void ShowVerdict(const Verdict& verdict) {
   if (::isatty(STDERR_FILENO))
     fmt::print(stderr, "{}: {} ({})\n", verdict.episode_id, Name(verdict.label), verdict.reason);
 }
@@ -114,8 +115,11 @@ ExitCode JudgeWithVlm(const VlmJudgeArguments& arguments) {
     if (probe == VlmProbe::kRetest && !arguments.retest) continue;
     options.probe = probe;
     VlmJudge judge(config, options, client, cache);
-    JudgeOptions how{
-        .again = arguments.again, .also_called = {judge.Name() + kVlmSmall}, .on_verdict = ShowProgress};
+    AskedProgress progress(judge.Name());
+    JudgeOptions how{.again = arguments.again,
+                     .also_called = {judge.Name() + kVlmSmall},
+                     .on_verdict = ShowVerdict,
+                     .on_asked = [&](int done, int total) { progress.Show(done, total); }};
     if (probe != VlmProbe::kNone)
       how.wanted = [&](const Episode& episode) { return IsProbed(episode, config.probe_share); };
     const JudgeSummary summary = JudgeEpisodes(judge, store, how);

@@ -18,7 +18,8 @@ int Main(int argc, char** argv) {
   app.require_subcommand(1);
   app.footer(
       "First steps:\n  evac run apps/configs/demo.yaml --out out/demo\n  evac report out/demo\n"
-      "Exit codes: 0 ok, 1 the answer is no, 2 invalid input, 3 inconclusive, 4 internal error.");
+      "Exit codes: 0 ok, 1 the answer is no, 2 invalid input, 3 inconclusive, 4 internal error, error budget spent, or "
+      "interrupted.");
   evac::ExitCode exit_code = evac::ExitCode::kOk;
   try {
     evac::AddRun(app, exit_code);
@@ -51,6 +52,9 @@ int Main(int argc, char** argv) {
   } catch (const evac::Error& error) {
     std::fputs(fmt::format("evac: {}\n", error.what()).c_str(), stderr);
     return static_cast<int>(error.exit_code());
+  } catch (const evac::TensorWriteError& error) {  // a full disk
+    std::fputs(fmt::format("evac: {}\n", error.what()).c_str(), stderr);
+    return static_cast<int>(evac::ExitCode::kInternal);
   } catch (const evac::TensorError& error) {  // a file of weights that is none, or another network's
     std::fputs(fmt::format("evac: {}\n", error.what()).c_str(), stderr);
     return static_cast<int>(evac::ExitCode::kInvalidInput);

@@ -26,7 +26,8 @@ void NeedNetworksFor(const Suite& suite);
 /// The world of a suite's entry of type `evac`: its network loaded, its chunk cache opened.
 /// @param store  where the real run's first frames are; null: nobody has run it, and only a recording can be started
 /// from
-/// @throws InvalidInput if page and weights are not of one network, or either is broken.
+/// @throws InvalidInput if page and weights are not of one network, either is broken, or one of the files is another
+/// than when the suite was read (DemandUnchanged).
 std::unique_ptr<World> MakeEvacWorld(const SuiteWorld& world, const Suite& suite, const Store* store);
 
 /// The same without loading it: what is wrong with page and weights is known before the first episode of any world, and

@@ -2,6 +2,7 @@
 #include <memory>
 #include <utility>
 
+#include "apps/number_range.h"
 #include "apps/policy_program.h"
 #include "apps/program_beside.h"
 #include "core/error.h"
@@ -44,7 +45,7 @@ Command AddPolicy(CLI::App& app, const std::string& name, const std::string& des
       ->check(CLI::Range(1, 1000))
       ->capture_default_str();
   command.app->add_option("--period-s", common.period_s, "seconds between two targets; 0: any")
-      ->check(CLI::Range(0.0, 60.0))
+      ->check(Within(0.0, 60.0))
       ->capture_default_str();
   AddAddressOptions(*command.app, common.address);
   return command;

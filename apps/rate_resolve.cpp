@@ -27,7 +27,8 @@ std::map<std::string, RubricFacts> FactsOf(const StudyStore& study) {
     const auto document = nlohmann::json::parse(rubric.document);
     RubricFacts& of_rubric = facts[rubric.hash];
     of_rubric.version = document.value("version", "");
-    for (const auto& stage : document.at("stages")) of_rubric.stages.push_back(stage.value("name", ""));
+    for (const auto& stage : document.value("stages", nlohmann::json::array()))
+      of_rubric.stages.push_back(stage.value("name", ""));
   }
   return facts;
 }
@@ -106,6 +107,7 @@ std::string ReasonOf(const RatedClip& clip, const std::string& study) {
 struct Told {
   Verdict verdict;
   bool takes_back = false;  ///< only where the run says something by that judge: it was of votes that are gone
+  std::string source_sha256 = {};  ///< of the episode's video that raters saw
 };
 
 /// Gives the verdicts of one study, under the names that they have in runs.
@@ -179,28 +181,42 @@ bool IsSame(const Verdict& a, const Verdict& b) {
   return a.label == b.label && a.reason == b.reason && a.stages == b.stages && a.rubric_version == b.rubric_version;
 }
 
-struct Written {
-  std::int64_t verdicts = 0, of_other_studies = 0;  ///< new ones, and those among them that took another study's place
+struct New {
+  std::vector<Verdict> verdicts;
+  std::int64_t of_other_studies = 0;  ///< those among them that take another study's place
 };
 
-/// Adds what a run does not say yet. A study takes back what it said itself only.
-Written WriteTo(const std::string& run, const std::vector<Told>& all, const std::string& study) {
-  Store store = Store::Open(run, Store::Mode::kReadWrite);
+/// What raters saw is what is there: a run that was made anew has the same episode ids.
+void RequireSameVideo(const Store& store, const std::map<std::string, std::string>& videos, const Told& told) {
+  const auto found = videos.find(told.verdict.episode_id);
+  if (found == videos.end())
+    throw InvalidInput("{}: has no episode {} any more, which raters were shown; wanted the run as it was",
+                       store.folder().string(), told.verdict.episode_id);
+  if (found->second != told.source_sha256)
+    throw InvalidInput("{}: the video of episode {} is another than raters were shown: SHA-256 {}, in the study {}; "
+                       "wanted the run as it was",
+                       store.folder().string(), told.verdict.episode_id, found->second, told.source_sha256);
+}
+
+/// What a run does not say yet. A study takes back what it said itself only.
+/// @throws InvalidInput if an episode is not the one that raters saw
+New NewFor(const Store& store, const std::vector<Told>& all, const std::string& study) {
   const auto current = store.CurrentVerdicts();
-  std::vector<Verdict> wanted;
-  Written written;
-  for (const auto& [verdict, takes_back] : all) {
+  std::map<std::string, std::string> videos;
+  for (const Episode& episode : store.Episodes()) videos[episode.key.Id()] = episode.video_sha256;
+  New fresh;
+  for (const Told& told : all) {
+    const Verdict& verdict = told.verdict;
     const auto of_episode = current.find(verdict.episode_id);
     const bool is_known = of_episode != current.end() && of_episode->second.contains(verdict.judge);
     const bool is_anothers = is_known && IsOfAnotherStudy(of_episode->second.at(verdict.judge), study);
-    if (takes_back && (!is_known || is_anothers)) continue;
+    if (told.takes_back && (!is_known || is_anothers)) continue;
+    RequireSameVideo(store, videos, told);
     if (is_known && IsSame(of_episode->second.at(verdict.judge), verdict)) continue;
-    wanted.push_back(verdict);
-    written.of_other_studies += is_anothers;
+    fresh.verdicts.push_back(verdict);
+    fresh.of_other_studies += is_anothers;
   }
-  store.AddVerdicts(wanted);
-  written.verdicts = static_cast<std::int64_t>(wanted.size());
-  return written;
+  return fresh;
 }
 
 }  // namespace
@@ -216,13 +232,21 @@ Resolved ResolveStudy(const StudyStore& study, const ResolveOptions& options) {
   std::map<std::string, std::vector<Told>> by_run;
   for (const RatedClip& clip : clips) {
     if (HasSomebodysWord(clip)) ++(clip.resolution.label ? resolved.decided : resolved.undecided);
-    for (Told& told : speaker.AllOf(clip)) by_run[clip.clip.run].push_back(std::move(told));
+    for (Told& told : speaker.AllOf(clip)) {
+      told.source_sha256 = clip.clip.source_sha256;
+      by_run[clip.clip.run].push_back(std::move(told));
+    }
   }
+  const std::string name = study.info().name;
+  // Before any is written.
+  for (const auto& [run, all] : by_run) NewFor(Store::Open(run, Store::Mode::kReadOnly), all, name);
   std::int64_t of_other_studies = 0;
   for (const auto& [run, all] : by_run) {
-    const Written written = WriteTo(run, all, study.info().name);
-    resolved.written += written.verdicts;
-    of_other_studies += written.of_other_studies;
+    Store store = Store::Open(run, Store::Mode::kReadWrite);
+    const New fresh = NewFor(store, all, name);
+    store.AddVerdicts(fresh.verdicts);
+    resolved.written += std::ssize(fresh.verdicts);
+    of_other_studies += fresh.of_other_studies;
   }
   if (of_other_studies > 0)
     resolved.warnings.push_back(fmt::format("{} of judge {} instead of another study's (--as NAME keeps studies apart)",

@@ -26,7 +26,9 @@ struct Resolved {
 /// run has a verdict of votes that count no more (their raters left, or undid them), cannot_tell takes its place.
 /// Of two studies that give labels under one name to one episode the later one's holds, and a warning says so.
 /// Stages are written where somebody told of them: a sheet does not, nor who saw a success and marked none.
-/// @throws InvalidInput for a name of other judges, or if a run has moved, or a task was rated by several rubrics and they were not to be mixed.
+/// @throws InvalidInput for a name of other judges, or if a run has moved, or holds another video than raters saw of an
+/// episode that gets a verdict (then nothing is written), or a task was rated by several rubrics and they were not to be
+/// mixed.
 Resolved ResolveStudy(const StudyStore& study, const ResolveOptions& options);
 
 }  // namespace evac

@@ -47,6 +47,9 @@ function(evac_module name)
   evac_precompile(evac_${name})
 endfunction()
 
+# Published tables, recordings and golden files that are not in this repository: tests that want them are skipped without.
+set(EVAC_SHARED_DIR "${CMAKE_SOURCE_DIR}/../shared" CACHE PATH "Where tests look for data/ that is not in this repository")
+
 # evac_test(NAME [LIBRARIES ...]): all *_test.cpp below this folder become the binary bin/NAME_test, run by ctest.
 function(evac_test name)
   cmake_parse_arguments(ARG "" "" "LIBRARIES" ${ARGN})
@@ -59,6 +62,6 @@ function(evac_test name)
   evac_optimise(${name}_test -O1)
   evac_precompile(${name}_test <gmock/gmock.h>)
   target_compile_definitions(${name}_test PRIVATE EVAC_SOURCE_DIR="${CMAKE_SOURCE_DIR}"
-    EVAC_SHARED_DIR="${CMAKE_SOURCE_DIR}/../shared" EVAC_BIN_DIR="${CMAKE_BINARY_DIR}/bin")
+    EVAC_SHARED_DIR="${EVAC_SHARED_DIR}" EVAC_BIN_DIR="${CMAKE_BINARY_DIR}/bin")
   add_test(NAME ${name} COMMAND ${name}_test)
 endfunction()

@@ -14,7 +14,7 @@ enum class ExitCode {
   kNo = 1,            ///< the answer is "no": a gate failed
   kInvalidInput = 2,  ///< the user's file, field or option is wrong
   kInconclusive = 3,  ///< neither yes nor no
-  kInternal = 4,      ///< our fault, the machine's (disk full), or the error budget is spent
+  kInternal = 4,      ///< our fault, the machine's (disk full), the error budget is spent, or interrupted
 };
 
 /// The one exception type of the project. Thrown with the values in the message; caught around an episode, at C

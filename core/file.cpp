@@ -104,6 +104,12 @@ void MakeFolders(const fs::path& folder) {
   SyncFolder(folder.parent_path());
 }
 
+void RefuseFolder(const fs::path& file) {
+  std::error_code ignored;
+  if (!file.has_filename() || fs::is_directory(file, ignored))
+    throw InvalidInput("{}: is a folder, wanted a file", file.string());
+}
+
 void WriteFileAtomically(const fs::path& path, std::string_view bytes) {
   const OwnPart part(path);
   try {

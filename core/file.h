@@ -25,4 +25,8 @@ void SyncAndRename(const std::filesystem::path& from, const std::filesystem::pat
 /// @throws InvalidInput naming what is no folder where one is wanted; Error naming the folder that cannot be made.
 void MakeFolders(const std::filesystem::path& folder);
 
+/// For a file that is written at the end of long work: whether one can be there is known before.
+/// @throws InvalidInput naming it if it is a folder, or ends like one.
+void RefuseFolder(const std::filesystem::path& file);
+
 }  // namespace evac

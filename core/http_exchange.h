@@ -6,7 +6,7 @@
 
 namespace evac {
 
-/// How long a server may take and how much it may say (vlm_judge.md 2.3).
+/// How long a server may take and how much it may say (docs/vlm_judge.md).
 struct HttpLimits {
   double connect_s = 5;
   double first_byte_s = 60;  ///< from the connection to the first byte of the answer

@@ -95,8 +95,9 @@ Store::~Store() = default;
 
 Store Store::CreateOrContinue(const fs::path& folder, const RunInfo& run) {
   MakeFolders(folder);
-  auto lock = std::make_unique<RunLock>(folder / run_files::kLock);
   const fs::path file = DatabaseIn(folder);
+  if (!fs::exists(file)) run_files::RequireNoOthersFiles(folder);
+  auto lock = std::make_unique<RunLock>(folder / run_files::kLock);
   if (fs::exists(file)) {  // looked at before anything is written: it may be a newer evac's
     sqlite::Connection reading = sqlite::Connection::OpenReadOnly(file);
     schema::Version(reading, schema::Steps(), file);

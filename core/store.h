@@ -25,10 +25,12 @@ struct RunInfo {
 };
 
 struct WorldInfo {
-  std::string name;          ///< real, sim, echo
-  std::string type;          ///< mujoco, echo
+  std::string name;          ///< real, sim, evac, …: as the suite calls it
+  std::string type;          ///< mujoco, evac, echo
   bool is_real = false;      ///< the reference of every comparison; its first frames are the initial scenes
-  std::string profile_hash;  ///< of what decides its behaviour beside the task (MuJoCo: the profile page), may be empty
+  /// Of what decides its behaviour beside the task: MuJoCo's profile page; evac's weights, page, statistics, sampler.
+  /// Empty for echo.
+  std::string profile_hash;
 };
 
 struct PolicyInfo {
@@ -94,7 +96,8 @@ class Store {
   /// Begins a run in `folder` (made if absent), or continues the one there if it has the same suite hash. One of another
   /// suite that never came to an episode makes room.
   /// @throws InvalidInput if another run is there, another process writes it, its schema is newer than this program, or
-  /// `folder` is a file or lies in one.
+  /// `folder` is a file or lies in one; also where somebody's files would be in the way: in videos/ or thumbs/ (or these
+  /// are links) of a folder without a run, or a file called lock that is none.
   static Store CreateOrContinue(const std::filesystem::path& folder, const RunInfo& run);
   /// @throws InvalidInput if there is no run in `folder`. Older schemas are migrated (kReadWrite) or read as they are.
   static Store Open(const std::filesystem::path& folder, Mode mode);

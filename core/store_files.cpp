@@ -33,10 +33,21 @@ std::string NameInside(const fs::path& folder, const fs::path& file) {
   return relative.generic_string();
 }
 
+void RequireNoOthersFiles(const fs::path& folder) {
+  for (const char* part : {kVideos, kThumbnails}) {
+    const fs::path found = folder / part;
+    const fs::file_status status = fs::symlink_status(found);
+    const bool is_free = status.type() == fs::file_type::not_found || (fs::is_directory(status) && fs::is_empty(found));
+    if (!is_free)
+      throw InvalidInput("{}: is there, and of no run ({} is missing); wanted that name free, or another folder for the "
+                         "run", found.string(), kDatabase);
+  }
+}
+
 void RemoveAllBut(const std::set<std::string>& names, const fs::path& folder) {
   std::vector<fs::path> orphans;
   for (const char* part : {kVideos, kThumbnails}) {
-    if (!fs::is_directory(folder / part)) continue;
+    if (!fs::is_directory(fs::symlink_status(folder / part))) continue;  // through a link would be somebody's
     for (const fs::directory_entry& entry : fs::recursive_directory_iterator(folder / part)) {
       const bool is_named = names.contains(entry.path().lexically_relative(folder).generic_string());
       if (!entry.is_directory() && !is_named) orphans.push_back(entry.path());

@@ -21,7 +21,10 @@ std::string ThumbnailName(const EpisodeKey& key);
 /// @throws InternalError if `file` is not below `folder`, or not there.
 std::string NameInside(const std::filesystem::path& folder, const std::filesystem::path& file);
 
-/// Removes what is below videos/ and thumbs/ and not among `names`.
+/// @throws InvalidInput if videos/ or thumbs/ hold anything, or are links: in a folder without a run that is somebody's
+void RequireNoOthersFiles(const std::filesystem::path& folder);
+
+/// Removes what is below videos/ and thumbs/ and not among `names`; nothing where one of them is a link.
 void RemoveAllBut(const std::set<std::string>& names, const std::filesystem::path& folder);
 
 }  // namespace evac::run_files

@@ -8,7 +8,8 @@ namespace evac {
 /// ends.
 class RunLock {
  public:
-  /// @throws InvalidInput naming the holder's process number, if there is one.
+  /// @throws InvalidInput naming the holder's process number, if there is one; or the file, if it is somebody's: holds
+  /// anything but a process's number, or is a link.
   explicit RunLock(const std::filesystem::path& file);
   ~RunLock();
   RunLock(const RunLock&) = delete;

@@ -1,6 +1,9 @@
 #include "core/store_study.h"
 
+#include <algorithm>
 #include <array>
+#include <charconv>
+#include <nlohmann/json.hpp>
 #include <utility>
 
 #include "core/error.h"
@@ -12,6 +15,7 @@ namespace evac {
 namespace {
 
 namespace fs = std::filesystem;
+using Json = nlohmann::json;
 
 constexpr std::int64_t kApplicationId = 0x65767374;  // "evst"
 constexpr const char* kFile = "study.sqlite";
@@ -34,6 +38,42 @@ void Check(sqlite::Connection& connection, const fs::path& file) {
     throw InvalidInput("{}: is no study that this evac knows (version {})", file.string(), version);
 }
 
+/// @param field  what in it, with what was found
+Error Damaged(const fs::path& folder, const std::string& field, const char* wanted) {
+  return InvalidInput("{}: the study is damaged: {}, wanted {}", (folder / kFile).string(), field, wanted);
+}
+
+std::uint64_t SeedIn(const std::string& text, const fs::path& folder) {
+  std::uint64_t seed = 0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), seed);
+  if (error != std::errc() || end != text.data() + text.size())
+    throw Damaged(folder, fmt::format("its seed is '{}'", text), "a whole number");
+  return seed;
+}
+
+bool HasTexts(const Json& object, std::initializer_list<const char*> names) {
+  return object.is_object() && std::ranges::all_of(names, [&](const char* name) {
+           const auto found = object.find(name);
+           return found == object.end() || found->is_string();
+         });
+}
+
+/// As raters, board and labels read it.
+void CheckRubric(const StudyRubric& rubric, const fs::path& folder) {
+  const Json document = Json::parse(rubric.document, nullptr, /*allow_exceptions=*/false);
+  const bool has_texts = HasTexts(document, {"instruction", "success", "version"});
+  const Json stages = has_texts ? document.value("stages", Json::array()) : Json();
+  const auto is_stage = [](const Json& stage) { return HasTexts(stage, {"name", "description"}); };
+  if (!stages.is_array() || !std::ranges::all_of(stages, is_stage))
+    throw Damaged(folder, fmt::format("the rubric {} of task {} is none", rubric.hash, rubric.task),
+                  "JSON: instruction, success, version, stages [{name, description}]");
+}
+
+void CheckViews(const StudyClip& clip, const fs::path& folder) {
+  if (!Json::parse(clip.views, nullptr, /*allow_exceptions=*/false).is_array())
+    throw Damaged(folder, fmt::format("the views of clip {} are none", clip.id), "JSON: [{name, x, y, width, height}]");
+}
+
 constexpr const char* kClipColumns =
     "SELECT id, wave, run, episode, task, initial_state, policy, checkpoint, world, is_real, source_sha256, use, "
     "reference, reference_reason, rubric_hash, views, file, video_sha256, frames FROM clips ";
@@ -44,7 +84,7 @@ std::string ClipQuery(const char* which) {
   return query;
 }
 
-StudyClip ClipOf(const sqlite::Statement& row) {
+StudyClip ClipOf(const sqlite::Statement& row, const fs::path& folder) {
   StudyClip clip;
   clip.id = row.Integer(0);
   clip.wave = static_cast<int>(row.Integer(1));
@@ -65,6 +105,7 @@ StudyClip ClipOf(const sqlite::Statement& row) {
   clip.file = row.Text(16);
   clip.video_sha256 = row.Text(17);
   clip.frames = static_cast<int>(row.Integer(18));
+  CheckViews(clip, folder);
   return clip;
 }
 
@@ -152,7 +193,7 @@ StudyInfo StudyStore::info() const {
   if (!row.Step()) throw InternalError("the study is damaged: it has no name");
   StudyInfo info;
   info.name = row.Text(0);
-  info.seed = std::stoull(row.Text(1));
+  info.seed = SeedIn(row.Text(1), folder());
   info.raters_per_clip = static_cast<int>(row.Integer(2));
   info.width_px = static_cast<int>(row.Integer(3));
   info.height_px = static_cast<int>(row.Integer(4));
@@ -218,20 +259,21 @@ int StudyStore::Waves() const { return static_cast<int>(Pragma(database_->connec
 std::vector<StudyClip> StudyStore::Clips() const {
   sqlite::Statement row = database_->connection.Query(ClipQuery("ORDER BY id").c_str());
   std::vector<StudyClip> clips;
-  while (row.Step()) clips.push_back(ClipOf(row));
+  while (row.Step()) clips.push_back(ClipOf(row, folder()));
   return clips;
 }
 
 StudyClip StudyStore::Clip(std::int64_t id) const {
   sqlite::Statement row = database_->connection.Query(ClipQuery("WHERE id = ?").c_str(), id);
   if (!row.Step()) throw InternalError("the study is damaged: there is no clip {}", id);
-  return ClipOf(row);
+  return ClipOf(row, folder());
 }
 
 std::vector<StudyRubric> StudyStore::Rubrics() const {
   sqlite::Statement row = database_->connection.Query("SELECT hash, task, document FROM rubrics ORDER BY task, hash");
   std::vector<StudyRubric> rubrics;
   while (row.Step()) rubrics.push_back({row.Text(0), row.Text(1), row.Text(2)});
+  for (const StudyRubric& rubric : rubrics) CheckRubric(rubric, folder());
   return rubrics;
 }
 

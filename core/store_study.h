@@ -121,7 +121,8 @@ struct StudyTable {
 };
 
 /// One rating study: STUDY/study.sqlite and the clips beside it (docs/formats/study.md). WAL, synchronous=FULL. One
-/// thread at a time; any number of processes may read.
+/// thread at a time; any number of processes may read. What is asked for and not as it is written (a seed, a rubric, a
+/// clip's views) is an InvalidInput that names the file.
 class StudyStore {
  public:
   enum class Mode { kReadOnly, kReadWrite };

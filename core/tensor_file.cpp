@@ -11,6 +11,7 @@
 #include <cerrno>
 #include <charconv>
 #include <cstring>
+#include <iterator>
 #include <utility>
 
 #include "core/tensor_file_header.h"
@@ -24,8 +25,25 @@ static_assert(std::endian::native == std::endian::little, "tensors are used as t
 constexpr std::size_t kLengthBytes = 8;
 constexpr std::size_t kMaxHeaderBytes = 100'000'000;
 
-TensorError SystemError(const fs::path& path, const char* doing) {
-  return TensorError(path.string() + ": cannot " + doing + ": " + std::strerror(errno));
+std::string SystemMessage(const fs::path& path, const char* doing) {
+  return path.string() + ": cannot " + doing + ": " + std::strerror(errno);
+}
+
+TensorError SystemError(const fs::path& path, const char* doing) { return TensorError(SystemMessage(path, doing)); }
+
+TensorWriteError WriteError(const fs::path& path, const char* doing) {
+  return TensorWriteError(SystemMessage(path, doing));
+}
+
+/// Whether somebody named a place where no file can be, rather than the machine failing.
+bool IsNoPlaceForAFile(int error) {
+  constexpr int kWrongPaths[] = {ENOENT, ENOTDIR, EISDIR, ENOTEMPTY, EEXIST, EACCES, EPERM, EROFS, ENAMETOOLONG, ELOOP};
+  return std::find(std::begin(kWrongPaths), std::end(kWrongPaths), error) != std::end(kWrongPaths);
+}
+
+[[noreturn]] void ThrowForPlace(const fs::path& path, const char* doing) {
+  if (IsNoPlaceForAFile(errno)) throw SystemError(path, doing);
+  throw WriteError(path, doing);
 }
 
 class Descriptor {
@@ -55,7 +73,7 @@ fs::path FolderOf(const fs::path& path) { return path.parent_path().empty() ? fs
 void SyncFolderOf(const fs::path& path) {
   const fs::path folder = FolderOf(path);
   const Descriptor file(::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));
-  if (file.get() < 0 || ::fsync(file.get()) != 0) throw SystemError(folder, "sync");
+  if (file.get() < 0 || ::fsync(file.get()) != 0) throw WriteError(folder, "sync");
 }
 
 /// What a file is called until it is whole; the number of the process follows.
@@ -193,7 +211,7 @@ TensorFileWriter::TensorFileWriter(const fs::path& path, std::span<const TensorD
   const std::string header = TensorHeaderText(tensors, metadata);
   if (header.size() > kMaxHeaderBytes) throw TensorError(path.string() + ": a header beyond 100 MB");
   file_ = ::open(partial_.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0644);
-  if (file_ < 0) throw SystemError(partial_, "write");
+  if (file_ < 0) ThrowForPlace(partial_, "write");
   const std::uint64_t length = header.size();
   try {
     Write(&length, sizeof length);
@@ -223,7 +241,7 @@ void TensorFileWriter::Write(const void* bytes, std::size_t count) {
   while (count > 0) {
     const ssize_t written = ::write(file_, at, std::min<std::size_t>(count, 1u << 30));
     if (written < 0 && errno == EINTR) continue;
-    if (written <= 0) throw SystemError(partial_, "write");
+    if (written <= 0) throw WriteError(partial_, "write");
     at += written;
     count -= static_cast<std::size_t>(written);
   }
@@ -231,9 +249,14 @@ void TensorFileWriter::Write(const void* bytes, std::size_t count) {
 
 void TensorFileWriter::Finish() {
   if (missing_ > 0) throw TensorError(path_.string() + ": " + std::to_string(missing_) + " declared bytes are missing");
-  if (::fsync(file_) != 0) throw SystemError(partial_, "sync");
+  if (::fsync(file_) != 0) throw WriteError(partial_, "sync");
   ::close(std::exchange(file_, -1));
-  if (::rename(partial_.c_str(), path_.c_str()) != 0) throw SystemError(path_, "rename to");
+  if (::rename(partial_.c_str(), path_.c_str()) != 0) {
+    const int why = errno;
+    ::unlink(partial_.c_str());
+    errno = why;
+    ThrowForPlace(path_, "rename to");
+  }
   SyncFolderOf(path_);
 }
 

@@ -16,10 +16,17 @@
 namespace evac {
 
 /// What is wrong with tensors or the file that holds them, in one sentence that names the file. The only exception of
-/// this header and of `worldmodel/nn`; `main` treats it like InvalidInput.
+/// this header and of `worldmodel/nn`; `main` treats it like InvalidInput, but for what the next one says.
 class TensorError : public std::runtime_error {
  public:
   using std::runtime_error::runtime_error;
+};
+
+/// The machine did not take what was written (a full disk): nobody's tensors are wrong. `main` treats it like
+/// InternalError.
+class TensorWriteError : public TensorError {
+ public:
+  using TensorError::TensorError;
 };
 
 enum class TensorType : std::uint8_t { kBool, kU8, kI8, kI16, kI32, kI64, kF16, kBF16, kF32, kF64 };
@@ -102,15 +109,18 @@ class TensorFile {
 /// What processes of this machine left of the same path when they were killed is removed.
 class TensorFileWriter {
  public:
+  /// @throws TensorError if there can be no such file (a folder that is missing or is none, no right to write there);
+  ///   TensorWriteError with the system's reason (disk full).
   TensorFileWriter(const std::filesystem::path& path, std::span<const TensorDeclaration> tensors,
                    const TensorMetadata& metadata);
   TensorFileWriter(const TensorFileWriter&) = delete;
   TensorFileWriter& operator=(const TensorFileWriter&) = delete;
   ~TensorFileWriter();
 
-  /// @throws TensorError with the system's reason (disk full).
+  /// @throws TensorError for more bytes than were declared; TensorWriteError with the system's reason (disk full).
   void Append(std::span<const std::byte> bytes);
-  /// Syncs and renames. @throws TensorError unless exactly the declared bytes were written.
+  /// Syncs and renames. @throws TensorError unless exactly the declared bytes were written, or if `path` is a folder;
+  ///   TensorWriteError as Append.
   void Finish();
 
  private:
@@ -121,7 +131,7 @@ class TensorFileWriter {
   std::size_t missing_ = 0;  ///< bytes still to come
 };
 
-/// All at once. The same tensors and metadata give the same bytes.
+/// All at once. The same tensors and metadata give the same bytes. @throws as TensorFileWriter.
 void WriteTensorFile(const std::filesystem::path& path, std::span<const TensorView> tensors,
                      const TensorMetadata& metadata);
 

@@ -72,12 +72,14 @@ using PrivilegedTrack = std::vector<PrivilegedFrame>;
 
 /// One way in which a task can begin. `seed` decides pose, colour, light and clutter.
 struct InitialState {
-  std::string id;  ///< "<suite seed>-<index, 4 digits>", e.g. "41-0007"; "recording" for a recorded start
+  /// "<suite seed>-<index, 4 digits>", e.g. "41-0007". Of recordings: "recording" of one alone, else the recording's
+  /// name or, in a collection, its row's initial state.
+  std::string id;
   std::uint64_t seed = 0;
 };
 
 /// The paper's stop rule: an episode has come to rest when, for `dwell_chunks` chunks in a row and not before
-/// `min_chunks`, neither the commanded chunk nor the observed gripper moves by more than any of these.
+/// `min_chunks`, both the commanded chunk and the observed gripper move by less than each of these: never, with a 0.
 struct StillRule {
   bool enabled = true;  ///< false while a recording is replayed
   double translation_m = 0.005;

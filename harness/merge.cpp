@@ -252,14 +252,6 @@ void RequireRoom(const fs::path& part, const fs::path& out, const std::vector<fs
                        "name for the merged run, or that one free", part.string(), out.string());
 }
 
-/// A lock holds the number of a process: what else is called so is somebody's, and locking would write over it.
-void RequireNoOthersFile(const fs::path& lock) {
-  if (!fs::exists(lock)) return;
-  const std::string text = fs::is_regular_file(lock) && fs::file_size(lock) <= 16 ? ReadFile(lock) : "other";
-  if (text.find_first_not_of("0123456789\n") != std::string::npos)
-    throw InvalidInput("{}: is no lock of a merge, wanted another name for the merged run, or that one free", lock.string());
-}
-
 /// All but the mark: who is killed meanwhile leaves it.
 void Empty(const fs::path& part) {
   for (const fs::directory_entry& left : fs::directory_iterator(part)) {
@@ -291,7 +283,6 @@ MergeSummary MergeRuns(const std::vector<fs::path>& shards, const fs::path& want
   const fs::path part = out.string() + ".tmp";
   const fs::path lock_file = out.string() + ".lock";
   RequireRoom(part, out, shards);
-  RequireNoOthersFile(lock_file);
   MakeFolders(out.parent_path());
   const RunLock lock(lock_file);
   MakeFolders(part / kMark);

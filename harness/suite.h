@@ -36,7 +36,7 @@ struct SuitePolicy {
 struct Transport {
   double deadline_s = 10;       ///< a policy that has not answered by then has failed the episode
   double repeat_after_s = 1;    ///< an unanswered request is sent again after this
-  double start_s = 30;          ///< how long a policy may take to declare itself
+  double start_s = 30;          ///< how long a policy may take to declare itself, and to begin an episode
   std::string images = "jpeg";  ///< jpeg or raw
 };
 

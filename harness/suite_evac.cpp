@@ -57,7 +57,7 @@ void ReadCache(const Config& page, SuiteEvac& evac) {
 
 std::string HashOf(const SuiteEvac& evac) {
   const std::string statistics = evac.statistics ? Config::FromFile(*evac.statistics).ContentHash() : "agibotworld";
-  return Sha256Hex(fmt::format("{} {} {} {} {} {} {} {} {} {} {} {}{}", Sha256HexOfFile(evac.weights),
+  return Sha256Hex(fmt::format("{} {} {} {} {} {} {} {} {} {} {} {}{}", evac.weights_sha256,
                                Config::FromFile(evac.config).ContentHash(), statistics, evac.solver, evac.steps,
                                evac.eta, evac.cfg, evac.cfg_rescale, evac.period_s, evac.pose_map_scales,
                                evac.all_threads_per_scene, fmt::join(evac.quirks, ","), evac.bf16 ? " bf16" : ""));
@@ -84,8 +84,20 @@ SuiteEvac ReadSuiteEvac(const Config& page) {
   evac.all_threads_per_scene = threads == "all";
   ReadQuirks(page, evac);
   ReadCache(page, evac);
+  evac.weights_sha256 = Sha256HexOfFile(evac.weights);
   evac.hash = HashOf(evac);
   return evac;
+}
+
+void DemandUnchanged(const SuiteEvac& evac) {
+  const auto demand = [](const std::string& file, const std::string& found, const std::string& wanted) {
+    if (found == wanted) return;
+    throw InvalidInput("{}: it is another file than when the suite was read: found SHA-256 {}, wanted {}", file, found,
+                       wanted);
+  };
+  demand(evac.weights.string(), Sha256HexOfFile(evac.weights), evac.weights_sha256);
+  const std::string statistics = evac.statistics ? " or " + evac.statistics->string() : "";
+  demand(evac.config.string() + statistics, HashOf(evac), evac.hash);
 }
 
 bool IsHashedByContent(const std::string& line) {

@@ -15,7 +15,8 @@ namespace evac {
 struct SuiteEvac {
   std::filesystem::path weights;                    ///< .safetensors or .pt
   std::filesystem::path config;                     ///< the page of the network's sizes
-  std::optional<std::filesystem::path> statistics;  ///< the robot's page; none: AgiBot World's
+  /// The robot's page; none: the weights' own, AgiBot World's if they hold none.
+  std::optional<std::filesystem::path> statistics;
   std::string solver = "ddim";                      ///< ddim or dpm
   int steps = 27;                                   ///< times the network is asked per chunk
   double eta = 1;                                   ///< of ddim
@@ -27,12 +28,18 @@ struct SuiteEvac {
   std::vector<std::string> quirks;                    ///< of the reference, by name (docs/evac_quirks.md)
   std::optional<std::filesystem::path> cache_folder;  ///< of imagined chunks
   double cache_limit_gb = 10;
+  std::string weights_sha256;  ///< of the file, when the page was read
   std::string hash;  ///< SHA-256 of everything above that decides a frame: files by content
 };
 
 /// @param page  an item of `worlds` with `type: evac`
 /// @throws InvalidInput naming file, line, field, what was found and what was wanted; also if a file is not there.
 SuiteEvac ReadSuiteEvac(const Config& page);
+
+/// Between the reading of a suite and a world's turn lie hours: what was loaded is to be what `hash` says. To be called
+/// after the files were read, so that what was written to meanwhile is noticed too.
+/// @throws InvalidInput naming the file and both hashes if the weights, the page or the statistics are others by now.
+void DemandUnchanged(const SuiteEvac& evac);
 
 /// Whether a line of the suite's canonical text is hashed by content (its files) or decides nothing (the cache).
 bool IsHashedByContent(const std::string& canonical_line);

@@ -106,7 +106,7 @@ int EncodeClip(const std::filesystem::path& source, const Task& task, const Clip
   return frames;
 }
 
-void PadClip(const std::filesystem::path& file, std::uintmax_t bytes) {
+void PadClip(const std::filesystem::path& file, std::uintmax_t bytes, const std::filesystem::path& padded) {
   constexpr std::uintmax_t kHeader = 8;
   std::string content = ReadFile(file);
   if (content.size() + kHeader > bytes)
@@ -115,7 +115,7 @@ void PadClip(const std::filesystem::path& file, std::uintmax_t bytes) {
   for (int shift = 24; shift >= 0; shift -= 8) content += static_cast<char>((box >> shift) & 0xFF);
   content += "free";
   content.resize(bytes, '\0');
-  WriteFileAtomically(file, content);
+  WriteFileAtomically(padded, content);
 }
 
 }  // namespace evac

@@ -49,8 +49,8 @@ struct ClipRoundTrip {
 int EncodeClip(const std::filesystem::path& source, const Task& task, const ClipLayout& layout,
                const ClipFormat& format, const ClipRoundTrip& round_trip, const std::filesystem::path& target);
 
-/// Makes a file `bytes` long with an mp4 box that players skip, so that its length tells nothing.
+/// Writes a file again as `padded`, `bytes` long with an mp4 box that players skip, so that its length tells nothing.
 /// @throws InternalError if it is longer already.
-void PadClip(const std::filesystem::path& file, std::uintmax_t bytes);
+void PadClip(const std::filesystem::path& file, std::uintmax_t bytes, const std::filesystem::path& padded);
 
 }  // namespace evac

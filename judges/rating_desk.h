@@ -28,7 +28,7 @@ struct DeskAnswer {
   std::string session = {};  ///< of Join: the secret that the browser keeps
 };
 
-/// The rules of a rating session (rating.md 1.2 to 1.5) over a study's store, without any network. Every call is one
+/// The rules of a rating session (docs/rating_session.md) over a study's store, without any network. Every call is one
 /// change that the caller commits before the answer leaves. Nothing it answers a rater tells policy, world or seed.
 class RatingDesk {
  public:

@@ -3,7 +3,7 @@
 #include "core/secret.h"
 #include "judges/rating_desk.h"
 
-/// What raters say, and take back (rating.md 1.4, 1.5).
+/// What raters say, and take back (docs/rating_session.md).
 namespace evac {
 
 using Json = nlohmann::ordered_json;

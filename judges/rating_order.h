@@ -7,7 +7,7 @@
 #include <vector>
 
 /// In which order one rater sees the clips: a function of the study's seed, the rater and the votes so far, nothing
-/// else (rating.md 1.2).
+/// else (docs/rating_session.md).
 namespace evac {
 
 struct OrderedClip {

@@ -53,6 +53,14 @@ HttpAnswer Refused(int status, const char* error, const std::string& message) {
   return Said({status, {{"error", error}, {"message", message}}});
 }
 
+/// @throws InvalidInput if the study is damaged: before raters are let in
+std::string IdOfWhole(const std::filesystem::path& folder) {
+  const StudyStore study = StudyStore::Open(folder, StudyStore::Mode::kReadWrite);
+  study.Rubrics();
+  study.Clips();
+  return study.Id();
+}
+
 HttpAnswer Page(const std::string& type, std::string text) { return {200, type, std::move(text)}; }
 
 }  // namespace
@@ -63,7 +71,7 @@ struct RatingServer::Impl {
   explicit Impl(RatingServerOptions given)
       : options(std::move(given)),
         lock(options.study / "lock"),
-        study_id(StudyStore::Open(options.study, StudyStore::Mode::kReadWrite).Id()),
+        study_id(IdOfWhole(options.study)),
         writer(StudyStore::Open(options.study, StudyStore::Mode::kReadWrite), true),
         player(StudyStore::Open(options.study, StudyStore::Mode::kReadOnly), false),
         reader(StudyStore::Open(options.study, StudyStore::Mode::kReadOnly), false),

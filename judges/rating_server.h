@@ -24,7 +24,8 @@ struct RatingServerOptions {
 /// a reverse proxy does that (docs/rating_session.md).
 class RatingServer {
  public:
-  /// Listens from here on. @throws InvalidInput if there is no study, another server has it, or the address is taken.
+  /// Listens from here on. @throws InvalidInput if there is no study, it is damaged,
+  /// another server has it, or the address is taken.
   explicit RatingServer(RatingServerOptions options);
   ~RatingServer();
   RatingServer(const RatingServer&) = delete;

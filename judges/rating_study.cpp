@@ -13,6 +13,8 @@
 #include "core/secret.h"
 #include "core/seed.h"
 #include "core/store.h"
+#include "core/store_lock.h"
+#include "core/video.h"
 #include "judges/rating_clip.h"
 
 namespace evac {
@@ -30,6 +32,7 @@ struct Candidate {
 };
 
 constexpr int kLowest_px = 64;  // of a first view in which something can be seen
+constexpr const char* kSecret = "secret";  // in clips/ until its wave is in the study
 
 void Check(const StudyOptions& options) {
   if (options.runs.empty()) throw InvalidInput("--run: wanted the folder of a run");
@@ -188,18 +191,51 @@ void LayOut(std::vector<Candidate>& candidates, const StudyInfo& info, const fs:
   }
 }
 
-Encoded EncodeAll(std::vector<Candidate>& candidates, const StudyInfo& info, const ClipRoundTrip& round_trip,
+/// From which the names of a wave's clips follow: a call that was broken off goes on, and nobody guesses a name.
+std::string SecretIn(const fs::path& clips) {
+  std::string secret = fs::exists(clips / kSecret) ? ReadFile(clips / kSecret) : "";
+  if (IsSecret(secret)) return secret;
+  secret = NewSecret();
+  WriteFileAtomically(clips / kSecret, secret);
+  return secret;
+}
+
+/// Of whose clip it is and of all that decides how it is encoded.
+std::string NameOf(const Candidate& candidate, const StudyInfo& info, const ClipRoundTrip& round_trip,
+                   const std::string& evac_version, const std::string& secret) {
+  const StudyClip& clip = candidate.clip;
+  std::string text = fmt::format("{}\n{}\n{}\n{}\n{}\n{}\n{}x{} {:a} {:a}\n", secret, clip.run, clip.episode,
+                                 clip.source_sha256, round_trip.codec_sha256, evac_version, info.width_px,
+                                 info.height_px, info.period_s, candidate.task.period_s);
+  text += ViewsJson(candidate.layout, info.width_px, info.height_px);
+  for (const Camera& camera : candidate.task.cameras) text += fmt::format("\n{}x{}", camera.width_px, camera.height_px);
+  return Sha256Hex(text).substr(0, secret.size());
+}
+
+/// A clip before it is padded: there if it was encoded, until its wave is in the study.
+fs::path BareOf(const fs::path& clip) { return fs::path(clip).replace_extension(".bare.mp4"); }
+
+/// @returns the number of frames
+int EncodeOnce(const Candidate& candidate, const ClipFormat& format, const ClipRoundTrip& round_trip,
+               const fs::path& bare) {
+  const int there = fs::exists(bare) ? VideoReader(bare).frames() : 0;
+  return there > 0 ? there : EncodeClip(candidate.video, candidate.task, candidate.layout, format, round_trip, bare);
+}
+
+Encoded EncodeAll(std::vector<Candidate>& candidates, const StudyInfo& info, const StudyOptions& options,
                   const fs::path& folder, const std::function<void(std::size_t, std::size_t)>& progress) {
   MakeFolders(folder / "clips");
+  const std::string secret = SecretIn(folder / "clips");
   Encoded encoded;
   const ClipFormat format{info.width_px, info.height_px, info.period_s};
   for (Candidate& candidate : candidates) {
+    const ClipRoundTrip round_trip = candidate.is_imagined ? ClipRoundTrip{} : options.round_trip;
     StudyClip clip = candidate.clip;
-    clip.file = "clips/" + NewSecret() + ".mp4";
+    clip.file = "clips/" + NameOf(candidate, info, round_trip, options.evac_version, secret) + ".mp4";
     clip.views = ViewsJson(candidate.layout, info.width_px, info.height_px);
-    clip.frames = EncodeClip(candidate.video, candidate.task, candidate.layout, format,
-                             candidate.is_imagined ? ClipRoundTrip{} : round_trip, folder / clip.file);
-    encoded.longest = std::max(encoded.longest, fs::file_size(folder / clip.file));
+    const fs::path bare = BareOf(folder / clip.file);
+    clip.frames = EncodeOnce(candidate, format, round_trip, bare);
+    encoded.longest = std::max(encoded.longest, fs::file_size(bare));
     encoded.clips.push_back(std::move(clip));
     progress(encoded.clips.size(), candidates.size());
   }
@@ -239,10 +275,33 @@ void CheckSameRoundTrip(const StudyStore& store, const ClipRoundTrip& round_trip
                      folder.string(), named(store.Codec()), named(round_trip.codec_sha256));
 }
 
+/// @throws InvalidInput for an episode that is another by now: votes on the clip would be taken for votes on it
 void LeaveOutWhatIsThere(std::vector<Candidate>& candidates, const StudyStore& store) {
-  std::set<std::string> there;
-  for (const StudyClip& clip : store.Clips()) there.insert(clip.run + "\n" + clip.episode);
-  std::erase_if(candidates, [&](const Candidate& c) { return there.contains(c.clip.run + "\n" + c.clip.episode); });
+  std::map<std::string, std::string> there;
+  for (const StudyClip& clip : store.Clips()) there[clip.run + "\n" + clip.episode] = clip.source_sha256;
+  std::erase_if(candidates, [&](const Candidate& c) {
+    const auto known = there.find(c.clip.run + "\n" + c.clip.episode);
+    if (known == there.end() || known->second == c.clip.source_sha256) return known != there.end();
+    throw InvalidInput("{}: the video of episode {} is another than the study {} has its clip of: SHA-256 {}, there "
+                       "{}; wanted the run as it was, or another study",
+                       c.clip.run, c.clip.episode, store.folder().string(), c.clip.source_sha256, known->second);
+  });
+}
+
+/// Clips that no row names, of calls that were broken off or not yet padded, and what their names followed from.
+void RemoveWhatNoRowNames(const StudyStore& store) {
+  std::set<std::string> named;
+  for (const StudyClip& clip : store.Clips()) named.insert(fs::path(clip.file).filename().string());
+  const fs::path clips = store.folder() / "clips";
+  std::vector<fs::path> left;
+  if (!fs::is_directory(clips)) return;
+  for (const fs::directory_entry& entry : fs::directory_iterator(clips)) {
+    const std::string name = entry.path().filename().string();
+    const bool is_clip = IsSecret(name.substr(0, name.find('.'))) && name.find(".mp4") != std::string::npos;
+    if (name == kSecret || (is_clip && !named.contains(name))) left.push_back(entry.path());
+  }
+  std::error_code next_time;
+  for (const fs::path& file : left) fs::remove(file, next_time);
 }
 
 std::vector<StudyRubric> RubricsOf(const std::vector<Candidate>& candidates) {
@@ -277,23 +336,28 @@ StudyMade MakeStudy(const fs::path& folder, const StudyOptions& options,
   LeaveOutWhatIsNotDrawn(candidates, options);
   if (!options.gold_from.empty()) ChooseKnown(candidates, options);
 
+  MakeFolders(folder);
+  const RunLock lock(folder / "new.lock");  // the server's is another: waves may come while people rate
   const bool is_new = !StudyStore::IsIn(folder);
   std::optional<StudyStore> store;
   if (!is_new) {
     store = StudyStore::Open(folder, StudyStore::Mode::kReadWrite);
     CheckSameHeight(store->info(), options, folder);
     LeaveOutWhatIsThere(candidates, *store);
-    if (candidates.empty()) throw InvalidInput("{}: every clip of these runs is in it already", folder.string());
+    if (candidates.empty()) {
+      RemoveWhatNoRowNames(*store);
+      throw InvalidInput("{}: every clip of these runs is in it already", folder.string());
+    }
     CheckSameRoundTrip(*store, options.round_trip, folder);
   }
   const StudyInfo info = is_new ? InfoFor(candidates, options, folder) : store->info();
   LayOut(candidates, info, folder);
-  Encoded encoded = EncodeAll(candidates, info, options.round_trip, folder, progress);
+  Encoded encoded = EncodeAll(candidates, info, options, folder, progress);
   constexpr std::uintmax_t kRound = 1 << 16;  // of one wave all are of one length, of several nearly
   const std::uintmax_t bytes = (encoded.longest + 8 + kRound - 1) / kRound * kRound;
   StudyMade made;
   for (StudyClip& clip : encoded.clips) {
-    PadClip(folder / clip.file, bytes);
+    PadClip(BareOf(folder / clip.file), bytes, folder / clip.file);
     clip.video_sha256 = Sha256HexOfFile(folder / clip.file);
     ++(clip.use == Showing::kGold       ? made.gold
        : clip.use == Showing::kPractice ? made.practice
@@ -302,6 +366,7 @@ StudyMade MakeStudy(const fs::path& folder, const StudyOptions& options,
   }
   if (is_new) store = StudyStore::Create(folder, info);
   made.list_hash = store->AddWave(encoded.clips, RubricsOf(candidates), options.round_trip.codec_sha256);
+  RemoveWhatNoRowNames(*store);
   made.left_out = collector.left_out;
   return made;
 }

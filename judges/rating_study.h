@@ -41,11 +41,13 @@ struct StudyMade {
 
 /// Freezes the episodes of runs that have a video into a study: encodes every clip anew (rating_clip.h), gives it a
 /// name that says nothing, and writes the list. A study that is there gets another wave with what it does not hold yet,
-/// as high as the first; views of a task that would be wider than its clips are made smaller.
+/// as high as the first; views of a task that would be wider than its clips are made smaller. A call that is broken off
+/// leaves no wave; the next one encodes what that one had not come to, and leaves in clips/ what the study names alone.
 /// @param progress  called after every clip with how many are done, of how many.
 /// @throws InvalidInput if a run is not there, no episode has a video, an option is out of range, or earlier waves were
 /// put through another codec, or through none, or are of another height than is asked for; or if a task's views do not
-/// fit into the study's clips even 64 px high.
+/// fit into the study's clips even 64 px high; or if an episode whose clip is in the study has another video by now, or
+/// another process makes a wave of it.
 StudyMade MakeStudy(const std::filesystem::path& folder, const StudyOptions& options,
                     const std::function<void(std::size_t, std::size_t)>& progress);
 

@@ -10,7 +10,7 @@
 #include "core/store_study.h"
 
 /// What a rater's browser sends: bodies, ids and ranges. Any bytes may come; what is returned keeps to the ranges of
-/// rating.md 1.4, or there is a sentence saying what is wrong.
+/// docs/formats/study.md, or there is a sentence saying what is wrong.
 namespace evac {
 
 /// A value, or what is wrong with the text: "label: found 'yes', wanted success, failure or cannot_tell".

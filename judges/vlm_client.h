@@ -42,7 +42,7 @@ struct VlmSaid {
   int attempts = 0;
 };
 
-/// Asks an OpenAI-compatible server, as vlm_judge.md 2.3 has it:
+/// Asks an OpenAI-compatible server (docs/vlm_judge.md):
 ///   429, 503               again after Retry-After (0 … 120 s), else after a random wait up to 1, 2, 4 … 30 s; six
 ///                          tries. Whoever else asks waits as well.
 ///   5xx, a broken answer   the same without Retry-After. After ten in a row: one pause of 60 s, then over.

@@ -21,7 +21,7 @@ struct VlmSampling {
   int max_tokens = 1200;
 };
 
-/// The body of POST …/chat/completions (vlm_judge.md 2.2): rubric, frames with their times, the schema of the answer.
+/// The body of POST …/chat/completions (docs/vlm_judge.md): rubric, frames with their times, the schema of the answer.
 /// Never says which policy or world it was. The task's instruction is quoted as data: an order in it is not followed.
 nlohmann::json VlmRequest(const Task& task, const std::vector<VlmFrame>& frames, VlmWording wording,
                           const VlmSampling& sampling);

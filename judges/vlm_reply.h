@@ -10,7 +10,7 @@
 namespace evac {
 
 /// What one request to a vision-language model came to. Only the first two are verdicts that a rate counts; none of the
-/// others is ever a failure (vlm_judge.md 2.3).
+/// others is ever a failure (docs/vlm_judge.md).
 enum class VlmOutcome {
   kSuccess,
   kFailure,

@@ -8,7 +8,8 @@
 #include "core/types.h"
 #include "worldmodel/action_statistics.h"
 
-/// Absolute gripper poses as the network reads them: as differences from frame to frame (spec 1.2, 1.3).
+/// Absolute gripper poses as the network reads them: as differences from frame to frame (EVAC, Sec. 3.2; numbers as the
+/// reference: docs/evac_quirks.md).
 namespace evac {
 
 enum class Side { kLeft, kRight };

@@ -15,10 +15,10 @@ struct ActionStatistics {
   std::array<double, 12> mean{}, deviation{};
 };
 
-/// What the released model was trained with (spec 1.3).
+/// What the released model was trained with: the reference's numbers (docs/evac_quirks.md).
 ActionStatistics AgiBotWorldStatistics();
 
-/// A page with `robot`, `mean` and `deviation`: one per robot, in configs/robots.
+/// A page with `robot`, `mean` and `deviation`: one per robot, in apps/configs/robots.
 /// @throws InvalidInput naming file and field: not 12 numbers, not finite, a deviation that is not positive.
 ActionStatistics ReadActionStatistics(const std::filesystem::path& path);
 /// The same of a text that stands elsewhere. @param name  stands for the file in messages

@@ -17,7 +17,8 @@ struct Crop {
   int x_px = 0, y_px = 0, width_px = 0, height_px = 0;
 };
 
-/// Anywhere in the picture, at least seven eighths of either side less what lies before it (spec 9.2).
+/// Anywhere in the picture, at least seven eighths of either side less what lies before it: as the reference
+/// (docs/evac_quirks.md) crops what it trains on.
 Crop RandomCrop(const cv::Size& picture_px, SplitMix64& random);
 
 /// The camera whose picture is that part of `camera`'s, resized.

@@ -12,7 +12,7 @@
 #include "worldmodel/pose_map.h"
 #include "worldmodel/ray_map.h"
 
-/// What the network is told of one chunk (EVAC, Sec. 3.2; spec 2 to 4), in plain numbers: no tensors, nothing encoded.
+/// What the network is told of one chunk (EVAC, Sec. 3.2), in plain numbers: no tensors, nothing encoded.
 namespace evac {
 
 /// [frames][V]: RGB, the network's picture size unless said otherwise.

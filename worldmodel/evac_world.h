@@ -10,7 +10,7 @@
 
 namespace evac {
 
-/// The first frame of an initial state in the real world. @throws Error if nobody has seen it.
+/// The first frame of an initial state in the real world, or of its recording. @throws Error if nobody has seen it.
 using FirstScene = std::function<InitialScene(const Task& task, const InitialState& initial)>;
 
 /// @param who  for the message: "world evac".
@@ -28,8 +28,8 @@ struct EvacWorldOptions {
 
 /// The paper's world: a network imagines what the cameras would see (EVAC, Sec. 3). Read Advance first.
 ///
-/// Every episode starts from the real run's first frame. Nobody measures the imagined arms: observed arms are the last
-/// commanded ones and say so. There is no physics, so no privileged track.
+/// Every episode starts from the first frame of the real run, or of a recording. Nobody measures the imagined arms:
+/// observed arms are the last commanded ones and say so. There is no physics, so no privileged track.
 /// A chunk may have any length: it is imagined in pieces of the network's K frames; a shorter last piece is filled up
 /// as if the arms rested at its end, and what is imagined beyond the last target is neither decoded nor remembered.
 /// What a scene answers is a function of the network, the first frame, Reset's seed and the chunks, whatever shares the

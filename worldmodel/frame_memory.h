@@ -7,7 +7,7 @@
 namespace evac {
 
 /// Which of the frames so far the network sees again: the first, others evenly spaced, and the newest (EVAC's sparse
-/// memory, spec 4.6).
+/// memory, as the reference picks it: docs/evac_quirks.md).
 /// @param frames  how many there are, at least 1
 /// @param memory  N: how many it sees, at least 1
 /// @returns `memory` indices, newest last; for fewer frames than that some are repeated

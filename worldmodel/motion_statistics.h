@@ -15,7 +15,7 @@ class MotionSums {
  public:
   void Add(const std::vector<Arms>& track);
 
-  /// Mean and deviation per frame of 30 Hz, as the network's deltas are normalised (spec 1.3): a step's mean and
+  /// Mean and deviation per frame of 30 Hz, as the network's deltas are normalised (action_delta.h): a step's mean and
   /// deviation, divided by `delta_frames`. An arm that never moves has mean 0 and deviation 1; no deviation is below
   /// 10 micrometres or .0001 rad a frame.
   /// @param delta_frames  frames of 30 Hz that one step spans

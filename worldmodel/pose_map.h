@@ -9,7 +9,7 @@
 #include "worldmodel/action_delta.h"
 #include "worldmodel/nn/model_config.h"
 
-/// The grippers' poses drawn into a view, as the network was trained to read them (EVAC, Sec. 3.2; spec 2).
+/// The grippers' poses drawn into a view, as the network was trained to read them (EVAC, Sec. 3.2).
 namespace evac {
 
 /// A gripper as it is drawn: turned 30 degrees about its tool axis, the left clockwise. In float, as in training.

@@ -5,7 +5,7 @@
 
 namespace evac {
 
-/// The camera as the network reads it: for each latent pixel the ray through its centre (EVAC, Sec. 3.2; spec 3).
+/// The camera as the network reads it: for each latent pixel the ray through its centre (EVAC, Sec. 3.2).
 struct RayMap {
   int height = 0, width = 0;        ///< latent pixels
   std::vector<float> direction;     ///< [3, height, width]: unit length, base frame

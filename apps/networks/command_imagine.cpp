@@ -3,6 +3,7 @@
 #include "apps/commands.h"
 #include "apps/network_parts.h"
 #include "apps/networks/imagine.h"
+#include "apps/number_range.h"
 
 namespace evac {
 namespace {
@@ -50,13 +51,13 @@ void AddModel(CLI::App& command, ImagineArguments& arguments) {
       .add_option("--steps", sampler.steps, "times the network is asked per chunk; default: 27 with ddim, 10 with dpm")
       ->check(CLI::Range(1, 1000));
   command.add_option("--eta", sampler.eta, "of ddim: 0 deterministic … 1")
-      ->check(CLI::Range(0.0, 1.0))
+      ->check(Within(0.0, 1.0))
       ->capture_default_str();
   command.add_option("--cfg", sampler.cfg, "guidance; 1: none, in half the time")
-      ->check(CLI::Range(0.0, 100.0))
+      ->check(Within(0.0, 100.0))
       ->capture_default_str();
   command.add_option("--cfg-rescale", sampler.cfg_rescale, "how far guidance is pulled back to its spread")
-      ->check(CLI::Range(0.0, 1.0))
+      ->check(Within(0.0, 1.0))
       ->capture_default_str();
   command.add_option("--seed", sampler.seed, "of all noise")->capture_default_str();
   command.add_option("--dtype", sampler.dtype, "of the weights in memory: f32, bf16, f16")

@@ -12,6 +12,7 @@
 #include "apps/networks/run_training.h"
 #include "apps/networks/train_judge.h"
 #include "apps/networks/train_policy.h"
+#include "apps/number_range.h"
 #include "worldmodel/nn/memory.h"
 
 /// evac train judge, evac train policy: the small networks beside the world model.
@@ -47,6 +48,14 @@ struct ShardJudgeData {
   JudgeData data;
 };
 
+/// Its judge would be replaced, and be back uncalibrated when the training goes on.
+void RefuseFolderOfATraining(const std::filesystem::path& out) {
+  if (std::filesystem::exists(out / "training.safetensors"))
+    throw InvalidInput(
+        "--out: {} holds a training, whose judge would be replaced: wanted another folder with --calibrate-only",
+        out.string());
+}
+
 ExitCode CalibrateOnly(const TrainArguments& arguments) {
   JudgeTrainingOptions options;
   ReadTrainingPage(arguments.training, "judge", arguments.settings, SettingsOf(options));
@@ -54,6 +63,7 @@ ExitCode CalibrateOnly(const TrainArguments& arguments) {
   const train::JobPlace place = PlaceOf(arguments, progress);
   CheckHoldouts(place.shards);
   const RunLock lock = HoldFolder(arguments.out);
+  RefuseFolderOfATraining(arguments.out);
   nn::KeepFreedMemory();
   CalibrateJudge(place, options, ShardJudgeData(arguments, place).data);
   fmt::print("{}: calibrated anew\n", (place.out / "judge.safetensors").string());
@@ -112,7 +122,8 @@ void AddTrainJudge(CLI::App& group, ExitCode& exit_code) {
   command
       ->add_flag("--calibrate-only", arguments->calibrate_only,
                  "nothing is learned: temperature and threshold of --init are chosen anew on these shards")
-      ->needs(init);
+      ->needs(init)
+      ->excludes("--steps", "--minutes");
   command->footer(
       "Example:\n"
       "  evac train judge out/shards --training apps/configs/desk_training.yaml --config apps/configs/desk_model.yaml "
@@ -133,7 +144,7 @@ void AddJudgeTrain(CLI::App& judge, ExitCode& exit_code) {
       ->capture_default_str();
   command->add_option("--worlds", runs.worlds, "clips of these worlds alone, with commas between them")->delimiter(',');
   command->add_option("--holdout", runs.holdout, "share of initial states that are kept apart to measure with")
-      ->check(CLI::Range(0.05, 0.9))
+      ->check(Within(0.05, 0.9))
       ->capture_default_str();
   command->add_option("--least", runs.least, "labels of each kind that a task must have")
       ->check(CLI::Range(1, 1000000))

@@ -158,7 +158,9 @@ std::unique_ptr<World> MakeEvacWorld(const SuiteWorld& world, const Suite& suite
   const ImaginerOptions options =
       OptionsOf(evac, config, evac.all_threads_per_scene ? threads : 1);
   nn::KeepFreedMemory();
-  return std::make_unique<EvacWorld>(Imaginer(Load(evac, config), options), FirstSceneOf(suite, store, world.name),
+  auto model = Load(evac, config);
+  DemandUnchanged(evac);  // what is stored and cached bears the suite's hash
+  return std::make_unique<EvacWorld>(Imaginer(std::move(model), options), FirstSceneOf(suite, store, world.name),
                                      EvacWorldOptions{world.name, threads, evac.all_threads_per_scene});
 }
 

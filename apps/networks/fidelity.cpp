@@ -27,6 +27,24 @@ bool Asks(const FidelityArguments& arguments, const char* part) {
   return std::find(arguments.parts.begin(), arguments.parts.end(), part) != arguments.parts.end();
 }
 
+/// They would be passed over in silence.
+void RefuseOptionsOfOtherParts(const FidelityArguments& given) {
+  const FidelityArguments none;
+  struct PartOption {
+    const char *option, *part;
+    bool is_given;
+  };
+  const PartOption options[] = {
+      {"--counterfactual-states", "counterfactual", given.counterfactual_states != none.counterfactual_states},
+      {"--horizon-states", "horizon", given.horizon_states != none.horizon_states},
+      {"--horizon-chunks", "horizon", given.horizon_chunks != none.horizon_chunks}};
+  for (const auto& [option, part, is_given] : options) {
+    if (is_given && !Asks(given, part))
+      throw InvalidInput("{}: is of part {}, which --parts leaves out: wanted that part too, or no {}", option, part,
+                         option);
+  }
+}
+
 /// One call's work: what it was asked, and what it has measured so far.
 class Measuring {
  public:
@@ -260,6 +278,7 @@ ExitCode RunFidelity(const FidelityArguments& arguments) {
     static const std::set<std::string> kParts = {"closed", "open", "executed", "counterfactual", "horizon"};
     if (!kParts.contains(part)) throw InvalidInput("--parts: found '{}', wanted some of closed, open, executed, counterfactual, horizon", part);
   }
+  RefuseOptionsOfOtherParts(arguments);
   const CatchInterrupts catch_interrupts;
   const Suite suite = ReadSuite(arguments.suite, arguments.assignments);
   if (suite.recording) return RunRecordedFidelity(arguments, suite);

@@ -30,11 +30,14 @@ struct FidelityArguments {
   int horizon_states = 3;          ///< long rollouts per task
   int horizon_chunks = 30;         ///< of the network's K frames
 };
+/// @throws InvalidInput naming a part that is none, an option of a part that is not asked for, or what the suite lacks.
 ExitCode RunFidelity(const FidelityArguments& arguments);
 
-/// Of a suite with a `recording`: the actions of every recording of that folder, replayed in the suite's world model and
-/// held against the recorded pictures. Nobody knows how they ended, so only pictures are compared.
-/// @throws InvalidInput naming an option that means nothing there.
+/// Of a suite with a `recording`: the actions of every recording of that folder (of the first `initial_states.count`,
+/// each of at most `max_chunks` chunks, where the suite says so), replayed in the suite's world model and held against
+/// the recorded pictures. Nobody knows how they ended, so only pictures are compared.
+/// @throws InvalidInput naming an option, or a field of the suite, that means nothing there; or a count of more
+///   recordings than can be replayed.
 ExitCode RunRecordedFidelity(const FidelityArguments& arguments, const Suite& suite);
 
 /// The three worlds of a fidelity suite.

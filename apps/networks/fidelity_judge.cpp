@@ -21,6 +21,7 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr double kCovered = 0.15;  ///< share of a pixel that shows the object, from which it is painted over
+constexpr const char* kPainted = "clip.mp4";
 
 cv::Mat WithoutObject(const cv::Mat& frame, const ColourModel& colour) {
   cv::Mat mask = Cover(frame, colour) > kCovered;
@@ -49,7 +50,7 @@ class MaskedClassifier : public Judge {
   /// @param run      the folder of the clips
   /// @param scratch  a folder for one painted clip
   MaskedClassifier(const std::string& weights, fs::path run, const fs::path& scratch)
-      : judge_(weights, scratch), run_(std::move(run)), painted_(scratch / "clip.mp4") {}
+      : judge_(weights, scratch), run_(std::move(run)), painted_(scratch / kPainted) {}
 
   std::string Name() const override { return judge_.Name() + ":masked"; }
 
@@ -66,6 +67,14 @@ class MaskedClassifier : public Judge {
   ClassifierJudge judge_;
   fs::path run_, painted_;
 };
+
+/// The painted clip, what a killed process left of one, and their folder if nothing of somebody's is in it.
+void RemovePainted(const fs::path& scratch) {
+  std::error_code left;
+  fs::remove(scratch / kPainted, left);
+  fs::remove(scratch / (std::string(kPainted) + ".tmp"), left);
+  if (!fs::is_symlink(scratch)) fs::remove(scratch, left);
+}
 
 std::optional<bool> OutcomeOf(Label label) {
   if (label == Label::kSuccess) return true;
@@ -107,7 +116,7 @@ JudgeQualityOnReal FidelityJudge::QualityOn(Store& store, const std::string& wor
     return is_told(episode) && HasKnowledgeOf(episode.key.pair.task);
   };
   JudgeWithProgress(masked_judge, store, {.wanted = can_be_painted});
-  fs::remove_all(scratch);
+  RemovePainted(scratch);
 
   std::vector<double> probabilities;
   std::vector<int> truths;

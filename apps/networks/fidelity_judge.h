@@ -28,7 +28,7 @@ class FidelityJudge {
 
   /// Against the oracle on the clips of a world; and once more with the object painted over, of which the verdicts are
   /// stored too ("NAME:masked"), so that no clip is painted twice.
-  /// @param scratch  a folder for painted clips
+  /// @param scratch  a folder for painted clips; they go again, and what else is in it stays
   JudgeQualityOnReal QualityOn(Store& store, const std::string& world, const std::filesystem::path& scratch);
 
  private:

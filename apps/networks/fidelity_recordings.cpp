@@ -30,7 +30,7 @@ const SuiteWorld& ModelOf(const Suite& suite) {
 }
 
 /// Pictures are compared, of replays: what asks about outcomes or for another part would be passed over in silence.
-void RefuseWhatMeansNothing(const FidelityArguments& given) {
+void RefuseOptionsThatMeanNothing(const FidelityArguments& given) {
   const FidelityArguments none;
   const std::vector<std::string> replays = {"open"};
   const std::pair<const char*, bool> options[] = {
@@ -47,14 +47,34 @@ void RefuseWhatMeansNothing(const FidelityArguments& given) {
   }
 }
 
+/// So would what says when a policy's episode ends, or which of them a world has.
+void RefuseFieldsThatMeanNothing(const Suite& suite) {
+  const std::vector<std::uint64_t> one_seed = {1};
+  std::vector<std::pair<std::string, bool>> fields = {
+      {"still", suite.recorded_task.still.has_value()},
+      {"workspace_m", suite.recorded_task.workspace_m.has_value()},
+      {"seeds", !suite.seeds.empty() && suite.seeds != one_seed}};
+  for (const SuiteWorld& world : suite.worlds)
+    fields.push_back({"initial_states of world " + world.name, world.initial_states > 0});
+  for (const auto& [field, is_given] : fields) {
+    if (is_given)
+      throw InvalidInput(
+          "{}: field {}: means nothing for `evac fidelity` of recordings: each is replayed once, in the model and "
+          "beside its own pictures, to its last action or to max_chunks; leave it out",
+          suite.path.string(), field);
+  }
+}
+
 /// Which arms are its actions: those that the network learned from, where its weights say so.
 ArmsKind ArmsReadBy(const TrainedFor& trained) {
   if (trained.arms_read == "told") return ArmsKind::kTold;
   return trained.arms_read == "measured" ? ArmsKind::kMeasured : ArmsKind::kAuto;
 }
 
-/// Those that can be read as the network was trained; of the others, how many and why is said.
-std::vector<Recording> ReadAll(const fs::path& folder, const SuiteWorld& model, const nn::ModelConfig& config) {
+/// Those that can be read as the network was trained, the first `suite.recorded_states` of them where the suite says so;
+/// of the others that were looked at, how many and why is said.
+std::vector<Recording> ReadAll(const Suite& suite, const SuiteWorld& model, const nn::ModelConfig& config) {
+  const fs::path& folder = *suite.recording;
   const std::vector<fs::path> folders = FindRecordings(folder);
   const TrainedFor trained = TrainedFor::Read(model.evac->weights);
   SourceOptions how{.period_s = model.evac->period_s,
@@ -66,6 +86,7 @@ std::vector<Recording> ReadAll(const fs::path& folder, const SuiteWorld& model, 
   std::vector<Recording> recordings;
   std::vector<LeftOut> left_out;
   for (const fs::path& one : folders) {
+    if (suite.recorded_states > 0 && std::ssize(recordings) == suite.recorded_states) break;
     Looked looked = LookAt(one, how);
     if (!looked.source) {
       left_out.push_back(std::move(looked.left_out));
@@ -83,13 +104,21 @@ std::vector<Recording> ReadAll(const fs::path& folder, const SuiteWorld& model, 
     fmt::print(stderr, "evac: warning: {}\n", left_out[i].sentence);
   if (!left_out.empty()) fmt::print(stderr, "evac: warning: {}\n", CountByKind(left_out));
   if (recordings.empty()) throw InvalidInput("{}: none of {} recordings can be replayed", folder.string(), folders.size());
+  if (std::ssize(recordings) < suite.recorded_states)
+    throw InvalidInput(
+        "{}: field initial_states.count: found {}, wanted at most {}: so many recordings of {} can be replayed",
+        suite.path.string(), suite.recorded_states, recordings.size(), folder.string());
   return recordings;
 }
 
-/// Where the arms were told to be where that is recorded, else where they were.
-std::vector<Arms> ActionsOf(const Recording& recording) {
+/// Where the arms were told to be where that is recorded, else where they were; to the suite's limit.
+std::vector<Arms> ActionsOf(const Recording& recording, const Suite& suite) {
   const std::vector<Arms> track = ToldTrack(recording);
-  return {track.begin() + 1, track.end()};
+  std::vector<Arms> actions = {track.begin() + 1, track.end()};
+  const auto chunks = static_cast<std::size_t>(suite.recorded_task.max_chunks);  // 0: all of them
+  const std::size_t most = chunks * static_cast<std::size_t>(suite.chunk_size);
+  if (most > 0 && actions.size() > most) actions.resize(most);
+  return actions;
 }
 
 /// The suite as if its recordings were tasks of a world: imagined episodes start from what that world stored.
@@ -110,10 +139,11 @@ Suite WithTasks(const Suite& suite, const std::vector<Recording>& recordings) {
 }  // namespace
 
 ExitCode RunRecordedFidelity(const FidelityArguments& arguments, const Suite& given) {
-  RefuseWhatMeansNothing(arguments);
+  RefuseOptionsThatMeanNothing(arguments);
+  RefuseFieldsThatMeanNothing(given);
   const SuiteWorld& model = ModelOf(given);
   const nn::ModelConfig config = ReadEvacConfig(model.evac->config);
-  const std::vector<Recording> recordings = ReadAll(*given.recording, model, config);
+  const std::vector<Recording> recordings = ReadAll(given, model, config);
   const Suite suite = WithTasks(given, recordings);
   SuiteWorld recorded;
   recorded.name = "recorded";
@@ -122,7 +152,7 @@ ExitCode RunRecordedFidelity(const FidelityArguments& arguments, const Suite& gi
   std::vector<Replay> replays;
   for (std::size_t i = 0; i < recordings.size(); ++i)
     replays.push_back({{suite.tasks[i].id, kRecorded.id, "recorded", "actions", 1}, &suite.tasks[i], kRecorded,
-                       ActionsOf(recordings[i])});
+                       ActionsOf(recordings[i], suite)});
 
   const fs::path out = arguments.out;
   ReplayRun run{suite, out / "open", "recordings", suite.tasks, {recorded, model}};

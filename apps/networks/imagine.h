@@ -79,14 +79,18 @@ class MapPainter {
   PoseMapOptions options_;
 };
 
+/// Says in OUT that something was imagined there, and what.
+inline constexpr const char* kImagined = "imagined.json";
+
 /// OUT/maps/frame_%05d.png: needs no weights; of weights that are named it reads what they were trained for.
+/// @throws InvalidInput also where OUT holds what was imagined, another process writes it, or its maps are somebody's
 ExitCode ImagineMaps(ImagineArguments arguments);
 
 /// OUT/imagined.mp4 and imagined.json, maps, and frames if asked. Killed at any moment and called again, it goes on
 /// after the last whole chunk and writes the same bytes.
 ExitCode ImagineFrames(ImagineArguments arguments);
 
-/// Writes those maps. @returns how many.
+/// Writes those maps. @returns how many. @throws InvalidInput if somebody's files are in their place.
 std::size_t WriteMaps(const MapPainter& painter, std::size_t frames, const std::filesystem::path& out);
 
 }  // namespace evac

@@ -1,5 +1,6 @@
 #include "apps/networks/imagine_job.h"
 
+#include "apps/networks/imagine_output.h"
 #include "core/config.h"
 #include "core/file.h"
 #include "core/hash.h"
@@ -66,6 +67,59 @@ Json FilesOf(const std::vector<fs::path>& paths) {
   return files;
 }
 
+bool LiesIn(const fs::path& path, const fs::path& folder) {
+  const fs::path from_folder = fs::weakly_canonical(path).lexically_relative(fs::weakly_canonical(folder));
+  return !from_folder.empty() && *from_folder.begin() != "..";
+}
+
+/// Before hours are spent, and before anything goes.
+/// @param is_claimed  OUT says what was imagined there
+void RequireOthersFilesStay(const ImagineArguments& arguments, const ImagineStart& start, bool is_claimed) {
+  const fs::path frames = arguments.out / "frames";
+  std::vector<fs::path> replaced = {arguments.out / "maps"};
+  if (arguments.png || (arguments.restart && is_claimed)) replaced.push_back(frames);
+  for (const fs::path& folder : replaced) {
+    RequireOwnPictures(folder);
+    for (const fs::path& file : start.files) {
+      if (LiesIn(file, folder))
+        throw InvalidInput("{}: lies in {}, which would be replaced; wanted another --out", file.string(),
+                           folder.string());
+    }
+  }
+  if (arguments.png && fs::exists(frames) && !fs::is_empty(frames) && !is_claimed)
+    throw InvalidInput("{}: is there, and nothing was imagined here yet ({} is missing); wanted that name free, or "
+                       "another --out", frames.string(), kImagined);
+}
+
+/// The job that a sidecar tells of. @throws InvalidInput if it tells of none
+Json JobIn(const fs::path& path) {
+  const Json page = Json::parse(ReadFile(path), nullptr, /*allow_exceptions=*/false);
+  const Json job = page.is_object() ? page.value("job", Json()) : Json();
+  if (!job.is_object())
+    throw InvalidInput("{}: is there, and says of no job of evac imagine; wanted that name free, or another --out",
+                       path.string());
+  return job;
+}
+
+/// chunk_00000.safetensors, and .partial-4711 of a process that was killed
+bool IsChunk(const std::string& name) {
+  const std::size_t digits_end = name.find_first_not_of("0123456789", 6);
+  return name.starts_with("chunk_") && digits_end != std::string::npos && digits_end > 6 &&
+         name.substr(digits_end).starts_with(".safetensors");
+}
+
+/// What a job left. Its sidecar goes last: until then what else is there is a job's.
+void RemoveJob(const fs::path& out) {
+  if (fs::is_directory(out / "chunks")) {
+    std::vector<fs::path> chunks;
+    for (const fs::directory_entry& entry : fs::directory_iterator(out / "chunks")) {
+      if (IsChunk(entry.path().filename().string())) chunks.push_back(entry.path());
+    }
+    for (const fs::path& chunk : chunks) fs::remove(chunk);
+  }
+  for (const char* part : {"frames", "maps", "imagined.mp4", kImagined}) fs::remove_all(out / part);
+}
+
 }  // namespace
 
 Json JobOf(const ImagineArguments& arguments, const ImagineStart& start) {
@@ -99,20 +153,18 @@ Sidecar::Sidecar(const ImagineArguments& arguments, const ImagineStart& start, J
            {"inputs", FilesOf(start.files)},
            {"command", CommandWords(arguments, start)},
            {"period_s", start.period_s}};
-  const fs::path path = out_ / "imagined.json";
-  if (!fs::exists(path)) return;
-  if (!arguments.restart) {
-    Refuse(Json::parse(ReadFile(path), nullptr, /*allow_exceptions=*/false));
-  } else {
-    for (const char* part : {"chunks", "frames", "maps", "imagined.mp4", "imagined.json"}) fs::remove_all(out_ / part);
-  }
+  const fs::path path = out_ / kImagined;
+  const bool is_claimed = fs::exists(path);
+  const Json before = is_claimed ? JobIn(path) : Json();
+  if (is_claimed && !arguments.restart) Refuse(before);
+  RequireOthersFilesStay(arguments, start, is_claimed);
+  if (is_claimed && arguments.restart) RemoveJob(out_);
 }
 
-void Sidecar::Refuse(const Json& before) const {
-  const Json job = before.is_object() ? before.value("job", Json::object()) : Json::object();
+void Sidecar::Refuse(const Json& job) const {
   std::string differences;
   for (const auto& [name, value] : page_.at("job").items()) {
-    const Json found = job.is_object() ? job.value(name, Json()) : Json();
+    const Json found = job.value(name, Json());
     if (found == value) continue;
     const std::string there = found.dump(), here = value.dump();
     differences += there.size() + here.size() > 60 ? fmt::format("; {} is another", name)
@@ -123,7 +175,7 @@ void Sidecar::Refuse(const Json& before) const {
                      out_.string(), differences);
 }
 
-void Sidecar::Write(const Json& page) const { WriteFileAtomically(out_ / "imagined.json", page.dump(2) + "\n"); }
+void Sidecar::Write(const Json& page) const { WriteFileAtomically(out_ / kImagined, page.dump(2) + "\n"); }
 
 void Sidecar::WriteBegun() const {
   Json page = page_;

@@ -17,7 +17,8 @@ nlohmann::json JobOf(const ImagineArguments& arguments, const ImagineStart& star
 class Sidecar {
  public:
   /// @throws InvalidInput if `out` holds another job, naming what differs, unless `restart`; then what is there
-  /// is removed.
+  /// is removed. Also where somebody's files would go: maps or frames with others in them, frames that no job of `out`
+  /// made, an imagined.json that is none, or a file that is read and lies in what is to be replaced.
   Sidecar(const ImagineArguments& arguments, const ImagineStart& start, nlohmann::json job);
 
   /// Of the job as a whole.
@@ -27,7 +28,7 @@ class Sidecar {
   void WriteFinished(const FinishedVideo& video, double seconds) const;
 
  private:
-  void Refuse(const nlohmann::json& before) const;
+  void Refuse(const nlohmann::json& job) const;
   void Write(const nlohmann::json& page) const;
 
   std::filesystem::path out_;

@@ -7,6 +7,7 @@
 #include "apps/networks/imagine_output.h"
 #include "core/file.h"
 #include "core/geometry.h"
+#include "core/store_lock.h"
 #include "worldmodel/conditioning.h"
 #include "worldmodel/evac_config.h"
 #include "worldmodel/shard_writer.h"
@@ -101,7 +102,16 @@ ExitCode ImagineMaps(ImagineArguments arguments) {
   const TrainedFor trained = arguments.weights.empty() ? TrainedFor() : TrainedFor::Read(arguments.weights);
   const ImagineStart start = StartAsTrained(arguments.inputs, config, options, trained);
   const MapPainter painter(start, config, options);
+  RequireOwnPictures(arguments.out / "maps");
+  MakeFolders(arguments.out);
+  const std::filesystem::path lock_file = arguments.out / "lock";
+  const bool was_there = std::filesystem::exists(lock_file);
+  const RunLock lock(lock_file);
+  if (std::filesystem::exists(arguments.out / kImagined))
+    throw InvalidInput("{}: holds what was imagined, with its maps; wanted another --out for --maps-only",
+                       arguments.out.string());
   const std::size_t frames = WriteMaps(painter, FrameCount(start, config, arguments.chunks), arguments.out);
+  if (!was_there) std::filesystem::remove(lock_file);  // maps alone leave nothing else
   fmt::print("{}: {} maps of {}x{}, {:.4g} s apart\n", (arguments.out / "maps").string(), frames,
              config.views * config.image_width_px, config.image_height_px, start.period_s);
   return ExitCode::kOk;

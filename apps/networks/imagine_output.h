@@ -7,10 +7,16 @@
 
 namespace evac {
 
+/// What stands in for a folder of pictures while it is written, FOLDER.tmp, holds new/ and old/ alone.
+/// @throws InvalidInput naming the folder, or that one, if it is there and holds anything but frame_%05d.png, or is a
+/// link: it is somebody's, and would go
+void RequireOwnPictures(const std::filesystem::path& folder);
+
 /// A folder of pictures that appears whole: filled beside its place, put there by Finish in place of what was there.
 /// Destroyed before that, nothing has changed.
 class PictureFolder {
  public:
+  /// @throws InvalidInput as RequireOwnPictures; so does Finish.
   explicit PictureFolder(std::filesystem::path folder);
   ~PictureFolder();
   PictureFolder(const PictureFolder&) = delete;

@@ -9,6 +9,7 @@
 #include <nlohmann/json.hpp>
 #include <optional>
 
+#include "apps/warnings.h"
 #include "apps/work_share.h"
 #include "core/error.h"
 #include "core/file.h"
@@ -16,6 +17,7 @@
 #include "core/names.h"
 #include "core/seed.h"
 #include "core/store_lock.h"
+#include "core/version.h"
 #include "reports/csv.h"
 #include "worldmodel/clip.h"
 #include "worldmodel/evac_config.h"
@@ -242,17 +244,22 @@ fs::path ShardPath(const fs::path& out, std::size_t number) {
   return out / fmt::format("shard_{:05}.safetensors", number);
 }
 
-/// OUT/packing.json says which packing the shards beside it are of.
+/// OUT/packing.json says which packing the shards beside it are of, and which evac began it.
 void Claim(const PackArguments& arguments, const Packing& packing) {
   const fs::path path = arguments.out / "packing.json";
-  const std::string text =
-      Json{{"format", "evac-packing"}, {"recipe", packing.recipe}, {"shards", packing.shards.size()}}.dump(1) + "\n";
-  if (!fs::exists(path)) {
-    WriteFileAtomically(path, text);
-  } else if (ReadFile(path) != text) {
+  const Json page = {{"format", "evac-packing"},
+                     {"recipe", packing.recipe},
+                     {"shards", packing.shards.size()},
+                     {"evac_version", EVAC_VERSION}};
+  if (!fs::exists(path)) return WriteFileAtomically(path, page.dump(1) + "\n");
+  const Json before = Json::parse(ReadFile(path), nullptr, /*allow_exceptions=*/false);
+  for (const char* field : {"format", "recipe", "shards"}) {
+    if (before.is_object() && before.contains(field) && before[field] == page[field]) continue;
     throw InvalidInput("{}: holds shards of other recordings or options, wanted recipe {}; choose another --out",
                        path.string(), packing.recipe);
   }
+  const auto began = before.find("evac_version");
+  SayIfAnotherVersionBegan(arguments.out, began != before.end() && began->is_string() ? began->get<std::string>() : "");
 }
 
 Clip Make(const PlannedClip& planned, const PackArguments& arguments, const Packing& packing) {

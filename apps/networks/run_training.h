@@ -29,6 +29,7 @@ ExitCode RunTraining(const TrainArguments& arguments, const TrainingKind& kind, 
   const train::JobPlace place = PlaceOf(arguments, progress);
   CheckHoldouts(place.shards);
   const RunLock lock = HoldFolder(arguments.out);
+  KeepWhoBegan(arguments.out);
   nn::KeepFreedMemory();
   const nn::LibraryThreads threads(kind.is_small ? 1 : LibraryThreadsOf(place, options.job));
   return End(train(place, options), arguments.out, kind.file.c_str());

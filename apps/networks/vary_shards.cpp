@@ -18,6 +18,7 @@
 #include "core/error.h"
 #include "core/file.h"
 #include "core/seed.h"
+#include "core/store_lock.h"
 #include "worldmodel/conditioning.h"
 
 namespace evac {
@@ -282,6 +283,7 @@ Counts VarySplit(const VaryArguments& arguments, const VariedCollection& collect
 
 void VaryShards(const VaryArguments& arguments) {
   const VariedCollection collection(arguments);
+  const RunLock lock(arguments.shards / "lock");
   Worlds worlds(collection.recipe());
   Counts all;
   for (const train::Split split : {train::Split::kTrain, train::Split::kHoldout}) {

@@ -89,6 +89,13 @@ TEST_F(Balance, WritesTheSameNetworkWithTheThresholdThatBalances) {
   EXPECT_NE(ClassifierName(out), ClassifierName(kJudge)) << "another card is another judge";
 }
 
+TEST_F(Balance, ATruthThatNobodyHasToldIsRefusedByItsName) {
+  Run(20);
+  EXPECT_THAT([&] { Printed(AddBalance, Words({"--truth", "orcale"})); },
+              testing::ThrowsMessage<Error>(testing::AllOf(
+                  HasSubstr("--truth: found 'orcale', wanted one who has judged"), HasSubstr("oracle"))));
+}
+
 TEST_F(Balance, TooFewPairsAreInconclusiveAndNothingIsWritten) {
   Run(20);
   CLI::App app;

@@ -134,6 +134,7 @@ TEST_F(Drift, AGripperThatIsTooPlainToBeFoundIsNotFoundAnywhere) {
   ArmState arm;
   arm.base_from_gripper.translation() = Eigen::Vector3d((kGripper.x + 0.5 - 48) / 100, (kGripper.y + 0.5 - 32) / 100, 1);
   drift.Add({&task_, Write("real.mp4", plain), Write("model.mp4", InReality), std::vector<Arms>(kFrames - 1, Arms{arm}), 1, 0});
+  ASSERT_EQ(drift.Chunks().size(), 2u);
   for (const ChunkDrift& chunk : drift.Chunks()) {
     EXPECT_FALSE(chunk.gripper_px);
     EXPECT_FALSE(chunk.gripper_found) << "where it is plain nobody could find it";

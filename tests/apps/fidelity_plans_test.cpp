@@ -1,5 +1,6 @@
 #include "apps/networks/fidelity_plans.h"
 
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -56,6 +57,25 @@ TEST(FidelityWorlds, TwoOfOneSortAreRefusedByTheirNames) {
               ThrowsMessage<Error>(HasSubstr("found one and two, wanted one of type evac")));
 }
 
+TEST(Fidelity, RefusesOptionsOfPartsThatAreNotAskedFor) {
+  using Give = std::function<void(FidelityArguments&)>;
+  const auto refuses = [](const char* option, std::vector<std::string> parts, const Give& give) {
+    const auto no_such_suite = ThrowsMessage<Error>(HasSubstr("none.yaml"));
+    FidelityArguments arguments;
+    const auto run = [&] { RunFidelity(arguments); };
+    arguments.suite = "none.yaml";
+    arguments.parts = std::move(parts);
+    EXPECT_THAT(run, no_such_suite) << "nothing is wrong with its options";
+    give(arguments);
+    EXPECT_THAT(run, ThrowsMessage<Error>(HasSubstr(std::string(option) + ": is of part")));
+    arguments.parts = FidelityArguments{}.parts;
+    EXPECT_THAT(run, no_such_suite) << "all parts are asked for";
+  };
+  refuses("--horizon-chunks", {"open"}, [](FidelityArguments& given) { given.horizon_chunks = 5; });
+  refuses("--horizon-states", {"closed", "executed"}, [](FidelityArguments& given) { given.horizon_states = 5; });
+  refuses("--counterfactual-states", {"open"}, [](FidelityArguments& given) { given.counterfactual_states = 3; });
+}
+
 TEST(RecordedFidelity, RefusesOptionsThatWouldBePassedOver) {
   const auto refuses = [](const char* option, const std::function<void(FidelityArguments&)>& give) {
     FidelityArguments arguments;
@@ -71,6 +91,20 @@ TEST(RecordedFidelity, RefusesOptionsThatWouldBePassedOver) {
   open.parts = {"open"};
   EXPECT_THAT([&] { RunRecordedFidelity(open, Worlds({})); }, ThrowsMessage<Error>(HasSubstr("wanted one of type evac")))
       << "which is what it does";
+}
+
+TEST(RecordedFidelity, RefusesFieldsOfTheSuiteThatWouldBePassedOver) {
+  const auto refuses = [](const char* field, const std::function<void(Suite&)>& give) {
+    Suite suite = Worlds({Evac("dream")});
+    give(suite);
+    EXPECT_THAT([&] { RunRecordedFidelity({}, suite); },
+                ThrowsMessage<Error>(HasSubstr(
+                    fmt::format("suite.yaml: field {}: means nothing for `evac fidelity` of recordings", field))));
+  };
+  refuses("still", [](Suite& suite) { suite.recorded_task.still.emplace(); });
+  refuses("workspace_m", [](Suite& suite) { suite.recorded_task.workspace_m.emplace(); });
+  refuses("seeds", [](Suite& suite) { suite.seeds = {1, 2}; });
+  refuses("initial_states of world dream", [](Suite& suite) { suite.worlds[0].initial_states = 2; });
 }
 
 TEST(Counterfactuals, OfATaskWhoseRubricNamesNoObjectAreRefusedBeforeAnythingSucceeded) {

@@ -183,6 +183,7 @@ TEST_F(Replays, OfOtherActionsAreNeitherGoneOnWithNorTakenOver) {
   const auto ends = Ends(RunReplays(run, Of(MovesThenRests(2, 3))));
   EXPECT_THAT(testing::internal::GetCapturedStderr(),
               AllOf(HasSubstr("2 of its episodes played other actions than these: not taken over"), testing::Not(HasSubstr("episodes taken"))));
+  ASSERT_EQ(ends.size(), 2u);
   EXPECT_THAT(ends, Each(std::pair<std::size_t, StopReason>(5, StopReason::kRecordingEnd)));
 }
 
@@ -237,7 +238,9 @@ TEST_F(Replays, ThatFailedAreSaidAndCountedAndTriedAgainByTheNextCall) {
   run.make = obedient;
   const Store store = RunReplays(run, Of(MovesThenRests(4, 0)));
   EXPECT_EQ(EpisodesOf("open", store).failed, 0);
-  EXPECT_THAT(Ends(store), Each(std::pair<std::size_t, StopReason>(4, StopReason::kRecordingEnd)));
+  const auto ends = Ends(store);
+  ASSERT_EQ(ends.size(), 2u);
+  EXPECT_THAT(ends, Each(std::pair<std::size_t, StopReason>(4, StopReason::kRecordingEnd)));
 }
 
 TEST_F(Replays, OfACallThatAskedForMoreAreNotCountedByTheNext) {

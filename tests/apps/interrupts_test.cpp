@@ -6,13 +6,23 @@
 namespace evac {
 namespace {
 
-bool KillsAtOnce(int signal) {
+bool Does(int signal, sighandler_t what) {
   struct sigaction now {};
   ::sigaction(signal, nullptr, &now);
-  return now.sa_handler == SIG_DFL;
+  return now.sa_handler == what;
 }
 
-TEST(Interrupts, OneThatCameBeforeAPartOfTheWorkBeganEndsThatPartToo) {
+bool KillsAtOnce(int signal) { return Does(signal, SIG_DFL); }
+
+/// As on a terminal, whatever the caller of the tests ignores.
+class Interrupts : public testing::Test {
+ protected:
+  Interrupts() {
+    for (const int signal : {SIGINT, SIGTERM, SIGHUP}) ::signal(signal, SIG_DFL);
+  }
+};
+
+TEST_F(Interrupts, OneThatCameBeforeAPartOfTheWorkBeganEndsThatPartToo) {
   const CatchInterrupts whole;
   ::raise(SIGINT);
   {
@@ -23,7 +33,7 @@ TEST(Interrupts, OneThatCameBeforeAPartOfTheWorkBeganEndsThatPartToo) {
   EXPECT_TRUE(IsInterrupted());
 }
 
-TEST(Interrupts, TheFirstAfterAPartOfTheWorkEndedEndsTheRestInOrder) {
+TEST_F(Interrupts, TheFirstAfterAPartOfTheWorkEndedEndsTheRestInOrder) {
   const CatchInterrupts whole;
   { const CatchInterrupts part; }
   for (const int signal : {SIGINT, SIGTERM, SIGHUP}) ASSERT_FALSE(KillsAtOnce(signal)) << signal;
@@ -31,7 +41,7 @@ TEST(Interrupts, TheFirstAfterAPartOfTheWorkEndedEndsTheRestInOrder) {
   EXPECT_TRUE(IsInterrupted());
 }
 
-TEST(Interrupts, AreForgottenWhenOtherWorkBeginsAndKillWhereNoneIsDone) {
+TEST_F(Interrupts, AreForgottenWhenOtherWorkBeginsAndKillWhereNoneIsDone) {
   {
     const CatchInterrupts first;
     ::raise(SIGINT);
@@ -39,6 +49,32 @@ TEST(Interrupts, AreForgottenWhenOtherWorkBeginsAndKillWhereNoneIsDone) {
   EXPECT_TRUE(KillsAtOnce(SIGINT));
   const CatchInterrupts second;
   EXPECT_FALSE(IsInterrupted());
+}
+
+/// `nohup evac train …` ended with the terminal all the same.
+TEST_F(Interrupts, ThatTheCallerIgnoresStayIgnoredDuringTheWorkAndAfterIt) {
+  ::signal(SIGHUP, SIG_IGN);
+  {
+    const CatchInterrupts whole;
+    ::raise(SIGHUP);
+    EXPECT_FALSE(IsInterrupted());
+    ::raise(SIGTERM);
+    EXPECT_TRUE(IsInterrupted()) << "the others are caught";
+  }
+  EXPECT_TRUE(Does(SIGHUP, SIG_IGN));
+  EXPECT_TRUE(KillsAtOnce(SIGTERM));
+  ::signal(SIGHUP, SIG_DFL);
+}
+
+TEST_F(Interrupts, DoAfterTheWorkWhatTheyDidBeforeIt) {
+  const sighandler_t own = [](int) {};
+  ::signal(SIGTERM, own);
+  {
+    const CatchInterrupts whole;
+    EXPECT_FALSE(Does(SIGTERM, own));
+  }
+  EXPECT_TRUE(Does(SIGTERM, own));
+  ::signal(SIGTERM, SIG_DFL);
 }
 
 }  // namespace

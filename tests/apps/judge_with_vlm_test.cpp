@@ -88,6 +88,15 @@ TEST_F(ASmallServer, IsAskedOnceAboutEachEpisodeAndNotAnewAtEveryCall) {
   EXPECT_EQ(server_.Seen().size(), asked + 2) << "only who it is and whether it sees";
 }
 
+/// In a log nothing was to be read for hours.
+TEST_F(ASmallServer, SaysHowFarItIsWhereNobodyLooksOn) {
+  testing::internal::CaptureStderr();
+  Judge();
+  const std::string said = testing::internal::GetCapturedStderr();
+  EXPECT_THAT(said, testing::ContainsRegex("2 of 2 episodes judged by vlm:gloomy-[0-9a-f]*, "));
+  EXPECT_THAT(said, testing::ContainsRegex("2 of 2 episodes judged by vlm:gloomy-[0-9a-f]*:flip, "));
+}
+
 TEST_F(ASmallServer, WhatARetestWouldTakeIsSaidBefore) {
   EXPECT_THAT(Judge(false, true, true), HasSubstr("2 clips, 14 requests"));
   Judge();

@@ -181,6 +181,24 @@ TEST_F(Resolving, ALabelThatTakesTheOneOfAnotherStudyIsSaidToAndNoneIsTakenBack)
   EXPECT_EQ(Told().at("human").label, Label::kSuccess) << "who left this study says nothing of the other's label";
 }
 
+/// A run that was made anew in the same folder, with another checkpoint's file, has the same episode ids.
+TEST_F(Resolving, AClipThatNobodySawGetsNobodysWord) {
+  AtTheDesk ann(store, desk), bob(store, desk);
+  RateAll(ann, "failure");
+  RateAll(bob, "failure");
+  const std::filesystem::path run = study.run().folder();
+  StoredRun anew("anew", "sf", "sf", 16);
+  const std::string there = anew.store().Episodes().front().video_sha256;
+  { const Store closed = std::move(anew.store()); }
+  std::filesystem::remove_all(run);
+  std::filesystem::copy(anew.folder(), run, std::filesystem::copy_options::recursive);
+  const std::string shown = store.Clips().front().source_sha256;
+  EXPECT_THAT([&] { Resolve(true); },
+              testing::ThrowsMessage<Error>(testing::AllOf(testing::HasSubstr(there), testing::HasSubstr(shown),
+                                                           testing::HasSubstr("another than raters were shown"))));
+  EXPECT_EQ(Store::Open(run, Store::Mode::kReadOnly).Judges(), std::vector<std::string>{"oracle"});
+}
+
 TEST_F(Resolving, UnderTheNameOfAnotherJudgeOrOfNoneNothingIsWritten) {
   Import("ann", "failure");
   Import("bob", "failure");

@@ -57,6 +57,17 @@ TEST(Tree, NothingNamesAPathOfOneMachine) {
   EXPECT_THAT(found, IsEmpty()) << Listed(found);
 }
 
+TEST(Tree, NothingNamesASectionOfADocumentThatIsNotHere) {
+  const Violations found = InTree(MissingSources, false);
+  EXPECT_THAT(found, IsEmpty()) << Listed(found);
+}
+
+TEST(Tree, ScriptsAreReadToo) {
+  std::vector<std::string> paths;
+  for (const SourceFile& file : ReadTree(EVAC_SOURCE_DIR)) paths.push_back(file.path);
+  EXPECT_THAT(paths, testing::Contains("tests/support/torch_checkpoint.py"));
+}
+
 TEST(Tree, TheTopHoldsOnlyTheFoldersItShould) {
   const Violations found = UnknownTopFolders(TopFolders(EVAC_SOURCE_DIR));
   EXPECT_THAT(found, IsEmpty()) << Listed(found);
@@ -176,6 +187,15 @@ TEST(MachinePath, IsFoundWithItsLine) {
   const std::string home = std::string("/") + "home";
   EXPECT_THAT(MachinePaths({"docs/a.md", "one\nsee " + home + "/me/evac\n"}), ElementsAre(HasSubstr("docs/a.md:2:")));
   EXPECT_THAT(MachinePaths({"docs/a.md", "out/home/me, https://a.org" + home + "/x, $X" + home + "/y\n"}), IsEmpty());
+}
+
+TEST(MissingSource, IsFoundWithItsLine) {
+  const std::string page = std::string("statistics.md") + " 3.4", section = std::string("(EVAC; spec") + " 4.6)";
+  EXPECT_THAT(MissingSources({"core/a.h", "one\n/// Association (" + page + ").\n"}),
+              ElementsAre(HasSubstr("core/a.h:2:")));
+  EXPECT_THAT(MissingSources({"docs/a.md", section + "\n" + page + "\n"}), SizeIs(2));
+  EXPECT_THAT(MissingSources({"core/a.h", "docs/statistics.md, rates.md 1, EVAC, Sec. 3.2, the spec of 2 cameras\n"}),
+              IsEmpty());
 }
 
 TEST(TopFolder, AnUnknownOneIsRefused) {

@@ -78,7 +78,8 @@ std::set<std::string> IgnoredFolders(const fs::path& root) {
 bool IsText(const std::string& path) {
   static const std::set<std::string> kExtensions = {".h",   ".cpp",  ".md",  ".txt",  ".cmake", ".yaml",
                                                     ".yml", ".lcm",  ".xml", ".in",   ".json",  ".js",
-                                                    ".css", ".html", ".sh",  ".toml", ""};
+                                                    ".css", ".html", ".sh",  ".toml", ".py",    ".csv",
+                                                    ".tsv", ""};
   return kExtensions.count(fs::path(path).extension().string()) > 0;
 }
 
@@ -139,6 +140,20 @@ Violations MachinePaths(const SourceFile& file) {
   for (int number = 1; std::getline(lines, line); ++number) {
     if (std::regex_search(line, kPath))
       violations.push_back(At(file, number, "a path of one machine: paths are relative, or arguments"));
+  }
+  return violations;
+}
+
+Violations MissingSources(const SourceFile& file) {
+  static const std::regex kSection(
+      "\\b((statistics|rating|vlm_judge|reports|desk_model|conventions|platform|house)\\.md|spec) [0-9]");
+  Violations violations;
+  std::istringstream lines(file.text);
+  std::string line;
+  for (int number = 1; std::getline(lines, line); ++number) {
+    if (std::regex_search(line, kSection))
+      violations.push_back(
+          At(file, number, "a section of a document that is not here: name a paper, a method or a page of docs/"));
   }
   return violations;
 }

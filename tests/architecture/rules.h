@@ -28,6 +28,8 @@ Violations MisplacedLibraries(const SourceFile& file);
 Violations TooLong(const SourceFile& file);
 /// No path of one person's machine in anything that is kept.
 Violations MachinePaths(const SourceFile& file);
+/// No section of a document that is not in the project: a source is a paper, a published method or a page of docs/.
+Violations MissingSources(const SourceFile& file);
 /// A new folder at the top needs a decision record, and its name here.
 Violations UnknownTopFolders(const std::vector<std::string>& folders);
 

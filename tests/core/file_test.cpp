@@ -96,15 +96,13 @@ TEST(File, AnotherNameIsALinkWhereTheDiskHasThem) {
 }
 
 TEST(File, AFileOfAnotherDiskIsCopiedWholeOrNotAtAll) {
-  const TempFolder folder;
-  const fs::path from = "/dev/shm/evac-file-test-" + std::to_string(::getpid());
+  if (!fs::exists("/dev/shm")) GTEST_SKIP() << "there is no /dev/shm here";
+  const TempFolder folder, there("/dev/shm");
+  const fs::path from = there / "whole";
   std::ofstream(from) << "whole";
   std::error_code refused;
   fs::create_hard_link(from, folder / "link", refused);
-  if (!refused || !fs::exists(from)) {
-    fs::remove(from);
-    GTEST_SKIP() << "/dev/shm is no other disk here";
-  }
+  if (!refused) GTEST_SKIP() << "/dev/shm is no other disk here";
   std::ofstream(folder / "f.tmp") << "half, of a process that was killed";
   LinkOrCopy(from, folder / "f");
   EXPECT_EQ(ReadFile(folder / "f"), "whole");
@@ -112,7 +110,6 @@ TEST(File, AFileOfAnotherDiskIsCopiedWholeOrNotAtAll) {
   MakeFolders(folder / "g.tmp/in_the_way");
   EXPECT_THAT(MessageOf([&] { LinkOrCopy(from, folder / "g"); }), HasSubstr((folder / "g").string()));
   EXPECT_FALSE(fs::exists(folder / "g"));
-  fs::remove(from);
 }
 
 TEST(File, FoldersAreMadeAsFarAsTheyAreMissing) {
@@ -126,6 +123,14 @@ TEST(File, FoldersAreMadeAsFarAsTheyAreMissing) {
 }
 
 /// It ended commands with 4, as if the machine had refused.
+TEST(File, AFolderWhereAFileIsWantedIsTheUsersToMove) {
+  const TempFolder folder;
+  EXPECT_NO_THROW(RefuseFolder(folder / "new"));
+  EXPECT_NO_THROW(RefuseFolder(folder / "missing/new"));
+  for (const fs::path& wrong : {folder.path(), folder / "new/"})
+    EXPECT_THAT(MessageOf([&] { RefuseFolder(wrong); }), HasSubstr(wrong.string() + ": is a folder, wanted a file"));
+}
+
 TEST(File, WhatIsNoFolderWhereOneIsWantedIsTheUsersToMove) {
   const TempFolder folder;
   WriteFileAtomically(folder / "f", "no folder");

@@ -12,6 +12,7 @@
 #include <fstream>
 
 #include "tests/support/command.h"
+#include "tests/support/temp_folder.h"
 
 namespace evac {
 namespace {
@@ -35,10 +36,8 @@ std::string ReadAll(const std::filesystem::path& path) {
 
 class TensorFileOnDisk : public testing::Test {
  protected:
-  void SetUp() override { std::filesystem::create_directories(folder_); }
-  void TearDown() override { std::filesystem::remove_all(folder_); }
-  std::filesystem::path folder_ =
-      std::filesystem::temp_directory_path() / ("tensor_file_" + std::to_string(::getpid()));
+  const TempFolder temp_;
+  const std::filesystem::path folder_ = temp_.path();
 };
 
 TEST_F(TensorFileOnDisk, SavedLoadedAndSavedAgainIsTheSameFile) {
@@ -107,6 +106,45 @@ TEST_F(TensorFileOnDisk, AFileWhoseHeaderDoesNotFitOnTheDiskLeavesNothing) {
   std::signal(SIGXFSZ, handler);
   EXPECT_THAT(message, HasSubstr("cannot write"));
   EXPECT_TRUE(std::filesystem::is_empty(folder_));
+}
+
+/// All that writes weights, latents or trainings ended with 2 (invalid input) on a full disk.
+TEST_F(TensorFileOnDisk, AFullDiskIsAnotherErrorThanAFolderThatIsNotThere) {
+  const std::vector<float> numbers(1000, 0.25F);
+  const TensorView tensor{{"x", TensorType::kF32, {1000}}, std::as_bytes(std::span(numbers))};
+  const auto write = [&](const std::filesystem::path& path) { WriteTensorFile(path, std::span(&tensor, 1), {}); };
+  const auto handler = std::signal(SIGXFSZ, SIG_IGN);
+  rlimit limit{};
+  ASSERT_EQ(::getrlimit(RLIMIT_FSIZE, &limit), 0);
+  for (const rlim_t bytes : {4, 2000}) {  // within the header, within the numbers
+    const rlimit little{bytes, limit.rlim_max};
+    ASSERT_EQ(::setrlimit(RLIMIT_FSIZE, &little), 0);
+    std::string message = "no error";
+    try {
+      write(folder_ / "a");
+    } catch (const TensorWriteError& error) {
+      message = error.what();
+    } catch (const TensorError&) {
+      message = "blamed on the tensors";
+    }
+    ASSERT_EQ(::setrlimit(RLIMIT_FSIZE, &limit), 0);
+    EXPECT_THAT(message, HasSubstr("cannot write")) << bytes;
+  }
+  std::signal(SIGXFSZ, handler);
+  EXPECT_TRUE(std::filesystem::is_empty(folder_));
+  std::filesystem::create_directory(folder_ / "folder");
+  for (const char* place : {"none/a", "folder"}) {
+    try {
+      write(folder_ / place);
+      ADD_FAILURE() << place << " was written";
+    } catch (const TensorWriteError&) {
+      ADD_FAILURE() << place << ": the machine is blamed";
+    } catch (const TensorError& error) {
+      EXPECT_THAT(error.what(), HasSubstr(place));
+    }
+  }
+  std::filesystem::remove(folder_ / "folder");
+  EXPECT_TRUE(std::filesystem::is_empty(folder_)) << "parts are left";
 }
 
 TEST_F(TensorFileOnDisk, AMissingFileIsNamed) {

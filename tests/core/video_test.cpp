@@ -195,17 +195,21 @@ TEST(Video, AFrameOfAnotherSizeOrTypeIsRefused) {
   const TempFolder folder;
   VideoWriter writer(folder / "v.mp4", {});
   writer.Append(Scene(0));
-  EXPECT_THROW(writer.Append(Flat(64, 64, {0, 0, 0})), Error);
-  EXPECT_THROW(writer.Append(cv::Mat(64, 96, CV_8UC1)), Error);
-  EXPECT_THROW(writer.Append(cv::Mat()), Error);
+  const auto refuses = [](const std::string& message) { return testing::ThrowsMessage<Error>(HasSubstr(message)); };
+  EXPECT_THAT([&] { writer.Append(Flat(64, 48, {0, 0, 0})); }, refuses("frame 1 is 64x48, the first was 96x64"));
+  EXPECT_THAT([&] { writer.Append(cv::Mat(64, 96, CV_8UC1)); }, refuses("a frame is no 8-bit RGB image"));
+  EXPECT_THAT([&] { writer.Append(cv::Mat()); }, refuses("a frame is no 8-bit RGB image"));
 }
 
 TEST(Video, ImpossibleOptionsAreRefusedWithTheirValue) {
   const TempFolder folder;
-  for (const VideoOptions& options : {VideoOptions{.period_s = 0}, VideoOptions{.crf = 52}, VideoOptions{.scale = 0}}) {
-    EXPECT_THROW(VideoWriter(folder / "v.mp4", options), Error);
-  }
-  EXPECT_THROW(Write(folder / "v.mp4", Scenes(1), {.preset = "no such preset"}), Error);
+  const auto refuses = [](const std::string& message) { return testing::ThrowsMessage<Error>(HasSubstr(message)); };
+  for (const auto& [options, message] : {std::pair(VideoOptions{.period_s = 0}, "period is 0 s, wanted .001 … 1000"),
+                                         {VideoOptions{.crf = 52}, "crf is 52, wanted 0 … 51"},
+                                         {VideoOptions{.scale = 0}, "scale is 0, wanted 1 … 64"}})
+    EXPECT_THAT([&] { VideoWriter(folder / "v.mp4", options); }, refuses(message));
+  EXPECT_THAT([&] { Write(folder / "v.mp4", Scenes(1), {.preset = "no such preset"}); },
+              refuses("the H.264 encoder does not start"));
   EXPECT_TRUE(std::filesystem::is_empty(folder.path()));
 }
 

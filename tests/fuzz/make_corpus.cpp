@@ -7,7 +7,10 @@
 #include "core/npy.h"
 #include "core/store.h"
 #include "core/store_codec.h"
+#include "core/store_study.h"
 #include "core/tensor_file.h"
+#include "policies/learned_input.h"
+#include "policies/messages.h"
 #include "tests/fuzz/small_shards.h"
 #include "tests/support/synthetic_recording.h"
 
@@ -59,6 +62,102 @@ void MakeStoreSeeds(const fs::path& folder) {
     evac::WriteText(folder.parent_path() / target / "small.png", evac::codec::EncodePng(image));
 }
 
+/// A study of one clip, which one rater has judged (study_fuzz.cpp).
+void MakeStudySeed(const fs::path& folder) {
+  const fs::path place = folder / "study";
+  {
+    evac::StudyStore study = evac::StudyStore::Create(
+        place, {.name = "fuzz", .seed = 7, .width_px = 8, .height_px = 8, .evac_version = "0"});
+    evac::StudyClip clip;
+    clip.run = "run", clip.episode = "e", clip.task = "take_bottle", clip.policy = "hold", clip.world = "real";
+    clip.rubric_hash = "h", clip.views = "[]", clip.file = "clips/a.mp4", clip.frames = 4;
+    const evac::StudyRubric rubric{"h", "take_bottle", "{}"};
+    study.AddWave({&clip, 1}, {&rubric, 1});
+    study.AddInvite("link", evac::RaterRole::kRater, 1);
+    const evac::StudyRater rater = study.Join("link", "uuid", "Ann", 2);
+    study.AddSession(rater.id, "session", 2);
+    evac::Presentation shown;
+    shown.id = "p", shown.rater = rater.id, shown.clip = 1;
+    study.AddPresentations({&shown, 1});
+    evac::HumanVerdict verdict;
+    verdict.client_uuid = "u", verdict.presentation = "p", verdict.label = "failure", verdict.note = "slipped";
+    study.AddVerdict(verdict);
+    study.AddGuess(rater.id, 1, "unsure", 3);
+  }
+  evac::WriteText(folder / "database", evac::ReadFile(place / "study.sqlite"));
+  fs::remove_all(place);
+}
+
+/// One of each message without its type's fingerprint, and a change of a JPEG, each after the number that says which it
+/// is (lcm_messages_fuzz.cpp).
+void MakeMessageSeeds(const fs::path& folder) {
+  const auto seed = [&](const char* name, const char kind, const auto& message) {
+    const std::vector<std::uint8_t> bytes = evac::Encoded(message);
+    evac::WriteText(folder / name, kind + std::string(bytes.begin() + 8, bytes.end()));
+  };
+  const evac::Task task = SomeTask();
+  evac::chunk_t chunk{};
+  chunk.targets.assign(2, evac::ToWire(evac::Arms(1)));
+  chunk.num_targets = 2, chunk.num_arms = 1;
+  seed("chunk", 0, chunk);
+  evac::image_t image{};
+  image.camera = "head";
+  evac::PutImage(cv::Mat(8, 8, CV_8UC3, cv::Scalar(10, 120, 200)), std::nullopt, image);
+  seed("image", 1, image);
+  evac::observation_t observation{};
+  observation.arms = evac::ToWire(evac::Arms(1));
+  observation.cameras = {evac::ToWire(task.cameras[0])};
+  observation.num_arms = observation.num_images = 1;
+  seed("observation", 2, observation);
+  evac::episode_start_t start{};
+  evac::PutTask(task, start);
+  seed("start", 3, start);
+  evac::hello_t hello{};
+  hello.harness = evac::ToWire(evac::HarnessSpec(task, 2));
+  seed("hello", 4, hello);
+  evac::declaration_t declaration{};
+  const evac::PolicySpec hold{
+      .name = "hold", .checkpoint = "a", .arms = {"right"}, .cameras = {{"head"}}, .needs = {"images"}};
+  declaration.policy = evac::ToWire(hold);
+  seed("declaration", 5, declaration);
+  evac::episode_started_t started{};
+  started.error = "no";
+  seed("started", 6, started);
+  evac::bye_t bye{};
+  bye.client = "somebody";
+  seed("bye", 7, bye);
+  evac::WriteText(folder / "jpeg", std::string("\x08\x01\x40\x7f", 4));
+}
+
+/// What people and their browsers write: tables, a server's page, answers.
+void MakeTextSeeds(const fs::path& corpus) {
+  evac::WriteText(corpus / "rating_csv_fuzz/small.csv",
+                  "run,episode,rater,label,note\na,e,ann,S,\nb,e,ann,failure,\"slipped, late\"\na,f,bo,U,\n");
+  evac::WriteText(corpus / "pairs_csv_fuzz/small.csv",
+                  "group,task,policy,real_sr,sim_sr\na,take,p,0.8,0.7\na,take,q,0.5,0.6\na,take,\"r, s\",0.2,0.1\n");
+  evac::WriteText(corpus / "real_trials_csv_fuzz/small.csv",
+                  "task,initial_state,policy,checkpoint,outcome,trial,video\ntake,41-0001,p,c,success,1,a.mp4\n"
+                  "t,1,p,,0,,\n");
+  evac::WriteText(corpus / "training_tables_fuzz/small.csv", "step,loss\n1,0.5\n2,0.25\n200,nan\n");
+  evac::WriteText(corpus / "training_job_fuzz/small",
+                  "evac-training 1\nworld\nsize chunk 8\nsize unet.channel_mult 1,2,4,4\noption batch 4\ninit_widen true\nbegun_with x\n");
+  evac::WriteText(corpus / "vlm_config_fuzz/server.yaml",
+                  "name: qwen3-vl\nbase_url: http://localhost:8000/v1\nmodel: m\nkey: {env: KEY}\n"
+                  "sampling: {temperature: 0.1, seed: 7, max_tokens: 500}\nclip: {frames: 8, tail_frames: 2}\n"
+                  "timeouts: {total_s: 60}\nbudget: {max_usd: 2, usd_per_million_prompt_tokens: 0.5}\n");
+  const std::string id(32, 'a');
+  const std::pair<const char*, std::string> words[] = {
+      {"verdict", R"({"client_uuid": "0123456789abcdef", "presentation": ")" + id +
+                      R"(", "tab_epoch": 3, "label": "success", "coverage": 0.9, "stages": 5, "played": [[0, 1.5]]})"},
+      {"join", R"({"invite": ")" + id + R"(", "uuid": ")" + id + R"(", "name": "Ann"})"},
+      {"next", R"({"tab_epoch": 3, "held": [")" + id + R"("]})"},
+      {"guess", R"({"presentation": ")" + id + R"(", "guess": "unsure"})"},
+      {"range", "bytes=5-9"},
+      {"cookie", "a=b; evac_rating=" + id},
+      {"from", "from=200"}};
+  for (const auto& [name, text] : words) evac::WriteText(corpus / "rating_words_fuzz" / name, text);
+}
+
 /// The project's own pages, each after the letter that says what it is (suite_fuzz.cpp).
 void MakePageSeeds(const fs::path& folder) {
   const fs::path root = EVAC_SOURCE_DIR;
@@ -86,7 +185,7 @@ void MakeShardSeeds(const fs::path& folder) {
   fs::remove_all(packing);
 }
 
-/// A small network's weights, a chunk of two frames of one view, and a sheet of verdicts.
+/// A small network's weights, and a chunk of two frames of one view.
 void MakeTensorSeeds(const fs::path& corpus) {
   const std::array<float, 2> numbers = {1.5F, -2};
   const std::array<std::uint8_t, 2 * 2 * 3 * 3> pixels{};
@@ -94,12 +193,16 @@ void MakeTensorSeeds(const fs::path& corpus) {
   const evac::TensorView chunk[] = {
       {{"latents", evac::TensorType::kF32, {2, 1}}, std::as_bytes(std::span(numbers))},
       {{"pictures", evac::TensorType::kU8, {2, 1, 2, 3, 3}}, std::as_bytes(std::span(pixels))}};
-  for (const char* target : {"weight_file_fuzz", "chunk_cache_fuzz"}) fs::create_directories(corpus / target);
-  evac::WriteTensorFile(corpus / "weight_file_fuzz/small", {&bias, 1},
-                        {{"format", "fuzz 1"}, {"tasks", "a,b"}, {"threshold", "0.25"}, {"frames", "4"}});
+  for (const char* target : {"weight_file_fuzz", "tensor_file_fuzz", "chunk_cache_fuzz"})
+    fs::create_directories(corpus / target);
+  const evac::TensorMetadata card = {{"format", "fuzz 1"},
+                                     {"tasks", "a,b"},
+                                     {"threshold", "0.25"},
+                                     {"frames", "4"},
+                                     {"camera.head", evac::CardLine(SomeTask().cameras[0])}};
+  for (const char* target : {"weight_file_fuzz", "tensor_file_fuzz"})
+    evac::WriteTensorFile(corpus / target / "small", {&bias, 1}, card);
   evac::WriteTensorFile(corpus / "chunk_cache_fuzz/small", chunk, {});
-  evac::WriteText(corpus / "rating_csv_fuzz/small.csv",
-                  "run,episode,rater,label,note\na,e,ann,S,\nb,e,ann,failure,\"slipped, late\"\na,f,bo,U,\n");
 }
 
 /// CORPUS/npy_fuzz: one array per type. CORPUS/recording_fuzz: a camera's pages and a collection's row, each after the
@@ -122,6 +225,9 @@ void MakeCorpus(const fs::path& corpus) {
   fs::rename(clip / "head_color.mp4", corpus / "video_fuzz" / "four_frames.mp4");
   fs::remove_all(clip);
   MakeStoreSeeds(corpus / "store_fuzz");
+  MakeStudySeed(corpus / "study_fuzz");
+  MakeMessageSeeds(corpus / "lcm_messages_fuzz");
+  MakeTextSeeds(corpus);
   MakePageSeeds(corpus / "suite_fuzz");
   MakeShardSeeds(corpus / "shards_fuzz");
   MakeTensorSeeds(corpus);
@@ -141,4 +247,5 @@ int main(int argc, char** argv) {
     return 2;
   }
   MakeCorpus(argv[1]);
+  return 0;  // tests/corpus calls this by another name
 }

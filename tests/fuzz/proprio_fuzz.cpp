@@ -4,6 +4,7 @@
 #include <cstdlib>
 #include <filesystem>
 #include <string>
+#include <vector>
 
 #include "core/error.h"
 #include "core/recording_parts.h"
@@ -30,17 +31,27 @@ class TempFile {
   int descriptor_;
 };
 
-}  // namespace
+using Track = std::vector<evac::Arms>(const std::filesystem::path& path);
 
-/// Any bytes are an arms' track whose closures lie in [0, 1], or an InvalidInput.
-extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
-  const TempFile file(data, size);
+void ReadOrRefuse(Track* read, const std::string& path) {
   try {
-    for (const evac::Arms& arms : evac::ReadProprio(file.path())) {
-      if (arms.size() != 2 || !(arms[0].closure >= 0 && arms[0].closure <= 1)) std::abort();
+    for (const evac::Arms& arms : read(path)) {
+      if (arms.size() != 2) std::abort();
+      for (const evac::ArmState& arm : arms) {
+        if (!(arm.closure >= 0 && arm.closure <= 1)) std::abort();
+      }
     }
   } catch (const evac::Error& error) {
     if (error.exit_code() != evac::ExitCode::kInvalidInput) std::abort();
   }
+}
+
+}  // namespace
+
+/// Any bytes are an arms' track whose closures lie in [0, 1], measured and told, or an InvalidInput.
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  const TempFile file(data, size);
+  ReadOrRefuse(evac::ReadProprio, file.path());
+  ReadOrRefuse(evac::ReadTold, file.path());
   return 0;
 }

@@ -14,8 +14,13 @@ void ReadAll(const evac::Store& store) {
   store.Tasks();
   store.Worlds();
   store.Policies();
+  store.Verdicts();
   store.CurrentVerdicts();
   store.CountersByPolicy();
+  store.RealTrials();
+  store.Looks();
+  store.GateRecords();
+  for (const std::string& judge : store.Judges()) store.ForEachEnded(judge, [](const evac::EndedEpisode&) {});
   for (evac::Episode episode : store.Episodes()) {
     store.LoadSteps(episode);
     store.LoadPrivileged(episode.key.Id());

@@ -7,6 +7,7 @@
 
 #include "core/error.h"
 #include "core/weight_file.h"
+#include "policies/learned_input.h"
 #include "tests/fuzz/scratch.h"
 
 namespace {
@@ -39,6 +40,11 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
       ReadOrRefuse([&] { Require(std::abs(file.Whole(field, -5, 5)) <= 5); });
       ReadOrRefuse([&] { Require(!file.Names(field).empty()); });
     }
+    ReadOrRefuse([&] {
+      const evac::Camera camera = evac::CameraOfCard(file, "head");
+      Require(camera.fx_px > 0 && camera.fy_px > 0 && std::isfinite(camera.fx_px) && std::isfinite(camera.cy_px));
+      Require(camera.mount_from_camera.matrix().allFinite());
+    });
     Require(file.Take("out.bias", {2}).bytes.size() == 2 * sizeof(float));
     file.RequireAllTaken();
   });

@@ -184,7 +184,9 @@ TEST_F(PolicyProcessTest, StopEndsWhatItStartedToo) {
 }
 
 TEST_F(PolicyProcessTest, WhatItStartedEndsWithIt) {
-  PolicyProcessOptions options = Shell(std::string(kWritePids) + " & sleep 0.3; exit 5");
+  const std::string until_it_ran_away =
+      "read away < $FOLDER/runaway; until test \"$(cut -d ' ' -f 6 /proc/$away/stat)\" = $away; do sleep 0.01; done";
+  PolicyProcessOptions options = Shell(std::string(kWritePids) + " & " + until_it_ran_away + "; exit 5");
   options.restarts = 0;
   PolicyProcess process(options);
   const pid_t child = PidIn("child"), runaway = PidIn("runaway");

@@ -191,6 +191,7 @@ TEST_F(Rollout, AWorldThatShowsWhatNobodyAskedForIsAWorldError) {
 TEST_F(Rollout, ObservationsAreCommandsPlusOneAndTheLimitIsAStopReason) {
   const Episode episode = OnlyEpisode([](Acted plain, std::uint64_t) { return plain; });
   EXPECT_EQ(episode.stop, StopReason::kMaxChunks);
+  EXPECT_EQ(episode.stop_reason, "still moving after 5 chunks, the task's limit");
   EXPECT_EQ(episode.chunks, 5);
   EXPECT_EQ(episode.commands.size(), 5u * kChunk);
   EXPECT_EQ(episode.observations.size(), episode.commands.size() + 1);
@@ -213,6 +214,7 @@ TEST_F(Rollout, APolicyThatGoesSilentFailsItsOwnEpisodeAlone) {
     ++failed;
     EXPECT_EQ(episode.stop, StopReason::kPolicyTimeout);
     EXPECT_EQ(episode.failure, "no answer within 1 s");
+    EXPECT_EQ(episode.stop_reason, "after 2 chunks: no answer within 1 s");
     EXPECT_EQ(episode.chunks, 2);
   }
   EXPECT_EQ(failed, 1);
@@ -258,7 +260,9 @@ TEST_F(Rollout, AStillPolicyEndsItsEpisodeWithTheNumbers) {
   });
   EXPECT_EQ(episode.stop, StopReason::kStill);
   EXPECT_EQ(episode.chunks, 1);
-  EXPECT_THAT(episode.stop_reason, HasSubstr("still for 2 chunks"));
+  EXPECT_EQ(episode.stop_reason,
+            "still for 2 chunks: the commanded gripper moves at most 0.0 mm, 0.000 rad, closure 0.000, the observed "
+            "one is not measured (limits 5.0 mm, 0.050 rad, closure 0.050), after 1 chunks");
 }
 
 TEST_F(Rollout, ALongerChunkIsCutToWhatTheWorldExecutes) {
@@ -278,6 +282,7 @@ TEST_F(Rollout, ARecordingEndsTheEpisodeWithAllItsSteps) {
     return plain;
   });
   EXPECT_EQ(episode.stop, StopReason::kRecordingEnd);
+  EXPECT_EQ(episode.stop_reason, "the recording ended after 11 steps in 3 chunks");
   EXPECT_EQ(episode.commands.size(), 2u * kChunk + 3);
 }
 

@@ -48,6 +48,30 @@ TEST(Still, AClosingGripperIsMotion) {
   EXPECT_FALSE(meter.Rest(At(0, 0), Stay(0, 1), {}));
 }
 
+Arms Turned(double turn_rad, double x_m = 0, double closure = 0) {
+  Arms arms = At(x_m, closure);
+  arms[0].base_from_gripper.rotate(Eigen::AngleAxisd(turn_rad, Eigen::Vector3d::UnitZ()));
+  return arms;
+}
+
+TEST(Still, ATurningHandIsMotion) {
+  const std::vector<Arms> turning = {At(0), Turned(.3)};
+  StillMeter commanded({.dwell_chunks = 1, .min_chunks = 0}), coasting({.dwell_chunks = 1, .min_chunks = 0});
+  EXPECT_FALSE(commanded.Rest(At(0), turning, {}));
+  EXPECT_FALSE(coasting.Rest(At(0), Stay(0), turning));
+  EXPECT_TRUE(coasting.Rest(At(0), Stay(0), Stay(0)));
+}
+
+TEST(Still, TheSentenceSaysHowFarTheCommandAndTheGripperWentAndTheLimits) {
+  StillMeter meter({.translation_m = .006, .rotation_rad = .04, .closure = .05, .dwell_chunks = 2, .min_chunks = 2});
+  const std::vector<Arms> told = {At(0, .1), Turned(.01, .001, .12)}, seen = {At(0, .1), Turned(.02, .002, .13)};
+  EXPECT_FALSE(meter.Rest(At(0, .1), told, seen));
+  EXPECT_FALSE(meter.Rest(At(0, .1), told, seen));
+  EXPECT_EQ(meter.Rest(At(0, .1), told, seen),
+            "still for 3 chunks: the commanded gripper moves at most 1.0 mm, 0.010 rad, closure 0.020, the observed "
+            "one moved 2.0 mm, 0.020 rad, closure 0.030 (limits 6.0 mm, 0.040 rad, closure 0.050), after 2 chunks");
+}
+
 TEST(Still, WhereArmsAreOnlyCommandedTheCommandDecides) {
   StillMeter meter({.dwell_chunks = 1, .min_chunks = 0});
   const auto sentence = meter.Rest(At(0), Stay(.001), {});

@@ -5,6 +5,7 @@
 #include <fstream>
 
 #include "core/error.h"
+#include "core/hash.h"
 #include "harness/suite.h"
 #include "harness/suite_hash.h"
 #include "tests/support/temp_folder.h"
@@ -93,6 +94,28 @@ TEST_F(EvacSuite, ItsHashIsOfTheFilesContentAndOfAllThatDecidesAFrame) {
   Write("c.yaml", "chunk: 4\n");
   Write("w.safetensors", "other weights");
   EXPECT_NE(Read().hash, hash);
+}
+
+TEST_F(EvacSuite, AFileThatWasWrittenToSinceIsNamedWithBothHashes) {
+  const Suite suite = Read();
+  const auto complaint = [&]() -> std::string {
+    try {
+      DemandUnchanged(*suite.worlds.at(0).evac);
+    } catch (const Error& error) {
+      EXPECT_EQ(error.exit_code(), ExitCode::kInvalidInput);
+      return error.what();
+    }
+    return "no complaint";
+  };
+  EXPECT_EQ(complaint(), "no complaint");
+  Write("c.yaml", "chunk: 5\n");
+  EXPECT_THAT(complaint(), AllOf(HasSubstr("c.yaml"), HasSubstr(suite.worlds.at(0).evac->hash)));
+  Write("c.yaml", "chunk: 4\n");
+  EXPECT_EQ(complaint(), "no complaint");
+  const std::string before = Sha256HexOfFile(folder_ / "w.safetensors");
+  Write("w.safetensors", "other weights");
+  EXPECT_THAT(complaint(), AllOf(HasSubstr("w.safetensors"), HasSubstr("wanted " + before),
+                                 HasSubstr("found SHA-256 " + Sha256HexOfFile(folder_ / "w.safetensors"))));
 }
 
 TEST_F(EvacSuite, RealityIsTheSameWhateverTheModelAndThePoliciesAndAnotherWithAnotherWorldOrState) {

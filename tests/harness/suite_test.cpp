@@ -66,6 +66,9 @@ TEST_F(SuiteTest, AWrongTypeSaysWhatWasFoundAndWhatWasWanted) {
 
 TEST_F(SuiteTest, ASecondRealWorldOrATwinPolicyIsRefused) {
   EXPECT_THAT(Complaint(std::string(kSuite), {"policies.1.checkpoint=a"}), HasSubstr("'replay@a' is there twice"));
+  const std::filesystem::path two_worlds = EVAC_SOURCE_DIR "/tests/system/small.yaml";
+  EXPECT_THAT(Complaint(two_worlds, {"worlds.1.role=real"}),
+              AllOf(HasSubstr("field worlds"), HasSubstr("wanted at most one world with role: real")));
 }
 
 TEST_F(SuiteTest, ASeedThatIsThereTwiceIsRefusedBeforeTheSecondEpisodeOfItsName) {
@@ -89,7 +92,12 @@ TEST_F(SuiteTest, AWorldMayTryTheFirstOfTheInitialStatesAlone) {
   EXPECT_EQ(StatesOf(suite, suite.worlds[1])[4].id, suite.initial_states[4].id);
   EXPECT_EQ(AllJobs(suite, suite.worlds[1], suite.policies[0]).size(), 5 * suite.tasks.size() * suite.seeds.size());
   EXPECT_NE(suite.hash, read({}).hash);
-  for (const char* wrong : {"0", "-1", "21"}) EXPECT_THROW(read({fmt::format("worlds.1.initial_states={}", wrong)}), Error) << wrong;
+  for (const auto& [wrong, wanted] :
+       {std::pair("0", "at least 1"), {"-1", "at least 1"}, {"21", "at most the suite's 20"}}) {
+    EXPECT_THAT([&] { read({fmt::format("worlds.1.initial_states={}", wrong)}); },
+                ::testing::ThrowsMessage<Error>(
+                    HasSubstr(fmt::format("initial_states: found '{}', wanted {}", wrong, wanted))));
+  }
 }
 
 TEST_F(SuiteTest, OnlyASimulatedWorldBesideTheRealOneMayGoUnfilmed) {

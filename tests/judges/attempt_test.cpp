@@ -158,9 +158,11 @@ TEST(Attempt, AnObjectThatIsNotThereIsRefusedByName) {
   const Task task = CarryTask();
   const std::string object = "cup";
   PrivilegedTrack track(1);
-  track[0].bodies = {{"gripper", Eigen::Isometry3d::Identity()}, {"thing", Eigen::Isometry3d::Identity()}};
+  for (const char* body : {"finger_left", "finger_right", "gripper", "thing"})
+    track[0].bodies.push_back({body, Eigen::Isometry3d::Identity()});
   const std::vector<Arms> told(1, Arms(1));
-  EXPECT_THROW(Look({task, object, track, told}), Error);
+  EXPECT_THAT([&] { Look({task, object, track, told}); },
+              testing::ThrowsMessage<Error>("the privileged track has no body 'cup'"));
 }
 
 TEST(Attempt, EveryFateHasANameOfItsOwn) {

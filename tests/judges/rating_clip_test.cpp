@@ -126,10 +126,10 @@ TEST(RatingClip, PaddingLeavesTheClipPlayable) {
   VideoWriter writer(folder / "clip.mp4", {});
   for (int k = 0; k < 5; ++k) writer.Append(cv::Mat(48, 64, CV_8UC3, cv::Scalar::all(50)));
   writer.Finish();
-  PadClip(folder / "clip.mp4", 100'000);
+  PadClip(folder / "clip.mp4", 100'000, folder / "clip.mp4");
   EXPECT_EQ(std::filesystem::file_size(folder / "clip.mp4"), 100'000u);
   EXPECT_EQ(ReadAllFrames(folder / "clip.mp4").size(), 5u);
-  EXPECT_THROW(PadClip(folder / "clip.mp4", 50'000), Error);
+  EXPECT_THROW(PadClip(folder / "clip.mp4", 50'000, folder / "clip.mp4"), Error);
 }
 
 }  // namespace

@@ -11,7 +11,7 @@
 #include "judges/rating_tally.h"
 #include "tests/judges/rating_support.h"
 
-/// Every row of rating.md 1.5 that is the server's.
+/// What docs/rating_session.md says becomes of what happens during a session, as far as it is the server's.
 namespace evac {
 namespace {
 
@@ -318,11 +318,14 @@ TEST_F(RatingDeskTest, AdjudicatorsSayWhatTheySeeBeforeTheySeeTheOthers) {
   const std::int64_t decided = store.FindPresentation(clip)->clip;
   RatingTally tally;
   tally.Read(store);
+  int found = 0;
   for (const RatedClip& rated : tally.rated()) {
     if (rated.clip.id != decided) continue;
+    ++found;
     EXPECT_EQ(rated.resolution.how, "adjudicated");
     EXPECT_EQ(rated.resolution.label, Label::kFailure);
   }
+  EXPECT_EQ(found, 1);
   EXPECT_EQ(store.Disputes().size(), 1u) << "the real and the sim clip of one state were split";
   HumanVerdict usurped = ann.Watched(store.PresentationsOf(ann.id)[0].id, "failure");
   usurped.is_final = true;
@@ -418,6 +421,32 @@ TEST(StudyTruth, WhatAKillBeforeTheFirstCommitLeftMakesRoomForAStudy) {
   EXPECT_FALSE(StudyStore::Open(folder.path(), StudyStore::Mode::kReadOnly).Clips().empty());
   EXPECT_THAT([&] { StudyStore::Create(folder.path(), {}); },
               testing::ThrowsMessage<Error>(HasSubstr("there is a study already")));
+}
+
+/// It ended in std::invalid_argument or in a parser's words, without a file.
+TEST(StudyTruth, ADamagedStudyIsRefusedWithItsFile) {
+  const SmallStudy study(1);
+  const std::string file = (study.folder() / "study.sqlite").string();
+  const std::pair<const char*, const char*> damages[] = {
+      {"UPDATE study SET seed='many'", "its seed is 'many'"},
+      {"UPDATE study SET seed='7 '", "its seed is '7 '"},
+      {"UPDATE study SET seed='1'; UPDATE rubrics SET document='{'", "of task take is none"},
+      {"UPDATE rubrics SET document='[]'", "of task take is none"},
+      {"UPDATE rubrics SET document='{\"version\": 1}'", "of task take is none"},
+      {"UPDATE rubrics SET document='{\"stages\": [7]}'", "of task take is none"},
+      {"UPDATE rubrics SET document='{}'; DROP TRIGGER clips_hold; UPDATE clips SET views='[{'",
+       "the views of clip 1 are none"}};
+  for (const auto& [sql, what] : damages) {
+    sqlite::Connection::OpenReadWrite(file).RunScript(sql);
+    try {
+      const StudyStore store = StudyStore::Open(study.folder(), StudyStore::Mode::kReadOnly);
+      store.info(), store.Rubrics(), store.Clips();
+      ADD_FAILURE() << sql;
+    } catch (const Error& error) {
+      EXPECT_EQ(error.exit_code(), ExitCode::kInvalidInput);
+      EXPECT_THAT(error.what(), testing::AllOf(HasSubstr(file + ": the study is damaged"), HasSubstr(what))) << sql;
+    }
+  }
 }
 
 TEST(StudyTruth, VerdictsAndClipsCannotBeChangedOrDeleted) {

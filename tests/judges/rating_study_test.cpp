@@ -7,6 +7,9 @@
 #include <set>
 
 #include "core/error.h"
+#include "core/file.h"
+#include "core/secret.h"
+#include "core/store_lock.h"
 #include "core/video.h"
 #include "tests/reports/stored_run.h"
 
@@ -126,6 +129,59 @@ TEST(RatingStudy, AWaveWithAWiderTaskIsMadeSmallerInsteadOfEndingInAnAssertion) 
   EXPECT_FALSE(IsBlack(picture, 85, 64));
   EXPECT_FALSE(IsBlack(picture, 85, 30)) << "as large as it fits: 168x84";
   EXPECT_TRUE(IsBlack(picture, 85, 8));
+}
+
+/// It began anew, and the clips that were encoded stayed for ever.
+TEST(RatingStudy, ACallThatWasBrokenOffGoesOnAndLeavesNothingBehind) {
+  StoredRun run("broken", "sf", "fs");
+  const fs::path whole = run.folder().parent_path() / "whole", folder = run.folder().parent_path() / "study";
+  const StudyOptions options{.runs = {run.folder()}, .height_px = 64};
+  Make(whole, options);
+  struct BrokenOff {};
+  const auto break_off = [](std::size_t done, std::size_t) {
+    if (done == 3) throw BrokenOff();
+  };
+  EXPECT_THROW(MakeStudy(folder, options, break_off), BrokenOff);
+  EXPECT_FALSE(StudyStore::IsIn(folder));
+  WriteFileAtomically(folder / "clips" / (NewSecret() + ".mp4"), "of a call that an earlier evac broke off");
+  const std::vector<Episode> episodes = run.store().Episodes();
+  for (std::size_t i = 0; i < 3; ++i) fs::remove(run.folder() / episodes[i].video);  // encoded already: not read again
+  EXPECT_EQ(Make(folder, options).clips, 4);
+  const std::vector<StudyClip> clips = ClipsIn(folder), wanted = ClipsIn(whole);
+  std::set<fs::path> named, there;
+  for (std::size_t i = 0; i < clips.size(); ++i) {
+    named.insert(folder / clips[i].file);
+    EXPECT_EQ(clips[i].episode, wanted.at(i).episode);
+    EXPECT_EQ(clips[i].frames, wanted.at(i).frames);
+    EXPECT_EQ(clips[i].video_sha256, wanted.at(i).video_sha256);
+    EXPECT_NE(clips[i].file, wanted.at(i).file) << "who knows one study knows no name of another's clips";
+  }
+  for (const auto& entry : fs::directory_iterator(folder / "clips")) there.insert(entry.path());
+  EXPECT_EQ(there, named);
+}
+
+TEST(RatingStudy, ASecondCallAtOnceIsRefusedBeforeItsHour) {
+  StoredRun run("twice", "s", "f");
+  const fs::path folder = run.folder().parent_path() / "study";
+  MakeFolders(folder);
+  const RunLock lock(folder / "new.lock");
+  EXPECT_THAT([&] { Make(folder, {.runs = {run.folder()}, .height_px = 64}); },
+              testing::ThrowsMessage<Error>(HasSubstr("is writing here")));
+}
+
+/// It was left out as one whose clip is there already, and votes on that clip would have been taken for votes on it.
+TEST(RatingStudy, AnEpisodeThatIsAnotherByNowIsRefusedWithBothVideos) {
+  StoredRun run("run", "s", "f"), other("other", "s", "f", 16);
+  const fs::path folder = run.folder().parent_path() / "study";
+  Make(folder, {.runs = {run.folder()}, .height_px = 64});
+  const std::string before = run.store().Episodes().front().video_sha256;
+  const std::string after = other.store().Episodes().front().video_sha256;
+  { const Store closed = std::move(run.store()), too = std::move(other.store()); }
+  fs::remove_all(run.folder());
+  fs::copy(other.folder(), run.folder(), fs::copy_options::recursive);
+  EXPECT_THAT([&] { Make(folder, {.runs = {run.folder()}}); },
+              testing::ThrowsMessage<Error>(testing::AllOf(HasSubstr(before), HasSubstr(after))));
+  EXPECT_EQ(ClipsIn(folder).size(), 2u);
 }
 
 TEST(RatingStudy, ATaskThatFitsIntoNoClipOfTheStudyIsRefusedByName) {

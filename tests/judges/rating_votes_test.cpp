@@ -84,6 +84,8 @@ TEST(Agreement, RawAgreementStaysHighWhereKappaFalls) {
   ASSERT_TRUE(agreement.interval);
   EXPECT_LE(agreement.interval->low, *agreement.alpha);
   EXPECT_GE(agreement.interval->high, *agreement.alpha);
+  EXPECT_GT(agreement.dropped_replicates, 40) << "a third of 200 draws hold the one split clip not once";
+  EXPECT_LT(agreement.dropped_replicates, 110);
 }
 
 TEST(Agreement, AlphaIsKrippendorffsAlsoWhereRatersSawDifferentClips) {

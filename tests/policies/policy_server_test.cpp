@@ -4,10 +4,12 @@
 #include <signal.h>
 #include <sys/wait.h>
 
+#include <stdexcept>
+
 #include "core/file.h"
 #include "policies/messages.h"
 #include "tests/policies/wire_support.h"
-#include "tests/support/command.h"
+#include "tests/support/child.h"
 #include "tests/support/temp_folder.h"
 
 namespace evac {
@@ -26,6 +28,15 @@ episode_start_t StartOf(const Task& task, const std::string& client, std::int64_
   return start;
 }
 
+/// Hears what comes until it is true. @throws std::runtime_error where nothing comes that makes it so.
+template <typename IsTrue>
+void HearUntil(LcmLink& link, const IsTrue& is_true) {
+  for (int waits = 0; !is_true(); ++waits) {
+    if (waits == 1200) throw std::runtime_error("what the test waits for never came");
+    link.Handle(0.1);
+  }
+}
+
 /// A harness of bare messages: what the server sends is kept as bytes.
 class BareClient {
  public:
@@ -38,7 +49,7 @@ class BareClient {
   void Start(std::int64_t episode, int lane, const Task& task) {
     const std::size_t before = started.size();
     link_.Publish(address_.Channel("start"), StartOf(task, name_, episode, lane));
-    while (started.size() == before) link_.Handle(0.1);
+    HearUntil(link_, [&] { return started.size() > before; });
   }
 
   observation_t Header(std::int64_t episode, std::int64_t request, const Observation& observation) const {
@@ -69,9 +80,13 @@ class BareClient {
     link_.Publish(address_.Channel(message), content);
   }
 
+  void SendBytes(const std::string& message, std::span<const std::uint8_t> bytes) {
+    link_.PublishBytes(address_.Channel(message), bytes);
+  }
+
   chunk_t NextChunk() {
     const std::size_t before = chunks.size();
-    while (chunks.size() == before) link_.Handle(0.1);
+    HearUntil(link_, [&] { return chunks.size() > before; });
     return chunks.back();
   }
 
@@ -220,6 +235,27 @@ TEST_F(PolicyServerTest, ImagesThatAreNotTheTasksAreAnErrorReply) {
   EXPECT_THAT(client.NextChunk().error, testing::HasSubstr("4607 bytes, wanted 4608 for 48x32 RGB"));
 }
 
+TEST_F(PolicyServerTest, BytesThatAreNoMessageAreCountedAndHarmNoRequest) {
+  const LcmAddress address = wire::OwnAddress();
+  wire::ProbePolicy probe;
+  wire::Served served(probe, wire::ProbeSpec(), address);
+  BareClient client(address);
+  client.Start(0, 0, task_);
+  const std::vector<std::uint8_t> zeros(40);
+  for (const char* message : {"hello", "start", "observation", "image", "bye"}) client.SendBytes(message, zeros);
+  std::vector<std::uint8_t> cut = Encoded(client.Header(0, 0, observation_));
+  cut.pop_back();
+  client.SendBytes("observation", cut);
+  client.Send("image", client.Image(0, 0, 16, observation_.images[1]));  // one more than a task may have
+  client.Send("observation", client.Header(0, 0, observation_));
+  for (int i = 0; i < 2; ++i) client.Send("image", client.Image(0, 0, i, observation_.images[i]));
+  EXPECT_EQ(client.NextChunk().error, "");
+  EXPECT_EQ(probe.seen().at(0).observations.size(), 1u);
+  const Counters counters = served.counters();
+  EXPECT_EQ(Count(counters, "undecodable_messages"), 7);
+  EXPECT_EQ(Count(counters, "errors"), 0);
+}
+
 TEST_F(PolicyServerTest, WhatWaitsBehindAStopIsNotAnswered) {
   struct OnceOnly final : wire::ProbePolicy {
     void Reset(SceneId scene, const Task& task, std::uint64_t seed) override {
@@ -235,7 +271,7 @@ TEST_F(PolicyServerTest, WhatWaitsBehindAStopIsNotAnswered) {
   int heard = 0;
   link.Subscribe(address.Channel("start"), [&](const std::string&, auto) { ++heard; });
   for (const int lane : {0, 1, 2}) link.Publish(address.Channel("start"), StartOf(task_, "bare", lane, lane));
-  while (heard < 3) link.Handle(0.1);
+  HearUntil(link, [&] { return heard == 3; });
   server.Run();
   EXPECT_EQ(Count(server.counters(), "resets"), 1);
 }
@@ -243,8 +279,8 @@ TEST_F(PolicyServerTest, WhatWaitsBehindAStopIsNotAnswered) {
 TEST_F(PolicyServerTest, AServedPolicyLeavesOnSigtermWithExitCodeZero) {
   const LcmAddress address = wire::OwnAddress();
   const TempFolder folder;
-  const pid_t child = StartCommand({Binary("evac-policy"), "hold", "--chunk-size", "4", "--url", address.url, "--token", address.token},
-                                   folder / "policy.log");
+  Child child({Binary("evac-policy"), "hold", "--chunk-size", "4", "--url", address.url, "--token", address.token},
+              folder / "policy.log");
   {
     LcmPolicy policy({.address = address});
     policy.Handshake(HarnessSpec(task_, 4), 60);
@@ -256,9 +292,7 @@ TEST_F(PolicyServerTest, AServedPolicyLeavesOnSigtermWithExitCodeZero) {
     EXPECT_EQ(targets.size(), 4u);
     EXPECT_TRUE(targets[3][0].base_from_gripper.isApprox(observation_.arms[0].base_from_gripper));
   }
-  ::kill(child, SIGTERM);
-  int status = -1;
-  ::waitpid(child, &status, 0);
+  const int status = child.End(SIGTERM);
   EXPECT_TRUE(WIFEXITED(status));
   EXPECT_EQ(WEXITSTATUS(status), 0) << ReadFile(folder / "policy.log");
 }

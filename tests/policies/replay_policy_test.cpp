@@ -1,5 +1,6 @@
 #include "policies/replay_policy.h"
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include "core/error.h"
@@ -79,11 +80,15 @@ TEST(ReplayPolicy, AnotherRobotOrRateIsRefused) {
   ReplayPolicy policy(Counting(8), 3);
   Task task;
   task.arms = {"left", "right"};
-  EXPECT_THROW(policy.Reset(0, task, 1), Error);
-  task = Task();
-  task.period_s = 1.0 / 30;
-  EXPECT_THROW(policy.Reset(0, task, 1), Error);
-  EXPECT_THROW(ReplayPolicy(Counting(1), 3), Error);
+  task.id = "take";
+  const auto refuses = [](const char* message) { return testing::ThrowsMessage<Error>(message); };
+  EXPECT_THAT([&] { policy.Reset(0, task, 1); },
+              refuses("recording counting: its arms are right, task take has left, right"));
+  task.arms = {"right"};
+  task.period_s = 0.05;
+  EXPECT_THAT([&] { policy.Reset(0, task, 1); },
+              refuses("recording counting: its period is 0.1 s, task take has 0.05 s"));
+  EXPECT_THAT([] { ReplayPolicy(Counting(1), 3); }, refuses("recording counting: 1 steps, wanted at least 2"));
 }
 
 }  // namespace

@@ -1,6 +1,7 @@
 #include "tests/support/command.h"
 
 #include <fcntl.h>
+#include <signal.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -16,6 +17,7 @@ pid_t Start(const std::vector<std::string>& words, const std::filesystem::path& 
   arguments.push_back(nullptr);
   const pid_t pid = ::fork();
   if (pid != 0) return pid;
+  HearInterrupts();
   ::dup2(::open("/dev/null", O_RDONLY), 0);
   ::dup2(::open(out.c_str(), O_WRONLY | O_CREAT | O_APPEND, 0644), 1);
   ::dup2(::open(err.c_str(), O_WRONLY | O_CREAT | O_APPEND, 0644), 2);
@@ -24,6 +26,10 @@ pid_t Start(const std::vector<std::string>& words, const std::filesystem::path& 
 }
 
 }  // namespace
+
+void HearInterrupts() {
+  for (const int number : {SIGINT, SIGTERM, SIGHUP}) ::signal(number, SIG_DFL);
+}
 
 pid_t StartCommand(const std::vector<std::string>& words, const std::filesystem::path& log) { return Start(words, log, log); }
 

@@ -13,6 +13,10 @@ struct CommandResult {
   std::string out, err;
 };
 
+/// In a process that is to become a program under test: interrupts do what they do on a terminal, whatever the caller
+/// of the tests ignores (a script's `&` ignores Ctrl-C, `nohup` the closed terminal).
+void HearInterrupts();
+
 /// Runs a program to its end. @param words  the program (absolute) and its arguments.
 CommandResult RunCommand(const std::vector<std::string>& words);
 

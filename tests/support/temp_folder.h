@@ -9,8 +9,10 @@ namespace evac {
 /// A folder of the test's own, gone with it.
 class TempFolder {
  public:
-  TempFolder() {
-    std::string pattern = (std::filesystem::temp_directory_path() / "evac-test-XXXXXX").string();
+  TempFolder() : TempFolder(std::filesystem::temp_directory_path()) {}
+  /// @param where  a folder that is there
+  explicit TempFolder(const std::filesystem::path& where) {
+    std::string pattern = (where / "evac-test-XXXXXX").string();
     path_ = ::mkdtemp(pattern.data());
   }
   ~TempFolder() {

@@ -4,6 +4,7 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <nlohmann/json.hpp>
 #include <set>
 
 #include "apps/collect_recipe.h"
@@ -264,6 +265,26 @@ TEST(CollectCommand, RefusesAFolderThatHoldsAnotherCollection) {
   EXPECT_THAT(other.err, HasSubstr("holds another collection"));
 }
 
+/// After an upgrade the same command went on without a word: one collection of two versions.
+TEST(CollectCommand, SaysThatAnotherVersionOfEvacBeganIt) {
+  const TempFolder folder;
+  const fs::path claim = folder / "a/collection.json";
+  const auto collect = [&] {
+    const CommandResult collected = RunCommand(Words(folder / "a", {"--episodes", "1"}));
+    EXPECT_EQ(collected.exit_code, 0) << collected.err;
+    return collected.err;
+  };
+  collect();
+  EXPECT_THAT(collect(), Not(HasSubstr("was begun by")));
+  nlohmann::ordered_json page = nlohmann::ordered_json::parse(ReadFile(claim));
+  page["evac_version"] = "0.0.1";
+  WriteFileAtomically(claim, page.dump(2) + "\n");
+  EXPECT_THAT(collect(), HasSubstr("evac: note: " + (folder / "a").string() + " was begun by evac 0.0.1; evac "));
+  page.erase("evac_version");
+  WriteFileAtomically(claim, page.dump(2) + "\n");
+  EXPECT_THAT(collect(), HasSubstr("was begun by an evac that did not write down its version"));
+}
+
 TEST(Recipe, GrowsWithoutChangingWhatIsThere) {
   const Recipe few = ReadRecipe(kRecipe, {"episodes=10"}), many = ReadRecipe(kRecipe, {"episodes=5000"});
   EXPECT_EQ(few.hash, many.hash);
@@ -318,6 +339,28 @@ TEST(Recipe, AMistakeIsNamedWithItsFieldBeforeAnythingRuns) {
   };
   EXPECT_THAT(with("policy_0.safetensors"), HasSubstr("policy_0.safetensors"));
   EXPECT_THAT(with("judge.safetensors"), HasSubstr("judge.safetensors"));
+}
+
+/// Each episode reads it anew: one collection held two policies under one hash.
+TEST(Recipe, ACheckpointThatIsWrittenToMeanwhileIsRefused) {
+  const TempFolder folder;
+  const std::string weights = EVAC_SOURCE_DIR "/worldmodel/weights/desk/";
+  const fs::path latest = folder / "latest.safetensors";
+  fs::copy_file(weights + "policy_000500.safetensors", latest);
+  const Recipe recipe =
+      ReadRecipe(kRecipe, {"mix=[{name: a, share: 1, policy: learned, checkpoint: " + latest.string() + "}]"});
+  const CollectJob job = JobAt(recipe, 1, 0);
+  EXPECT_NE(MakePolicy(job, recipe.chunk_size), nullptr);
+  fs::copy_file(weights + "policy_001000.safetensors", latest, fs::copy_options::overwrite_existing);
+  try {
+    MakePolicy(job, recipe.chunk_size);
+    ADD_FAILURE() << "it goes on with another policy";
+  } catch (const Error& error) {
+    EXPECT_EQ(error.exit_code(), ExitCode::kInvalidInput);
+    EXPECT_THAT(error.what(),
+                testing::AllOf(HasSubstr(latest.string()), HasSubstr("found SHA-256 " + Sha256HexOfFile(latest)),
+                               HasSubstr("wanted " + Sha256HexOfFile(weights + "policy_000500.safetensors"))));
+  }
 }
 
 }  // namespace

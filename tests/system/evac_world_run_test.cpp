@@ -13,6 +13,7 @@
 #include "core/seed.h"
 #include "tests/support/command.h"
 #include "tests/support/temp_folder.h"
+#include "tests/system/killed_run.h"
 #include "tests/system/run_support.h"
 #include "worldmodel/action_statistics.h"
 #include "worldmodel/evac_config.h"
@@ -23,8 +24,11 @@ namespace evac {
 namespace {
 
 namespace fs = std::filesystem;
+using system_test::KillOnce;
 using system_test::List;
+using system_test::MadeAnew;
 using system_test::RunWords;
+using system_test::VideoTimes;
 using testing::HasSubstr;
 
 const std::string kImagined = EVAC_SOURCE_DIR "/tests/system/imagined.yaml";
@@ -69,6 +73,16 @@ TEST_F(ImaginedRun, HasTheSameFramesWithOneLaneAndWithEight) {
     EXPECT_EQ(Sha256HexOfFile(one / episode["video"].get<std::string>()), episode["video_sha256"]);
 }
 
+/// Of those that were imagined: a file of the cache per chunk.
+bool IsAnyKept(const fs::path& cache) {
+  std::error_code error;
+  for (auto file = fs::recursive_directory_iterator(cache, error); !error && file != fs::recursive_directory_iterator();
+       file.increment(error)) {
+    if (file->path().extension() == ".safetensors") return true;
+  }
+  return false;
+}
+
 TEST_F(ImaginedRun, AfterAnyKillIsThatOfAnUninterruptedRun) {
   const fs::path whole = folder_ / "whole", killed = folder_ / "killed";
   const auto begin = std::chrono::steady_clock::now();
@@ -76,9 +90,13 @@ TEST_F(ImaginedRun, AfterAnyKillIsThatOfAnUninterruptedRun) {
   ASSERT_EQ(straight.exit_code, 0) << straight.err;
   const double whole_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
   SplitMix64 random(23);
-  const auto words =
-      RunWords(kImagined, killed, Settings({"worlds.1.cache={folder: " + (folder_ / "cache").string() + "}"}));
-  for (int kill = 0; kill < 3; ++kill) {
+  const auto words = RunWords(
+      kImagined, killed, Settings({"worlds.1.cache={folder: " + (folder_ / "cache").string() + "}", "lanes=1"}));
+  // The first one when the first chunk of one episode after the other was imagined, the others wherever they come.
+  KillOnce([&] { return IsAnyKept(folder_ / "cache"); }, words, folder_ / "log");
+  const auto finished = VideoTimes(killed);
+  EXPECT_THAT(finished.size(), testing::AllOf(testing::Ge(4u), testing::Lt(8u))) << "four real ones, not all imagined";
+  for (int kill = 1; kill < 3; ++kill) {
     const pid_t pid = StartCommand(words, folder_ / "log");
     std::this_thread::sleep_for(std::chrono::duration<double>(random.Uniform(0.2, 0.9) * whole_s));
     ::kill(pid, SIGKILL);
@@ -87,6 +105,7 @@ TEST_F(ImaginedRun, AfterAnyKillIsThatOfAnUninterruptedRun) {
   const CommandResult last = RunCommand(words);
   ASSERT_EQ(last.exit_code, 0) << last.err;
   EXPECT_EQ(List(killed), List(whole)) << "also when chunks come from the cache";
+  EXPECT_THAT(MadeAnew(finished, killed), testing::IsEmpty()) << "what was stored is kept";
 }
 
 TEST_F(ImaginedRun, NeedsTheRealOneFirst) {
@@ -98,6 +117,23 @@ TEST_F(ImaginedRun, NeedsTheRealOneFirst) {
   } catch (const Error& error) {
     EXPECT_THAT(error.what(),
                 HasSubstr("nobody has seen task take_bottle, initial state 3-0000: run the real world first"));
+  }
+}
+
+/// Their frames were stored, and cached, under the hash of the weights that the suite named.
+TEST_F(ImaginedRun, WeightsThatWereWrittenToBeforeTheWorldsTurnAreRefused) {
+  const Suite suite = ReadSuite(kImagined, Settings());
+  EXPECT_NE(MakeWorld(suite.worlds[1], suite, nullptr), nullptr);
+  const std::string before = Sha256HexOfFile(weights_);
+  nn::RandomWeights later(6);
+  nn::SaveWeights(weights_, later, ReadEvacConfig(kSmallNetwork));
+  try {
+    MakeWorld(suite.worlds[1], suite, nullptr);
+    ADD_FAILURE() << "the run would go on with other weights";
+  } catch (const Error& error) {
+    EXPECT_EQ(error.exit_code(), ExitCode::kInvalidInput);
+    EXPECT_THAT(error.what(), testing::AllOf(HasSubstr(weights_.string()), HasSubstr("wanted " + before),
+                                             HasSubstr("found SHA-256 " + Sha256HexOfFile(weights_))));
   }
 }
 

@@ -14,6 +14,7 @@
 #include "tests/support/command.h"
 #include "tests/support/synthetic_recording.h"
 #include "tests/support/temp_folder.h"
+#include "tests/system/killed_run.h"
 #include "tests/system/process_support.h"
 #include "tests/system/run_support.h"
 #include "worldmodel/evac_config.h"
@@ -35,20 +36,15 @@ class FidelityRun : public testing::Test {
     nn::SaveWeights(weights_, random, ReadEvacConfig(EVAC_SOURCE_DIR "/tests/system/evac_small.yaml"));
   }
 
-  std::vector<std::string> Words(const fs::path& out) const {
-    return {Binary("evac"),
-            "fidelity",
-            kSuite,
-            "--out",
-            out.string(),
-            "--set",
-            "worlds.2.weights=" + weights_.string(),
-            "--counterfactual-states",
-            "1",
-            "--horizon-states",
-            "1",
-            "--horizon-chunks",
-            "3"};
+  /// @param parts  those that are asked for; empty: all
+  std::vector<std::string> Words(const fs::path& out, const std::string& parts = "") const {
+    std::vector<std::string> words = {Binary("evac"), "fidelity", kSuite, "--out", out.string(), "--set",
+                                      "worlds.2.weights=" + weights_.string()};
+    const auto asks = [&](const char* part) { return parts.empty() || parts.find(part) != std::string::npos; };
+    if (!parts.empty()) words.insert(words.end(), {"--parts", parts});
+    if (asks("counterfactual")) words.insert(words.end(), {"--counterfactual-states", "1"});
+    if (asks("horizon")) words.insert(words.end(), {"--horizon-states", "1", "--horizon-chunks", "3"});
+    return words;
   }
 
   /// The same suite with a second policy, which misses.
@@ -118,9 +114,7 @@ Arms FirstArmsIn(const fs::path& out, const std::string& world) {
 
 TEST_F(FidelityRun, AsksEveryPartAndEndsInTheSameNumbersWhenItWasKilled) {
   const fs::path whole = folder_ / "whole", killed = folder_ / "killed";
-  const auto begin = std::chrono::steady_clock::now();
   const CommandResult straight = RunCommand(Words(whole));
-  const double whole_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
   ASSERT_EQ(straight.exit_code, 0) << straight.err;
   EXPECT_THAT(straight.err, HasSubstr("nobody judges the imagined clips"));
 
@@ -148,13 +142,14 @@ TEST_F(FidelityRun, AsksEveryPartAndEndsInTheSameNumbersWhenItWasKilled) {
   EXPECT_EQ(numbers["horizon"]["psnr_moving_by_chunk"].size(), 3u);
   EXPECT_TRUE(fs::exists(whole / "index.html"));
 
-  const pid_t pid = StartCommand(Words(killed), folder_ / "log");
-  std::this_thread::sleep_for(std::chrono::duration<double>(0.4 * whole_s));
-  ::kill(pid, SIGKILL);
-  ::waitpid(pid, nullptr, 0);
+  system_test::KillOnce([&] { return system_test::Stored(killed / "open") > 0; }, Words(killed), folder_ / "log");
+  const auto finished = system_test::VideoTimes(killed / "closed");
+  EXPECT_EQ(finished.size(), system_test::VideoTimes(whole / "closed").size());
+  EXPECT_FALSE(fs::exists(killed / "episodes.csv")) << "it had ended before it was killed";
   const CommandResult last = RunCommand(Words(killed));
   ASSERT_EQ(last.exit_code, 0) << last.err;
   EXPECT_EQ(Numbers(killed), numbers);
+  EXPECT_TRUE(system_test::MadeAnew(finished, killed / "closed").empty()) << "what was stored is kept";
   EXPECT_EQ(ReadFile(killed / "episodes.csv"), ReadFile(whole / "episodes.csv"));
 
   // Asked about the same reality again, it does not wait for that again, imagines anew, and ends in the same numbers.
@@ -180,8 +175,7 @@ TEST_F(FidelityRun, AsksEveryPartAndEndsInTheSameNumbersWhenItWasKilled) {
 /// They began from the suite's state, not from what that state is on the task: actions of one scene were done in another.
 TEST_F(FidelityRun, ReplaysInRealityStartFromTheSceneThatTheirActionsAreOf) {
   const fs::path out = folder_ / "out";
-  std::vector<std::string> words = Words(out);
-  words.insert(words.end(), {"--parts", "executed,counterfactual,horizon"});
+  std::vector<std::string> words = Words(out, "executed,counterfactual,horizon");
   const CommandResult result = RunCommand(words);
   ASSERT_EQ(result.exit_code, 0) << result.err;
   const Eigen::Vector3d bottle = FirstPlaceOfTheBottleIn(out / "closed");
@@ -191,8 +185,8 @@ TEST_F(FidelityRun, ReplaysInRealityStartFromTheSceneThatTheirActionsAreOf) {
   // Replays that began elsewhere, as those of an earlier evac did, are not taken over; their scene is told by their suite's hash.
   fs::remove_all(out / "counterfactual_shifted");
   fs::copy(out / "closed", out / "counterfactual_shifted", fs::copy_options::recursive);
-  words = Words(folder_ / "later");
-  words.insert(words.end(), {"--parts", "counterfactual", "--reality", out.string()});
+  words = Words(folder_ / "later", "counterfactual");
+  words.insert(words.end(), {"--reality", out.string()});
   const CommandResult later = RunCommand(words);
   ASSERT_EQ(later.exit_code, 0) << later.err;
   EXPECT_THAT(later.err, HasSubstr("counterfactual_shifted: its replays began in other scenes than their actions are of"));
@@ -212,8 +206,8 @@ TEST_F(FidelityRun, InterruptedItSaysThatTheSameCommandGoesOn) {
 }
 
 TEST_F(FidelityRun, AClassifierJudgesTheClipsAndSaysHowFarItIs) {
-  std::vector<std::string> words = Words(folder_ / "out");
-  words.insert(words.end(), {"--parts", "closed", "--classifier", EVAC_SOURCE_DIR "/worldmodel/weights/desk/judge.safetensors",
+  std::vector<std::string> words = Words(folder_ / "out", "closed");
+  words.insert(words.end(), {"--classifier", EVAC_SOURCE_DIR "/worldmodel/weights/desk/judge.safetensors",
                              "--set", "judges=[]"});
   const CommandResult result = RunCommand(words);
   ASSERT_EQ(result.exit_code, 0) << result.err;
@@ -226,8 +220,11 @@ TEST_F(FidelityRun, AClassifierJudgesTheClipsAndSaysHowFarItIs) {
   std::getline(rows, head) && std::getline(rows, row);
   EXPECT_THAT(row, testing::StartsWith("closed_loop,take_bottle,visual_pick,good,3-0000,1,1,1,"));
   EXPECT_FALSE(fs::exists(folder_ / "out" / "masked")) << "painted clips are not kept";
+  MakeFolders(folder_ / "out" / "masked");
+  WriteFileAtomically(folder_ / "out" / "masked" / "own.txt", "mine");
   const CommandResult again = RunCommand(words);
   ASSERT_EQ(again.exit_code, 0) << again.err;
+  EXPECT_EQ(ReadFile(folder_ / "out" / "masked" / "own.txt"), "mine") << "the folder went with all that was in it";
   EXPECT_THAT(again.err, Not(HasSubstr(":masked"))) << "no clip is painted twice";
   EXPECT_EQ(Numbers(folder_ / "out"), numbers);
 }
@@ -236,9 +233,8 @@ TEST_F(FidelityRun, AClassifierJudgesTheClipsAndSaysHowFarItIs) {
 TEST_F(FidelityRun, TakesOverWhatPoliciesThatBothSuitesHaveDid) {
   const fs::path one = folder_ / "one", two = folder_ / "two", back = folder_ / "back";
   const auto words = [&](const fs::path& out, const std::string& suite, const fs::path& reality) {
-    std::vector<std::string> words = Words(out);
+    std::vector<std::string> words = Words(out, "open");
     words[2] = suite;
-    words.insert(words.end(), {"--parts", "open"});
     if (!reality.empty()) words.insert(words.end(), {"--reality", reality.string()});
     return words;
   };
@@ -310,17 +306,42 @@ void WriteRecordings(const fs::path& root) {
   }
 }
 
-TEST_F(FidelityRun, OfRecordingsComparesPicturesAndSaysWhatWasLeftOut) {
-  WriteRecordings(folder_ / "mine");
-  nn::RandomWeights random(5);
-  nn::SaveWeights(weights_, random, ReadEvacConfig(EVAC_SOURCE_DIR "/tests/system/evac_small.yaml"),
-                  {.metadata = {{"arms", "left,right"}}});
+/// With recordings of its own, and weights of both arms.
+class RecordedFidelityRun : public FidelityRun {
+ protected:
+  RecordedFidelityRun() {
+    WriteRecordings(folder_ / "mine");
+    nn::RandomWeights random(5);
+    nn::SaveWeights(weights_, random, ReadEvacConfig(EVAC_SOURCE_DIR "/tests/system/evac_small.yaml"),
+                    {.metadata = {{"arms", "left,right"}}});
+  }
+
+  CommandResult Run(const fs::path& out, const std::vector<std::string>& assignments = {}) const {
+    std::vector<std::string> words = {
+        Binary("evac"), "fidelity", EVAC_SOURCE_DIR "/apps/configs/fidelity_recordings.yaml", "--out", out.string(),
+        "--set", "recording=" + (folder_ / "mine").string(), "--set", "worlds.1.weights=" + weights_.string(), "--set",
+        "worlds.1.config=" EVAC_SOURCE_DIR "/tests/system/evac_small.yaml", "--set",
+        "worlds.1.statistics=" EVAC_SOURCE_DIR "/apps/configs/robots/agibotworld.yaml"};
+    for (const std::string& assignment : assignments) words.insert(words.end(), {"--set", assignment});
+    return RunCommand(words);
+  }
+};
+
+TEST_F(RecordedFidelityRun, ReplaysAsManyAndAsLongAsTheSuiteSays) {
   const fs::path out = folder_ / "out";
-  const CommandResult result = RunCommand(
-      {Binary("evac"), "fidelity", EVAC_SOURCE_DIR "/apps/configs/fidelity_recordings.yaml", "--out", out.string(),
-       "--set", "recording=" + (folder_ / "mine").string(), "--set", "worlds.1.weights=" + weights_.string(), "--set",
-       "worlds.1.config=" EVAC_SOURCE_DIR "/tests/system/evac_small.yaml", "--set",
-       "worlds.1.statistics=" EVAC_SOURCE_DIR "/apps/configs/robots/agibotworld.yaml"});
+  const CommandResult result = Run(out, {"initial_states={count: 1}", "max_chunks=1"});
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  const nlohmann::json numbers = Numbers(out);
+  EXPECT_EQ(numbers["parts"][0]["episodes"], 2) << "one recording, and what the model imagined of it";
+  EXPECT_EQ(numbers["open_loop"]["psnr_by_chunk"].size(), 2u) << "one chunk of 16 actions, two of the network's";
+  const CommandResult three = Run(folder_ / "three", {"initial_states={count: 3}"});
+  EXPECT_EQ(three.exit_code, 2) << three.err;
+  EXPECT_THAT(three.err, HasSubstr("field initial_states.count: found 3, wanted at most 2: so many recordings of"));
+}
+
+TEST_F(RecordedFidelityRun, ComparesPicturesAndSaysWhatWasLeftOut) {
+  const fs::path out = folder_ / "out";
+  const CommandResult result = Run(out);
   ASSERT_EQ(result.exit_code, 0) << result.err;
   EXPECT_THAT(result.err, HasSubstr("2 recordings left out: 1 other_robot, 1 too_short"));
   EXPECT_THAT(result.err, HasSubstr("one_armed: found arms right, wanted left, right"));

@@ -165,6 +165,9 @@ TEST_F(GateCommand, APinnedFileIsWrittenWithTheFoldersAboveIt) {
   const CommandResult in_a_file = Evac({"gate", "pin", Path("main"), "--out", Path("gate.yaml/baseline.json")});
   EXPECT_EQ(in_a_file.exit_code, 2) << in_a_file.err;
   EXPECT_THAT(in_a_file.err, HasSubstr(Path("gate.yaml") + ":"));
+  const CommandResult over_a_folder = Evac({"gate", "pin", Path("main"), "--out", Path("new/folder")});
+  EXPECT_EQ(over_a_folder.exit_code, 2) << over_a_folder.err;
+  EXPECT_THAT(over_a_folder.err, HasSubstr(Path("new/folder") + ": is a folder, wanted a file"));
 }
 
 TEST_F(GateCommand, AJudgeWhoGaveNoVerdictIsInvalidAndNotInconclusive) {

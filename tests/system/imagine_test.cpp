@@ -13,6 +13,7 @@
 #include "core/file.h"
 #include "core/hash.h"
 #include "core/recording_writer.h"
+#include "core/store_lock.h"
 #include "core/tensor_file.h"
 #include "core/video.h"
 #include "tests/support/command.h"
@@ -200,6 +201,76 @@ TEST_F(ImagineCommand, MapsWrittenAgainReplaceTheOldOnesWhole) {
   ASSERT_EQ(RunCommand(Words("maps", {"--maps-only", "--stride", "1", "--chunks", "1"})).exit_code, 0);
   EXPECT_EQ(Files("maps").size(), 3u);
   EXPECT_FALSE(fs::exists(folder_ / "maps/maps.old"));
+}
+
+/// maps, maps.old and maps.tmp went, whoever's they were.
+TEST_F(ImagineCommand, SomebodysFilesWhereMapsWouldBeAreRefusedAndStay) {
+  for (const char* name : {"out/maps/own.txt", "out/maps/frame_1.png", "out/maps.tmp/frame_00000.png"}) {
+    WriteText(folder_ / name, "mine");
+    for (const auto& words : {Words("out", {"--maps-only"}), Frames("out")}) {
+      const CommandResult result = RunCommand(words);
+      EXPECT_EQ(result.exit_code, 2) << result.err;
+      EXPECT_THAT(result.err, HasSubstr((folder_ / name).parent_path().string() + ":"));
+      EXPECT_EQ(ReadFile(folder_ / name), "mine");
+    }
+    fs::remove_all(folder_ / "out");
+  }
+  WriteText(folder_ / "out/maps.old/frame_00000.png", "mine");
+  ASSERT_EQ(RunCommand(Words("out", {"--maps-only"})).exit_code, 0);
+  ASSERT_EQ(RunCommand(Words("out", {"--maps-only"})).exit_code, 0);
+  EXPECT_EQ(ReadFile(folder_ / "out/maps.old/frame_00000.png"), "mine");
+}
+
+TEST_F(ImagineCommand, FramesThatNoJobOfOutMadeAreRefusedAndStay) {
+  WriteText(folder_ / "out/frames/frame_00000.png", "mine");
+  const CommandResult result = RunCommand(Frames("out"));
+  EXPECT_EQ(result.exit_code, 2);
+  EXPECT_THAT(result.err, HasSubstr((folder_ / "out/frames").string() + ":"));
+  EXPECT_EQ(ReadFile(folder_ / "out/frames/frame_00000.png"), "mine");
+}
+
+TEST_F(ImagineCommand, AFirstFrameIsNotTakenFromWhatWouldBeReplaced) {
+  ASSERT_EQ(RunCommand(Frames("out", {"--chunks", "1"})).exit_code, 0);
+  const std::string frame = folder_ / "out/frames/frame_00000.png";
+  cv::imwrite(frame, cv::Mat(SyntheticClip::kHeight_px, SyntheticClip::kWidth_px, CV_8UC3, cv::Scalar::all(9)));
+  const auto before = Results("out");
+  const CommandResult result =
+      RunCommand({Binary("evac"), "imagine", "--frame", frame, "--actions",
+                  folder_ / "proprio_stats/327/648642/proprio_stats.h5", "--extrinsics",
+                  Page("head_extrinsic_params_aligned.json").string(), "--intrinsics",
+                  Page("head_intrinsic_params.json").string(), "--config", folder_ / "tiny.yaml", "--weights",
+                  folder_ / "tiny.safetensors", "--steps", "2", "--threads", "1", "--stride", "1", "--restart", "--out",
+                  folder_ / "out"});
+  EXPECT_EQ(result.exit_code, 2) << result.err;
+  EXPECT_THAT(result.err, HasSubstr(frame + ": lies in"));
+  EXPECT_EQ(Results("out"), before);
+}
+
+TEST_F(ImagineCommand, MapsAloneDoNotReplaceThoseOfWhatWasImaginedNorThoseThatAreBeingWritten) {
+  ASSERT_EQ(RunCommand(Frames("out")).exit_code, 0);
+  const auto before = Results("out");
+  const CommandResult result = RunCommand(Words("out", {"--maps-only", "--stride", "1", "--chunks", "1"}));
+  EXPECT_EQ(result.exit_code, 2);
+  EXPECT_THAT(result.err, AllOf(HasSubstr((folder_ / "out").string()), HasSubstr("--maps-only")));
+  EXPECT_EQ(Results("out"), before);
+  fs::create_directory(folder_ / "held");
+  const RunLock lock(folder_ / "held/lock");
+  const CommandResult held = RunCommand(Words("held", {"--maps-only"}));
+  EXPECT_EQ(held.exit_code, 2);
+  EXPECT_THAT(held.err, HasSubstr("is writing here"));
+}
+
+TEST_F(ImagineCommand, RestartThrowsAwayWhatAJobLeftAndNothingElse) {
+  ASSERT_EQ(RunCommand(Frames("out")).exit_code, 0);
+  WriteText(folder_ / "out/frames/own.txt", "mine");
+  const CommandResult result = RunCommand(Frames("out", {"--seed", "9", "--restart"}));
+  EXPECT_EQ(result.exit_code, 2);
+  EXPECT_THAT(result.err, HasSubstr((folder_ / "out/frames").string() + ":"));
+  EXPECT_EQ(ReadFile(folder_ / "out/frames/own.txt"), "mine");
+  fs::remove(folder_ / "out/frames/own.txt");
+  WriteText(folder_ / "out/chunks/own.txt", "mine");
+  ASSERT_EQ(RunCommand(Frames("out", {"--seed", "9", "--restart"})).exit_code, 0);
+  EXPECT_EQ(ReadFile(folder_ / "out/chunks/own.txt"), "mine");
 }
 
 TEST_F(ImagineCommand, ADistortedCameraIsRefusedWhereverItsPageSaysSo) {

@@ -87,7 +87,7 @@ TEST_F(LearnedPolicyProgram, AnotherPeriodEndsTheRunBeforeItsFirstEpisode) {
 
 TEST_F(LearnedPolicyProgram, WeightsThatAreNotThereEndTheRunWithTheirName) {
   const CommandResult result = Run("take_toast");
-  EXPECT_NE(result.exit_code, 0);
+  EXPECT_EQ(result.exit_code, 2);
   EXPECT_THAT(result.err, HasSubstr("step.safetensors"));
 }
 

@@ -50,6 +50,20 @@ TEST(NetworkProgram, IsTheSameProgramToItsUser) {
   }
 }
 
+TEST(Help, NamesTheKindsOfArmsByTheirNamesAlone) {
+  EXPECT_THAT(RunCommand({Binary("evac"), "pack", "-h"}).out, HasSubstr("--arms TEXT:{auto,told,measured}"));
+}
+
+TEST(Help, SaysWhereSeveralJudgesMayBeNamed) {
+  for (const std::string command : {"trust", "compare", "dashboard"})
+    EXPECT_THAT(RunCommand({Binary("evac"), command, "-h"}).out, HasSubstr("oracle,classifier")) << command;
+}
+
+TEST(Help, SaysAllThatTheLastExitCodeMeans) {
+  EXPECT_THAT(RunCommand({Binary("evac"), "-h"}).out,
+              HasSubstr("4 internal error, error budget spent, or interrupted"));
+}
+
 TEST(NetworkProgram, ANewForecastTakesThePlaceOfTheOldOneAndAllElseStays) {
   const TempFolder folder;
   std::string page = ReadFile(EVAC_SOURCE_DIR "/apps/configs/desk_model.yaml");

@@ -194,6 +194,25 @@ TEST_F(PackCommand, IsNotGoneOnWithByArmsOfAnotherKind) {
   EXPECT_EQ(HashesOf("out"), whole);
 }
 
+TEST_F(PackCommand, SaysThatAnotherVersionOfEvacBeganIt) {
+  Add("a", Good());
+  const fs::path claim = folder_ / "out/packing.json";
+  const auto pack = [&] {
+    const CommandResult packed = RunCommand(Words("out"));
+    EXPECT_EQ(packed.exit_code, 0) << packed.err;
+    return packed.err;
+  };
+  pack();
+  EXPECT_THAT(pack(), Not(HasSubstr("was begun by")));
+  nlohmann::ordered_json page = nlohmann::ordered_json::parse(ReadFile(claim));
+  page["evac_version"] = "0.0.1";
+  WriteText(claim, page.dump(1) + "\n");
+  EXPECT_THAT(pack(), HasSubstr("evac: note: " + (folder_ / "out").string() + " was begun by evac 0.0.1; evac "));
+  page.erase("evac_version");  // as earlier versions wrote it
+  WriteText(claim, page.dump(1) + "\n");
+  EXPECT_THAT(pack(), HasSubstr("was begun by an evac that did not write down its version"));
+}
+
 TEST_F(PackCommand, ACollectionBesideOtherRecordingsIsAskedWhichArmsAreMeant) {
   Add("a", Good());
   AddCollected("000000");

@@ -28,6 +28,7 @@ namespace {
 using nlohmann::json;
 
 constexpr int kKills = 10;
+constexpr int kMostTries = 30000;  // many minutes: what is not there by then will not come
 
 /// `evac rate serve`, killed and started again at one port.
 class MortalServer {
@@ -38,8 +39,10 @@ class MortalServer {
   void Start() {
     std::filesystem::remove(log_);
     process_ = StartCommand({Binary("evac"), "rate", "serve", study_, "--port", std::to_string(port)}, log_);
+    int tries = 0;
     for (std::string url; url.empty();) {
       if (waitpid(process_, nullptr, WNOHANG) == process_) throw std::runtime_error("it ended: " + ReadFile(log_));
+      if (++tries > kMostTries) throw std::runtime_error("it never said where it listens: " + ReadFile(log_));
       std::this_thread::sleep_for(std::chrono::milliseconds(10));
       std::ifstream(log_) >> url;
       if (url.starts_with("http://") && url.ends_with("/"))
@@ -65,7 +68,9 @@ class Stubborn {
  public:
   Stubborn(const MortalServer& server, const std::string& link) : server_(server) {
     const json joined = {{"invite", link}, {"uuid", NewSecret()}};
-    for (RawAnswer answer; session_.empty() && IsWorthAnotherTry(answer);) {
+    RawAnswer answer;
+    for (int tries = 0; session_.empty() && tries < kMostTries && IsWorthAnotherTry(answer); ++tries) {
+      if (tries > 0) std::this_thread::sleep_for(std::chrono::milliseconds(20));
       answer = PostJson(server_.port, "/api/join", joined.dump(), "");
       cookie_ = CookieSetBy(answer.head);
       session_ = cookie_.substr(cookie_.find('=') + 1);
@@ -101,13 +106,15 @@ class Stubborn {
   /// What it answers in the end; that all is done where it will not.
   json Insist(const std::string& path, const std::string& body) {
     const std::string csrf = Sha256Hex("csrf " + session_).substr(0, 32);
-    for (;;) {
+    for (int tries = 0; tries < kMostTries; ++tries) {
       const RawAnswer answer =
           PostJson(server_.port, path, body, "Cookie: " + cookie_ + "\r\nX-Evac-Csrf: " + csrf + "\r\n");
       if (answer.status == 200) return json::parse(answer.body);
       if (!IsWorthAnotherTry(answer)) return {{"done", true}};
       std::this_thread::sleep_for(std::chrono::milliseconds(20));
     }
+    ADD_FAILURE() << path << " is never answered";
+    return {{"done", true}};
   }
 
   const MortalServer& server_;

@@ -7,6 +7,7 @@
 #include <nlohmann/json.hpp>
 #include <opencv2/core.hpp>
 
+#include "core/file.h"
 #include "core/hash.h"
 #include "core/store_study.h"
 #include "core/video.h"
@@ -174,6 +175,13 @@ TEST(RatingSession, WrongWordsAreRefusedWithWhatWasWanted) {
   EXPECT_FALSE(std::filesystem::exists(unknown)) << "no study is frozen without the gold that was asked for";
   EXPECT_THAT(Rate({"invite", study, "--role", "king"}).err, HasSubstr("wanted rater, adjudicator or lead"));
   EXPECT_THAT(Rate({"export", study}).err, HasSubstr("--csv"));
+  const std::string table = study + "_tables/new/verdicts.csv";
+  const CommandResult exported = Rate({"export", study, "--csv", table});
+  EXPECT_EQ(exported.exit_code, 0) << exported.err;
+  EXPECT_THAT(ReadFile(table), HasSubstr(",")) << "with the folders above it";
+  const CommandResult over_a_folder = Rate({"export", study, "--csv", study});
+  EXPECT_EQ(over_a_folder.exit_code, 2) << over_a_folder.err;
+  EXPECT_THAT(over_a_folder.err, HasSubstr(study + ": is a folder, wanted a file"));
   EXPECT_THAT(Rate({"invite", study, "--count", "2", "--url", "https://rate.lab.org"}).out,
               testing::MatchesRegex("(https://rate.lab.org/r/[0-9a-f]+\n)+"));
 }

@@ -49,6 +49,17 @@ TEST_F(Refusals, AnOutThatIsAFileIsInvalidInputAndNamed) {
   EXPECT_THAT(result.err, HasSubstr("evac: " + (folder_ / "run").string() + ":"));
 }
 
+/// All that was below OUT/videos and OUT/thumbs went without a word.
+TEST_F(Refusals, AnOutWithVideosOfSomebodysIsInvalidInputAndTheyStay) {
+  const std::filesystem::path videos = folder_ / "run/videos";
+  std::filesystem::create_directories(videos);
+  std::ofstream(videos / "own.mp4") << "mine";
+  const CommandResult result = Run({});
+  EXPECT_EQ(result.exit_code, 2);
+  EXPECT_THAT(result.err, HasSubstr("evac: " + videos.string() + ":"));
+  EXPECT_TRUE(std::filesystem::exists(videos / "own.mp4"));
+}
+
 /// It said "confidence is -1".
 TEST_F(Refusals, ARiskOfAComparisonThatIsNoShareIsNamedAsTheOption) {
   for (const char* option : {"--alpha", "--power"}) {
@@ -57,6 +68,25 @@ TEST_F(Refusals, ARiskOfAComparisonThatIsNoShareIsNamedAsTheOption) {
       EXPECT_EQ(result.exit_code, 2);
       EXPECT_THAT(result.err, AllOf(HasSubstr(std::string("compare: ") + option + " is "), HasSubstr("wanted between 0 and 1")));
     }
+  }
+}
+
+/// It passed every range, being neither below nor above anything.
+TEST_F(Refusals, ANumberThatIsNoneIsNamedAsTheOption) {
+  const std::string none = (folder_ / "none").string();
+  const std::pair<std::vector<std::string>, const char*> options[] = {
+      {{"evac", "rate", "serve", none}, "--cover"},
+      {{"evac", "pack", none, "--config", none, "--out", none}, "--holdout"},
+      {{"evac", "imagine", "--out", none}, "--cfg"},
+      {{"evac", "plan"}, "--rate"},
+      {{"evac-policy", "hold"}, "--period-s"},
+      {{"evac-policy", "visual_pick"}, "--noise-m"}};
+  for (auto [words, option] : options) {
+    words.front() = Binary(words.front());
+    words.insert(words.end(), {option, "nan"});
+    const CommandResult result = RunCommand(words);
+    EXPECT_EQ(result.exit_code, 2) << option;
+    EXPECT_THAT(result.err, AllOf(HasSubstr(option + 2), HasSubstr("nan")));
   }
 }
 

@@ -17,6 +17,7 @@
 #include "harness/suite.h"
 #include "tests/support/command.h"
 #include "tests/support/temp_folder.h"
+#include "tests/system/killed_run.h"
 #include "tests/system/process_support.h"
 #include "tests/system/run_support.h"
 
@@ -28,9 +29,13 @@ using Clock = std::chrono::steady_clock;
 
 using system_test::kFaults;
 using system_test::KillAll;
+using system_test::KillOnce;
 using system_test::List;
+using system_test::MadeAnew;
 using system_test::Mark;
 using system_test::RunWords;
+using system_test::Stored;
+using system_test::VideoTimes;
 using system_test::WaitUntil;
 using testing::HasSubstr;
 
@@ -57,8 +62,12 @@ TEST(Resume, AfterAnyKillTheTablesAndVideosAreThoseOfAnUninterruptedRun) {
   ASSERT_EQ(straight.exit_code, 0) << straight.err;
   const double whole_s = std::chrono::duration<double>(Clock::now() - begin).count();
 
+  // The first one in the midst of it, the others wherever they come.
+  KillOnce([&] { return Stored(killed) > 0; }, RunWords(kSuite, killed, {Lanes(2)}), folder / "log");
+  const auto finished = VideoTimes(killed);
+  EXPECT_THAT(finished.size(), testing::AllOf(testing::Gt(0u), testing::Lt(Stored(whole))));
   SplitMix64 random(20);
-  for (int kill = 0; kill < Kills(); ++kill) {
+  for (int kill = 1; kill < Kills(); ++kill) {
     const pid_t pid = StartCommand(RunWords(kSuite, killed, {Lanes(kill % 2 ? 3 : 2)}), folder / "log");
     std::this_thread::sleep_for(std::chrono::duration<double>(random.Uniform(0, 1.5 * whole_s / Kills())));
     ::kill(pid, SIGKILL);
@@ -69,6 +78,7 @@ TEST(Resume, AfterAnyKillTheTablesAndVideosAreThoseOfAnUninterruptedRun) {
 
   EXPECT_EQ(List(killed), List(whole));
   EXPECT_EQ(Videos(killed), Videos(whole));
+  EXPECT_THAT(MadeAnew(finished, killed), testing::IsEmpty()) << "what was stored is kept";
   for (const auto& episode : nlohmann::json::parse(List(killed))) {
     EXPECT_EQ(Sha256HexOfFile(killed / episode["video"].get<std::string>()), episode["video_sha256"]);
   }

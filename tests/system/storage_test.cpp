@@ -8,6 +8,7 @@
 #include "core/file.h"
 #include "core/store.h"
 #include "core/store_sqlite.h"
+#include "tests/support/small_disk.h"
 #include "tests/support/synthetic_recording.h"
 #include "tests/support/temp_folder.h"
 #include "tests/system/process_support.h"
@@ -24,26 +25,6 @@ using system_test::WaitUntil;
 using testing::AllOf;
 using testing::AnyOf;
 using testing::HasSubstr;
-
-/// A small disk that fills up properly; gone with this.
-class SmallDisk {
- public:
-  SmallDisk(const fs::path& at, const char* options) : at_(at) {
-    fs::create_directories(at_);
-    is_there_ = ::mount("tmpfs", at_.c_str(), "tmpfs", 0, options) == 0;
-  }
-  ~SmallDisk() {
-    if (is_there_) ::umount2(at_.c_str(), MNT_DETACH);
-  }
-  bool is_there() const { return is_there_; }
-  bool Remount(unsigned long flags, const char* options) {
-    return ::mount("tmpfs", at_.c_str(), "tmpfs", MS_REMOUNT | flags, options) == 0;
-  }
-
- private:
-  fs::path at_;
-  bool is_there_;
-};
 
 int Lines(const std::string& text, const std::string& with) {
   std::istringstream lines(text);
@@ -81,7 +62,7 @@ TEST(Storage, AnOutputThatCannotBeWrittenIsOneMessage) {
   SmallDisk disk(folder / "disk", "size=1m");
   if (!disk.is_there() || !disk.Remount(MS_RDONLY, "")) GTEST_SKIP() << "mounting a read-only disk needs root";
   const CommandResult result = RunCommand(RunWords(kFaults, folder / "disk/run"));
-  EXPECT_NE(result.exit_code, 0);
+  EXPECT_EQ(result.exit_code, 4);
   EXPECT_THAT(result.err, AllOf(HasSubstr((folder / "disk/run").string()), HasSubstr("Read-only")));
   EXPECT_EQ(Lines(result.err, ""), 1) << result.err;
 }

@@ -73,6 +73,20 @@ TEST_F(WeightsCommand, InitMakesTheSameFileOfASeedAndItFits) {
   EXPECT_EQ(json.at("list").size(), json.at("tensors"));
 }
 
+TEST_F(WeightsCommand, AFullDiskIsTheMachinesFaultAndAMissingFolderTheUsers) {
+  const std::string log = (folder_ / "log").string();
+  const std::string command = fmt::format(
+      "cd '{}' && trap '' XFSZ && ulimit -f 8 && '{}/evac' weights init full.safetensors --config tiny.yaml >'{}' 2>&1",
+      folder_.string(), EVAC_BIN_DIR, log);
+  const int status = std::system(command.c_str());
+  std::ostringstream text;
+  text << std::ifstream(log).rdbuf();
+  EXPECT_EQ(WEXITSTATUS(status), 4) << text.str();
+  EXPECT_THAT(text.str(), HasSubstr("full.safetensors.partial-"));
+  EXPECT_FALSE(std::filesystem::exists(folder_ / "full.safetensors"));
+  EXPECT_EQ(Evac("init none/a.safetensors --config tiny.yaml").exit_code, 2);
+}
+
 TEST_F(WeightsCommand, ConvertThereAndBackLosesNothing) {
   Init("f32.safetensors");
   EXPECT_EQ(Evac("convert f32.safetensors same.safetensors --config tiny.yaml").exit_code, 0);

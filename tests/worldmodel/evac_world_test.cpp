@@ -194,15 +194,23 @@ TEST(EvacWorld, WeightsThatAreNoNumbersFailTheEpisodeAndNothingElse) {
 
 TEST(EvacWorld, OneSceneThatFailsDoesNotStopTheOthers) {
   EvacWorld world = SmallWorld(2);
-  const Seen alone = Play(world, {1});
-  for (const SceneId scene : {0, 1})
-    world.Reset(scene, SomeTask(), {"state", static_cast<std::uint64_t>(scene)}, 10 + scene);
+  const std::string alone = Play(world, {1}).at(1);
+  std::string together;
+  for (const SceneId scene : {0, 1}) {
+    together.clear();  // scene 1's is kept
+    Add(world.Reset(scene, SomeTask(), {"state", static_cast<std::uint64_t>(scene)}, 10 + scene).observation, together);
+  }
   const ActionChunk three_arms{.targets = {ArmsAt(0.3, 3)}}, good = ChunkOf(3, 0.32);
   const SceneChunk batch[] = {{0, &three_arms}, {1, &good}};
   const std::vector<Advanced> answers = world.Advance(batch);
   ASSERT_TRUE(std::holds_alternative<Failure>(answers[0]));
   EXPECT_EQ(std::get<Failure>(answers[0]).stop, StopReason::kWorldError);
-  EXPECT_TRUE(std::holds_alternative<std::vector<WorldStep>>(answers[1]));
+  ASSERT_TRUE(std::holds_alternative<std::vector<WorldStep>>(answers[1]));
+  const auto& steps = std::get<std::vector<WorldStep>>(answers[1]);
+  ASSERT_THAT(steps, SizeIs(3));
+  for (const WorldStep& step : steps) Add(step.observation, together);
+  ASSERT_LT(together.size(), alone.size());
+  EXPECT_TRUE(alone.starts_with(together)) << "the frames that it has alone";
 }
 
 ImaginerOptions Cached(const fs::path& folder, int& steps) {
