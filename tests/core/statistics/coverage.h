@@ -5,7 +5,7 @@
 #include <vector>
 
 /// What the intervals and tests promise, tried out on made-up data whose truth is known. One call is one table of
-/// docs/statistics.md; `stat_coverage` prints them all.
+/// docs/statistics.md or of docs/decisions/0012-interval-of-record.md; `stat_coverage` prints them all.
 namespace evac::coverage {
 
 struct SimulationOptions {
@@ -47,5 +47,31 @@ struct FalseAlarms {
   double share = 0;
 };
 std::vector<FalseAlarms> Peeking(const SimulationOptions& options);
+
+/// In what share of the replicates, by a rule as it was and as it is.
+struct BeforeAndNow {
+  double before = 0, now = 0;
+};
+
+/// How often the gate's rule "MMRV at most .1", alpha .05, passed two policies.
+struct MmrvPasses {
+  std::string setting;  ///< true rates: "0.9 0.5, 0.5 0.9", real and sim
+  int states = 0;
+  double truth = 0;  ///< MMRV of the true rates; above .1 a pass is false
+  BeforeAndNow passes;
+};
+/// Before: the percentile interval alone; now: the one of record. 120 draws each.
+std::vector<MmrvPasses> PassesOfMmrv(const SimulationOptions& options);
+
+/// 90 % intervals of the difference of two policies whose pairs repeat initial states.
+struct RepeatedDifference {
+  std::string setting;  ///< states x repeats and the rates of flips: "20 x 4, 0 and 0.05", better and worse
+  double rho = 0;       ///< the repeats of a state are copies with this probability
+  double truth = 0;
+  BeforeAndNow covered;  ///< the interval held the truth
+  BeforeAndNow shown;    ///< "not worse by 10 points"
+};
+/// Before: Tango's interval of EffectivePairs; now: TangoOfClusters.
+std::vector<RepeatedDifference> DifferencesOfRepeats(const SimulationOptions& options);
 
 }  // namespace evac::coverage

@@ -93,6 +93,35 @@ TEST(Coverage, TheBootstrapCoversWhatOtherStatesWouldHaveGiven) {
   }
 }
 
+TEST(Coverage, MmrvOfFewStatesPassesFalselyAtItsAlphaWhereThePercentileIntervalAlonePassesFarMore) {
+  for (const MmrvPasses& row : PassesOfMmrv(Options())) {
+    EXPECT_LE(row.passes.now, row.passes.before) << row.setting << ", n " << row.states;
+    if (row.truth > 0.1) {
+      const double promise = row.states == 20 ? 0.07 : 0.05;  // the percentile interval's own, which varied
+      EXPECT_LE(row.passes.now, promise + Noise(promise)) << row.setting << ", n " << row.states;
+      if (row.states <= 3) {
+        EXPECT_GT(row.passes.before, 0.1) << row.setting << ", n " << row.states;
+      }
+    } else {
+      EXPECT_GT(row.passes.now, 0.85) << row.setting << ", n " << row.states << ": policies that lie well apart";
+    }
+  }
+}
+
+TEST(Coverage, DifferencesOfRepeatsHoldTheirPromiseAndShowNothingThatStatesWithoutFlipsWouldNot) {
+  for (const RepeatedDifference& row : DifferencesOfRepeats(Options())) {
+    EXPECT_GT(row.covered.now, 0.88 - Noise(0.88)) << row.setting << ", rho " << row.rho;
+    EXPECT_LE(row.shown.now, row.shown.before) << row.setting << ", rho " << row.rho;
+    if (row.setting == "20 x 4, 0.01 and 0.11") {
+      EXPECT_LE(row.shown.now, 0.05 + Noise(0.05)) << "worse by the margin";
+    }
+    if (row.setting == "20 x 4, 0 and 0.05") {
+      EXPECT_GT(row.shown.before, 0.05) << row.rho;
+      EXPECT_EQ(row.shown.now, 0) << row.rho << ": 20 states without any flip do not show it";
+    }
+  }
+}
+
 TEST(Peeking, SequentialTestsKeepTheirAlphaAndFixedOnesDoNot) {
   double worst_z = 0;
   for (const FalseAlarms& row : Peeking(Options())) {
