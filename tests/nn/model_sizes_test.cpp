@@ -69,6 +69,17 @@ TEST(Sizes, AsTextAreTheSameWhenReadAgain) {
   EXPECT_EQ(again.vae.scale_factor, other.vae.scale_factor) << "to the last digit";
 }
 
+/// The desk's network has no attention within pictures; a job that was written for it could not be read.
+TEST(Sizes, AListOfNoneIsOneToo) {
+  ModelConfig config;
+  for (const Size& size : SizesOf(config)) {
+    if (size.Key() != "unet.attention_resolutions") continue;
+    EXPECT_TRUE(SetFromText(size, ""));
+    EXPECT_EQ(TextOf(size), "");
+  }
+  EXPECT_TRUE(config.unet.attention_resolutions.empty());
+}
+
 TEST(Sizes, TextThatIsNoneLeavesThemAsTheyWere) {
   ModelConfig config;
   const std::string before = AllOf(config);

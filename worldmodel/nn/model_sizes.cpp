@@ -126,7 +126,7 @@ bool Parse(const std::string& text, std::optional<double>& value) {
 }
 bool Parse(const std::string& text, std::vector<std::int64_t>& values) {
   std::vector<std::int64_t> found;
-  for (std::size_t from = 0; from <= text.size();) {
+  for (std::size_t from = 0; !text.empty() && from <= text.size();) {
     const std::size_t comma = std::min(text.find(',', from), text.size());
     if (!Parse(text.substr(from, comma - from), found.emplace_back())) return false;
     from = comma + 1;

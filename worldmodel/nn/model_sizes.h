@@ -23,7 +23,8 @@ struct Size {
 /// All of them, those of a section together, in the order of apps/configs/evac_published.yaml.
 std::vector<Size> SizesOf(ModelConfig& config);
 
-/// What a size says: "320", "1,2,4,4", "0.18215", "true"; all digits of a number. Empty: an optional one that is not there.
+/// What a size says: "320", "1,2,4,4", "0.18215", "true"; all digits of a number. Empty: an optional one that is not
+/// there, or a list of none.
 std::string TextOf(const Size& size);
 /// The other way round. @returns false, with the size as it was, if the text says no such thing
 bool SetFromText(const Size& size, const std::string& text);

@@ -16,6 +16,7 @@
 
 #include "worldmodel/nn/library.h"
 #include "worldmodel/nn/memory.h"
+#include "worldmodel/nn/open_blas.h"
 #include "worldmodel/nn/threads.h"
 #include "worldmodel/train/training_job.h"
 
@@ -182,6 +183,7 @@ int Train(const Arguments& arguments) {
 }  // namespace
 
 int main(int count, char** words) {
+  if (nn::TellOpenBlasTheProcessor()) ::execv("/proc/self/exe", words);  // it was loaded already; without, slower
   const std::vector<std::string> given(words + 1, words + count);
   if (given.size() == 1 && (given[0] == "--help" || given[0] == "-h")) {
     std::fputs(kUsage, stdout);
