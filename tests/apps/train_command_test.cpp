@@ -219,7 +219,10 @@ TEST_F(TrainCommand, ASideThatIsNoMultipleOfEightIsSaidToBeNone) {
 }
 
 TEST_F(TrainCommand, AJobThatIsCarriedElsewhereTrainsTheSameWeights) {
-  TrainCodec({"--threads", "1"});
+  // The program itself: it tells OpenBLAS the processor, as evac-train does, and these tests do not.
+  const CommandResult here = RunCommand({Binary("evac"), "train", "codec", Path("shards"), "--config", Path("page.yaml"),
+                                         "--out", Path("codec"), "--set", "batch=2", "--steps", "1", "--threads", "1"});
+  ASSERT_EQ(here.exit_code, 0) << here.err;
   EXPECT_THAT(Train({"codec", Path("shards"), "--config", Path("page.yaml"), "--job", Path("job"), "--set", "batch=2", "--steps", "1"}),
               HasSubstr("There: evac-train job SHARDS --out OUT"));
   EXPECT_FALSE(std::filesystem::exists(Path("job.tmp")));
@@ -231,7 +234,7 @@ TEST_F(TrainCommand, AJobThatIsCarriedElsewhereTrainsTheSameWeights) {
   const CommandResult trained = there({"--out", Path("there")});
   EXPECT_EQ(trained.exit_code, 0) << trained.err;
   EXPECT_THAT(trained.out, HasSubstr("there/codec.safetensors: done after 1 steps"));
-  EXPECT_EQ(ReadFile(Path("there/codec.safetensors")), ReadFile(Path("codec/codec.safetensors")));
+  EXPECT_TRUE(ReadFile(Path("there/codec.safetensors")) == ReadFile(Path("codec/codec.safetensors")));
 
   const auto refused = [&](const std::vector<std::string>& more, const std::string& why) {
     const CommandResult result = there(more);
