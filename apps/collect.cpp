@@ -23,6 +23,9 @@ namespace {
 namespace fs = std::filesystem;
 using Json = nlohmann::ordered_json;
 
+/// For a message. What lies deep is not shown: what writes it, or copies it, calls itself at every bracket.
+std::string Shown(const Json& value) { return value.is_structured() ? value.type_name() : value.dump(); }
+
 /// OUT/collection.json: which collection this is, and which evac began it. @throws InvalidInput if there is another.
 void Claim(const CollectArguments& arguments, const Recipe& recipe) {
   const Json page = {{"format", "evac-collection"},
@@ -35,10 +38,10 @@ void Claim(const CollectArguments& arguments, const Recipe& recipe) {
   if (!fs::exists(path)) return WriteFileAtomically(path, page.dump(2) + "\n");
   const Json before = Json::parse(ReadFile(path), nullptr, /*allow_exceptions=*/false);
   for (const char* field : {"version", "seed", "recipe_sha256"}) {
-    const Json found = before.is_object() && before.contains(field) ? before[field] : Json();
-    if (found == page[field]) continue;
+    const auto found = before.find(field);
+    if (found != before.end() && *found == page[field]) continue;
     throw InvalidInput("{}: holds another collection: {} is {}, wanted {}; choose another --out", path.string(), field,
-                       found.dump(), page[field].dump());
+                       found != before.end() ? Shown(*found) : "null", page[field].dump());
   }
   const auto began = before.find("evac_version");
   SayIfAnotherVersionBegan(arguments.out, began != before.end() && began->is_string() ? began->get<std::string>() : "");

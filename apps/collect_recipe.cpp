@@ -16,6 +16,7 @@
 #include "policies/explorer.h"
 #include "policies/swaying_policy.h"
 #include "policies/visual_pick.h"
+#include "worldmodel/sim/profile.h"
 #include "worldmodel/sim/scene_page.h"
 
 namespace evac {
@@ -41,9 +42,12 @@ constexpr PickParameter kPickParameters[] = {{"noise_m", &VisualPickOptions::noi
                                              {"speed", &VisualPickOptions::speed}};
 /// Besides: `miss_m` and `miss_deg`, the bias in polar form, and `retries`.
 constexpr const char* kPickExtras[] = {"miss_m", "miss_deg", "retries"};
+constexpr double kMostMiss_m = 0.5, kMostMiss_deg = 360, kMostRetries = 5;
 
 /// Of any policy: its hand strays (policies/swaying_policy.h).
 constexpr const char* kSway = "sway_m";
+
+constexpr double kMostShare = 1e9;
 
 bool IsKnown(const std::string& policy, const std::string& name) {
   if (name == kSway) return true;
@@ -54,6 +58,19 @@ bool IsKnown(const std::string& policy, const std::string& name) {
          std::find(std::begin(kPickExtras), std::end(kPickExtras), name) != std::end(kPickExtras);
 }
 
+std::pair<double, double> ReadRange(const Config& page, const std::string& key) {
+  const auto range = page.Get<std::vector<double>>(key);
+  page.Require(range.size() == 2 && range[0] <= range[1], key, "[low, high] with low <= high");
+  const auto demand = [&](double least, double most) {
+    page.Require(range[0] >= least && range[1] <= most, key, fmt::format("numbers from {} to {}", least, most));
+  };
+  // Of two that make one bias, and of a number that is rounded, the ends do not show what lies between.
+  if (key == "miss_m") demand(-kMostMiss_m, kMostMiss_m);
+  if (key == "miss_deg") demand(-kMostMiss_deg, kMostMiss_deg);
+  if (key == "retries") demand(0, kMostRetries);
+  return {range[0], range[1]};
+}
+
 Behaviour ReadBehaviour(const Config& page) {
   Behaviour behaviour;
   behaviour.name = page.Get<std::string>("name");
@@ -62,13 +79,13 @@ Behaviour ReadBehaviour(const Config& page) {
   behaviour.does = page.Get<std::string>("does", "");
   behaviour.without_object = page.Get<bool>("without_object", false);
   behaviour.unaware = page.Get<bool>("unaware", false);
-  page.Require(behaviour.share > 0 && std::isfinite(behaviour.share), "share", "a positive number");
+  page.Require(behaviour.share > 0 && behaviour.share <= kMostShare, "share",
+               fmt::format("a number above 0, at most {:.0f}", kMostShare));
   const bool explores = behaviour.policy == "explorer", learned = behaviour.policy == "learned";
   page.Require(explores || learned || behaviour.policy == "visual_pick", "policy", "visual_pick, explorer or learned");
   page.Require(explores == page.Has("does"), "does", "it with policy explorer, and only there");
   page.Require(learned == page.Has("checkpoint"), "checkpoint", "it with policy learned, and only there");
   page.Require(!behaviour.unaware || behaviour.without_object, "unaware", "it with without_object: true");
-  if (explores) ExplorationFromName(behaviour.does);
   if (learned) {
     behaviour.checkpoint = page.Path("checkpoint");
     behaviour.checkpoint_sha256 = Sha256HexOfFile(behaviour.checkpoint);
@@ -77,9 +94,7 @@ Behaviour ReadBehaviour(const Config& page) {
   for (const std::string& key : page.Keys()) {
     if (kOwn.contains(key)) continue;
     page.Require(IsKnown(behaviour.policy, key), key, "no such field: it is no parameter of " + behaviour.policy);
-    const auto range = page.Get<std::vector<double>>(key);
-    page.Require(range.size() == 2 && range[0] <= range[1], key, "[low, high] with low <= high");
-    behaviour.parameters.push_back({key, {range[0], range[1]}});
+    behaviour.parameters.push_back({key, ReadRange(page, key)});
   }
   return behaviour;
 }
@@ -88,6 +103,7 @@ CollectTask ReadCollectTask(const Config& page) {
   page.AllowOnly({"page", "object", "middle_m"});
   CollectTask task;
   task.task = ReadTaskPage(page.Path("page"));
+  sim::ReadScenePage(task.task);
   task.object = page.Get<std::string>("object");
   task.without = sim::WithoutObject(task.task, task.object);
   const auto middle_m = page.Get<std::vector<double>>("middle_m");
@@ -117,10 +133,18 @@ void ResizeCameras(const Config& page, Recipe& recipe) {
   }
 }
 
-/// How many there are decides no episode: a collection can grow.
-std::string HashOf(Config page, const Recipe& recipe) {
-  page.Set("episodes=0");
-  std::string all = page.Canonical() + Config::FromFile(recipe.profile).ContentHash();
+/// How many there are decides no episode: a collection can grow. (Config::Set would refuse a number that an alias makes
+/// one with another's.)
+std::string CanonicalOfAny(const Config& page) {
+  const std::string field = "\n.episodes=";
+  std::string lines = "\n" + page.Canonical();
+  const std::size_t number = lines.find(field) + field.size();
+  lines.replace(number, lines.find('\n', number) - number, "0");
+  return lines.substr(1);
+}
+
+std::string HashOf(const Config& page, const Recipe& recipe) {
+  std::string all = CanonicalOfAny(page) + Config::FromFile(recipe.profile).ContentHash();
   for (const CollectTask& task : recipe.tasks) {
     const Config task_page = Config::FromText(task.task.page, task.task.page_path);
     all += task_page.ContentHash();
@@ -146,7 +170,8 @@ void ReadNumbers(const Config& page, Recipe& recipe) {
   recipe.episodes_per_state = page.Get<int>("episodes_per_state", 1);
   recipe.chunk_size = page.Get<int>("chunk_size", 8);
   recipe.max_chunks = page.Get<int>("max_chunks");
-  page.Require(recipe.episodes > 0, "episodes", "at least 1");
+  page.Require(recipe.episodes > 0 && recipe.episodes <= kMostEpisodes, "episodes",
+               fmt::format("1 … {}", kMostEpisodes));
   page.Require(recipe.episodes_per_state > 0, "episodes_per_state", "at least 1");
   page.Require(recipe.chunk_size > 0 && recipe.chunk_size <= 1000, "chunk_size", "1 … 1000");
   page.Require(recipe.max_chunks > 0 && recipe.max_chunks <= 1000, "max_chunks", "1 … 1000");
@@ -207,6 +232,21 @@ std::unique_ptr<Policy> MakeSteadyPolicy(const CollectJob& job, int chunk_size) 
                                                     speed == job.row.parameters.end() ? 1.0 : speed->second});
 }
 
+/// Both ends of every range are values that the policy takes, and it knows every task.
+/// @throws InvalidInput with the behaviour's place
+void CheckBehaviour(const Config& page, const Recipe& recipe, const Behaviour& behaviour) try {
+  std::unique_ptr<Policy> policy;
+  for (const bool high : {false, true}) {
+    CollectJob job{&recipe.tasks.front(), &behaviour, {}};
+    for (const auto& [name, range] : behaviour.parameters) job.row.parameters[name] = high ? range.second : range.first;
+    policy = MakePolicy(job, recipe.chunk_size);
+  }
+  for (const CollectTask& task : recipe.tasks) policy->Reset(0, task.task, 1);
+} catch (const Error& error) {
+  if (error.exit_code() != ExitCode::kInvalidInput) throw;
+  throw InvalidInput("{}: {}", page.Where(), error.what());
+}
+
 }  // namespace
 
 Recipe ReadRecipe(const fs::path& path, const std::vector<std::string>& assignments) {
@@ -217,6 +257,7 @@ Recipe ReadRecipe(const fs::path& path, const std::vector<std::string>& assignme
   Recipe recipe;
   recipe.name = page.Get<std::string>("recipe");
   recipe.profile = page.Path("profile");
+  sim::ReadProfile(recipe.profile);
   for (const Config& task : page.List("tasks")) recipe.tasks.push_back(ReadCollectTask(task));
   for (const Config& behaviour : page.List("mix")) recipe.mix.push_back(ReadBehaviour(behaviour));
   page.Require(!recipe.tasks.empty(), "tasks", "at least one task");
@@ -226,14 +267,8 @@ Recipe ReadRecipe(const fs::path& path, const std::vector<std::string>& assignme
   ResizeCameras(page, recipe);
   recipe.text = page.Text();
   recipe.hash = HashOf(page, recipe);
-  for (const Behaviour& behaviour : recipe.mix) {  // both ends of every range are values that the policy takes
-    for (const bool high : {false, true}) {
-      CollectJob job{&recipe.tasks.front(), &behaviour, {}};
-      for (const auto& [name, range] : behaviour.parameters)
-        job.row.parameters[name] = high ? range.second : range.first;
-      MakePolicy(job, recipe.chunk_size);
-    }
-  }
+  const std::vector<Config> mix = page.List("mix");
+  for (std::size_t i = 0; i < mix.size(); ++i) CheckBehaviour(mix[i], recipe, recipe.mix[i]);
   return recipe;
 }
 

@@ -14,6 +14,8 @@
 
 namespace evac {
 
+inline constexpr int kMostEpisodes = 10'000'000;  ///< of a collection
+
 /// One way of acting and how often it is seen: an entry of a recipe's `mix`.
 struct Behaviour {
   std::string name;
@@ -48,6 +50,8 @@ struct Recipe {
   std::string hash;  ///< of everything that decides a byte: the recipe and every page, scene and profile it names
 };
 
+/// What is wrong is known before the first episode: the profile and the tasks' scenes are read too, each policy of the
+/// mix knows every task, and takes both ends of its ranges and what is drawn between them.
 /// @throws InvalidInput naming file, line, field, what was found and what was wanted.
 Recipe ReadRecipe(const std::filesystem::path& path, const std::vector<std::string>& assignments);
 

@@ -88,6 +88,14 @@ void CheckAllTasks(const Suite& suite, const PolicySpec& declared) {
   }
 }
 
+/// Of a task page everybody is told what it says; what is made up for a recording (FillInRecordedTask) is for people.
+void CheckInstruction(const Suite& suite, const PolicySpec& declared) {
+  if (!suite.recording || suite.recorded_task.instruction || !declared.needs.contains("instruction")) return;
+  throw InvalidInput("{}: field instruction: found none, wanted what is to be done, in words: policy {}@{} needs an "
+                     "instruction, and recordings say none",
+                     suite.path.string(), declared.name, declared.checkpoint);
+}
+
 }  // namespace
 
 void CheckRubrics(const Suite& suite) {
@@ -156,6 +164,7 @@ RunningPolicy::RunningPolicy(const SuitePolicy& policy, const Suite& suite, cons
   link_.emplace(std::move(options));
   spec_ = link_->Handshake(HarnessSpec(suite.tasks.front(), suite.chunk_size), suite.transport.start_s);
   CheckAllTasks(suite, spec_);
+  CheckInstruction(suite, spec_);
 }
 
 Counters RunningPolicy::counters() const {

@@ -41,7 +41,8 @@ std::vector<std::string> CommandLine(const SuitePolicy& policy, const Suite& sui
 class RunningPolicy {
  public:
   /// Starts and greets it. @param interrupted  asked while waiting for it.
-  /// @throws InvalidInput with both declarations if it does not fit the suite's tasks.
+  /// @throws InvalidInput with both declarations if it does not fit the suite's tasks; naming the suite's field if it
+  /// needs an instruction and the suite says none of its recordings.
   RunningPolicy(const SuitePolicy& policy, const Suite& suite, const std::filesystem::path& run_folder,
                 std::function<bool()> interrupted);
 

@@ -4,11 +4,13 @@
 #include <fmt/format.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <chrono>
 #include <ctime>
 #include <iterator>
 #include <thread>
 
+#include "apps/interrupts.h"
 #include "apps/judge_with_progress.h"
 #include "core/seed.h"
 #include "core/store_calls.h"
@@ -67,17 +69,26 @@ ExitCode SayWhatItWouldCost(const VlmConfig& config, const Store& store, const V
   return ExitCode::kOk;
 }
 
+/// A server may want minutes; who interrupts waits for none of them.
+void SleepUnlessInterrupted(double wait_s) {
+  using Seconds = std::chrono::duration<double>;
+  constexpr double kLook_s = 0.05;
+  for (double left_s = wait_s; left_s > 0 && !IsInterrupted(); left_s -= kLook_s)
+    std::this_thread::sleep_for(Seconds(std::min(left_s, kLook_s)));
+}
+
 VlmClientOptions ClientOptions(const VlmConfig& config, bool offline) {
   return {.base_url = config.base_url,
           .bearer_key = offline ? "" : config.Key(),
           .limits = config.limits,
           .budget = config.budget,
           .seed = static_cast<std::uint64_t>(config.sampling.seed),
-          .sleep_s = [](double wait_s) { std::this_thread::sleep_for(std::chrono::duration<double>(wait_s)); }};
+          .sleep_s = SleepUnlessInterrupted,
+          .interrupted = IsInterrupted};
 }
 
 /// Who answers, and whether it sees; without a network, who answered last.
-std::string Greet(const VlmConfig& config, VlmClient& client, CallCache& cache, bool offline) {
+std::string Greet(const VlmConfig& config, VlmClient& client, CallCache& cache, bool offline) try {
   const std::string& model = config.sampling.model;
   if (offline) {
     const auto known = cache.Fingerprint(config.base_url, model);
@@ -88,6 +99,9 @@ std::string Greet(const VlmConfig& config, VlmClient& client, CallCache& cache, 
   CheckThatItSees(client, config.sampling);
   cache.SetFingerprint(config.base_url, model, fingerprint);
   return fingerprint;
+} catch (const Error&) {
+  if (IsInterrupted()) throw InternalError("interrupted");
+  throw;
 }
 
 /// Beside the counting, for who looks on; a log would be full of it.
@@ -107,6 +121,7 @@ ExitCode JudgeWithVlm(const VlmJudgeArguments& arguments) {
                          "beside its `recording` (docs/suite.md)", arguments.run.string(), task.id);
   }
   if (arguments.dry_run) return SayWhatItWouldCost(config, store, arguments);
+  const CatchInterrupts catch_interrupts;
   CallCache cache(store.folder() / CallCache::kFile);
   VlmClient client(ClientOptions(config, arguments.offline));
   VlmJudgeOptions options{.run_folder = store.folder(), .offline = arguments.offline, .now = Now};
@@ -118,6 +133,7 @@ ExitCode JudgeWithVlm(const VlmJudgeArguments& arguments) {
     AskedProgress progress(judge.Name());
     JudgeOptions how{.again = arguments.again,
                      .also_called = {judge.Name() + kVlmSmall},
+                     .interrupted = IsInterrupted,
                      .on_verdict = ShowVerdict,
                      .on_asked = [&](int done, int total) { progress.Show(done, total); }};
     if (probe != VlmProbe::kNone)

@@ -14,8 +14,9 @@ struct VlmJudgeArguments {
   bool retest = false;   ///< ask a share of the episodes a second time
 };
 
-/// `evac judge RUN --judge vlm --config PAGE`. @returns kInternal if the server gave out before the last episode; the
-/// same command goes on from there.
+/// `evac judge RUN --judge vlm --config PAGE`. The first Ctrl-C ends it in order: nothing more is sent.
+/// @throws InternalError if it was interrupted or the server gave out before the last episode: what was judged is
+/// stored, the same command goes on from there. InvalidInput for what is found before the first episode.
 ExitCode JudgeWithVlm(const VlmJudgeArguments& arguments);
 
 }  // namespace evac

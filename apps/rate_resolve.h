@@ -28,7 +28,7 @@ struct Resolved {
 /// Stages are written where somebody told of them: a sheet does not, nor who saw a success and marked none.
 /// @throws InvalidInput for a name of other judges, or if a run has moved, or holds another video than raters saw of an
 /// episode that gets a verdict (then nothing is written), or a task was rated by several rubrics and they were not to be
-/// mixed.
+/// mixed, or the study is damaged (StudyStore::RequireWhole).
 Resolved ResolveStudy(const StudyStore& study, const ResolveOptions& options);
 
 }  // namespace evac

@@ -6,6 +6,7 @@
 
 #include "judges/rating_board.h"
 #include "reports/text_table.h"
+#include "reports/wording.h"
 
 namespace evac {
 namespace {
@@ -22,6 +23,12 @@ std::string Decimal(const Json& number) {
   if (number.contains("low"))
     text += fmt::format(" [{:.3f}, {:.3f}]", number.at("low").get<double>(), number.at("high").get<double>());
   return text;
+}
+
+/// Beside alpha's interval: from how many replicates it is not.
+std::string Dropped(const Json& agreement) {
+  const auto dropped = agreement.at("dropped_replicates").get<std::int64_t>();
+  return dropped > 0 ? fmt::format(" ({} without any spread dropped)", Counted(dropped, "replicate")) : "";
 }
 
 void PrintRaters(const Json& board) {
@@ -59,7 +66,7 @@ void PrintRatingStatus(const StudyStore& store, std::int64_t now_ms, bool as_jso
              Percent(all.at("unanimous")), Percent(all.at("dawid_skene")), all.at("undecided").get<int>(),
              Percent(all.at("low")), Percent(all.at("high")));
   const Json& agreement = board.at("agreement");
-  fmt::print("agreement: alpha {}, Fleiss kappa {}, raw {}\n", Decimal(agreement.at("alpha")),
+  fmt::print("agreement: alpha {}{}, Fleiss kappa {}, raw {}\n", Decimal(agreement.at("alpha")), Dropped(agreement),
              Decimal(agreement.at("fleiss")), Percent(agreement.at("agreement")));
   for (const char* world : {"real", "generated"}) {
     const Json& index = board.at("blinding").at(world);

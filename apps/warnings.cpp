@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cstdio>
 
+#include "core/file.h"
 #include "core/version.h"
 
 namespace evac {
@@ -16,10 +17,17 @@ void PrintWarnings(const std::vector<std::string>& warnings) {
   if (warnings.size() > kMost) fmt::print(stderr, "evac: warning: and {} more like these\n", warnings.size() - kMost);
 }
 
-void SayIfAnotherVersionBegan(const std::filesystem::path& out, const std::string& began) {
+void SayIfAnotherVersionBegan(const std::string& what, const std::string& began) {
   if (began == EVAC_VERSION) return;
-  fmt::print(stderr, "evac: note: {} was begun by {}; evac {} goes on with it\n", out.string(),
+  fmt::print(stderr, "evac: note: {} was begun by {}; evac {} goes on with it\n", what,
              began.empty() ? "an evac that did not write down its version" : "evac " + began, EVAC_VERSION);
+}
+
+void KeepWhoBegan(const std::filesystem::path& file, bool is_begun, const std::string& what) {
+  if (!is_begun) return WriteFileAtomically(file, EVAC_VERSION "\n");
+  std::string began = std::filesystem::exists(file) ? ReadFile(file) : "";
+  std::erase(began, '\n');
+  SayIfAnotherVersionBegan(what, began);
 }
 
 }  // namespace evac

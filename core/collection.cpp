@@ -30,6 +30,9 @@ std::uint64_t Number(const std::string& digits) {
   return number;
 }
 
+/// For a message. What lies deep is not shown: what writes it calls itself at every bracket.
+std::string Shown(const Json& value) { return value.is_structured() ? value.type_name() : value.dump(); }
+
 /// A field that is a whole number of type T: the library would make one of any number, whatever it is.
 template <typename T>
 T WholeIn(const Json& page, const char* field, const std::string& where) {
@@ -38,7 +41,7 @@ T WholeIn(const Json& page, const char* field, const std::string& where) {
   const bool fits = value.is_number_unsigned()
                         ? value.get<std::uint64_t>() <= kMost
                         : value.is_number_integer() && value.get<std::int64_t>() >= std::numeric_limits<T>::min();
-  if (!fits) throw InvalidInput("{}: {} is {}, wanted a whole number", where, field, value.dump());
+  if (!fits) throw InvalidInput("{}: {} is {}, wanted a whole number", where, field, Shown(value));
   return value.get<T>();
 }
 
@@ -176,8 +179,8 @@ std::string CollectedCsvHeading() {
 
 std::string CollectedCsvLine(const CollectedEpisode& episode) {
   return fmt::format("{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{}\n", episode.index, episode.task,
-                     episode.episode, episode.initial_state, episode.behaviour, episode.policy,
-                     Cell(Sentence(episode.parameters)), episode.without, episode.success ? 1 : 0, episode.fate,
+                     episode.episode, episode.initial_state, Cell(episode.behaviour), episode.policy,
+                     Cell(Sentence(episode.parameters)), Cell(episode.without), episode.success ? 1 : 0, episode.fate,
                      episode.stop, episode.frames, episode.contact_frames, episode.state_seed, episode.world_seed,
                      episode.policy_seed, Cell(episode.reason));
 }

@@ -27,6 +27,8 @@ constexpr std::pair<Showing, const char*> kShowings[] = {
     {Showing::kExample, "example"}, {Showing::kRepeat, "repeat"}, {Showing::kAdjudication, "adjudication"},
     {Showing::kImport, "import"}};
 
+constexpr const char* kWhole = "every row that another one names";
+
 std::int64_t Pragma(sqlite::Connection& connection, const char* sql) {
   sqlite::Statement statement = connection.Query(sql);
   return statement.Step() ? statement.Integer(0) : 0;
@@ -38,16 +40,11 @@ void Check(sqlite::Connection& connection, const fs::path& file) {
     throw InvalidInput("{}: is no study that this evac knows (version {})", file.string(), version);
 }
 
-/// @param field  what in it, with what was found
-Error Damaged(const fs::path& folder, const std::string& field, const char* wanted) {
-  return InvalidInput("{}: the study is damaged: {}, wanted {}", (folder / kFile).string(), field, wanted);
-}
-
 std::uint64_t SeedIn(const std::string& text, const fs::path& folder) {
   std::uint64_t seed = 0;
   const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), seed);
   if (error != std::errc() || end != text.data() + text.size())
-    throw Damaged(folder, fmt::format("its seed is '{}'", text), "a whole number");
+    throw DamagedStudy(folder, fmt::format("its seed is '{}'", text), "a whole number");
   return seed;
 }
 
@@ -62,16 +59,19 @@ bool HasTexts(const Json& object, std::initializer_list<const char*> names) {
 void CheckRubric(const StudyRubric& rubric, const fs::path& folder) {
   const Json document = Json::parse(rubric.document, nullptr, /*allow_exceptions=*/false);
   const bool has_texts = HasTexts(document, {"instruction", "success", "version"});
-  const Json stages = has_texts ? document.value("stages", Json::array()) : Json();
   const auto is_stage = [](const Json& stage) { return HasTexts(stage, {"name", "description"}); };
-  if (!stages.is_array() || !std::ranges::all_of(stages, is_stage))
-    throw Damaged(folder, fmt::format("the rubric {} of task {} is none", rubric.hash, rubric.task),
-                  "JSON: instruction, success, version, stages [{name, description}]");
+  const auto are_stages = [&](const Json& stages) {  // not copied: what copies calls itself at every bracket
+    return stages.is_array() && std::ranges::all_of(stages, is_stage);
+  };
+  if (!has_texts || (document.contains("stages") && !are_stages(document.at("stages"))))
+    throw DamagedStudy(folder, fmt::format("the rubric {} of task {} is none", rubric.hash, rubric.task),
+                       "JSON: instruction, success, version, stages [{name, description}]");
 }
 
 void CheckViews(const StudyClip& clip, const fs::path& folder) {
   if (!Json::parse(clip.views, nullptr, /*allow_exceptions=*/false).is_array())
-    throw Damaged(folder, fmt::format("the views of clip {} are none", clip.id), "JSON: [{name, x, y, width, height}]");
+    throw DamagedStudy(folder, fmt::format("the views of clip {} are none", clip.id),
+                       "JSON: [{name, x, y, width, height}]");
 }
 
 constexpr const char* kClipColumns =
@@ -116,6 +116,10 @@ std::string LineOf(const StudyClip& clip) {
 
 }  // namespace
 
+Error DamagedStudy(const fs::path& folder, const std::string& field, const char* wanted) {
+  return InvalidInput("{}: the study is damaged: {}, wanted {}", (folder / kFile).string(), field, wanted);
+}
+
 const char* Name(RaterRole role) {
   for (const auto& [known, name] : kRoles) {
     if (known == role) return name;
@@ -141,7 +145,7 @@ Showing ShowingFromName(const std::string& name) {
   for (const auto& [showing, known] : kShowings) {
     if (known == name) return showing;
   }
-  throw InternalError("the study is damaged: '{}' is no way to show a clip", name);
+  throw InvalidInput("the study is damaged: '{}' is no way to show a clip", name);
 }
 
 StudyStore::StudyStore(std::unique_ptr<Database> database) : database_(std::move(database)) {}
@@ -190,7 +194,7 @@ const fs::path& StudyStore::folder() const { return database_->folder; }
 StudyInfo StudyStore::info() const {
   sqlite::Statement row = database_->connection.Query(
       "SELECT name, seed, raters_per_clip, width_px, height_px, period_s, evac_version FROM study");
-  if (!row.Step()) throw InternalError("the study is damaged: it has no name");
+  if (!row.Step()) throw DamagedStudy(folder(), "the table study has no row", "the one that says how it was begun");
   StudyInfo info;
   info.name = row.Text(0);
   info.seed = SeedIn(row.Text(1), folder());
@@ -200,6 +204,24 @@ StudyInfo StudyStore::info() const {
   info.period_s = row.Real(5);
   info.evac_version = row.Text(6);
   return info;
+}
+
+void StudyStore::RequireWhole() const {
+  info();
+  sqlite::Connection& connection = database_->connection;
+  sqlite::Statement broken = connection.Query("PRAGMA foreign_key_check");  // table, rowid, the other one, which key
+  if (!broken.Step()) return;
+  const std::string table = broken.Text(0), other = broken.Text(2);
+  sqlite::Statement key =
+      connection.Query("SELECT \"from\" FROM pragma_foreign_key_list(?) WHERE id = ?", table, broken.Integer(3));
+  const std::string column = key.Step() ? key.Text(0) : "";
+  sqlite::Statement named = connection.Query(
+      fmt::format("SELECT \"{}\" FROM \"{}\" WHERE rowid = ?", column, table).c_str(), broken.Integer(1));
+  const std::string value = named.Step() ? named.Text(0) : "";
+  throw DamagedStudy(
+      folder(),
+      fmt::format("row {} of {} names {} '{}', which {} does not have", broken.Integer(1), table, column, value, other),
+      kWhole);
 }
 
 void StudyStore::Begin() { database_->connection.Run("BEGIN IMMEDIATE"); }
@@ -265,7 +287,7 @@ std::vector<StudyClip> StudyStore::Clips() const {
 
 StudyClip StudyStore::Clip(std::int64_t id) const {
   sqlite::Statement row = database_->connection.Query(ClipQuery("WHERE id = ?").c_str(), id);
-  if (!row.Step()) throw InternalError("the study is damaged: there is no clip {}", id);
+  if (!row.Step()) throw DamagedStudy(folder(), fmt::format("there is no clip {}", id), kWhole);
   return ClipOf(row, folder());
 }
 

@@ -23,7 +23,7 @@ RaterRole RaterRoleFromName(const std::string& name);
 enum class Showing { kCounted, kGold, kPractice, kExample, kRepeat, kAdjudication, kImport };
 /// "counted", "gold", "practice", "example", "repeat", "adjudication", "import".
 const char* Name(Showing showing);
-/// @throws InternalError for a name that is none.
+/// @throws InvalidInput for a name that is none.
 Showing ShowingFromName(const std::string& name);
 
 /// What a study was begun with; never changed.
@@ -122,7 +122,7 @@ struct StudyTable {
 
 /// One rating study: STUDY/study.sqlite and the clips beside it (docs/formats/study.md). WAL, synchronous=FULL. One
 /// thread at a time; any number of processes may read. What is asked for and not as it is written (a seed, a rubric, a
-/// clip's views) is an InvalidInput that names the file.
+/// clip's views, a clip or rater that is not there) is an InvalidInput that names the file.
 class StudyStore {
  public:
   enum class Mode { kReadOnly, kReadWrite };
@@ -139,6 +139,9 @@ class StudyStore {
 
   const std::filesystem::path& folder() const;
   StudyInfo info() const;
+  /// Every row is there that another one names. Reads the whole study once.
+  /// @throws InvalidInput naming the file, the first row whose own is missing, and what it names.
+  void RequireWhole() const;
   /// 12 hex digits that no other study has, the same for as long as it lives: what browsers tell studies apart by.
   std::string Id() const;
 
@@ -264,6 +267,7 @@ class StudyStore {
   std::vector<Guess> Guesses() const;
 
   /// Every verdict ever given with every stored field, its clip's and its rater's.
+  /// @throws InvalidInput as RequireWhole: one whose clip or rater is missing would be left out.
   StudyTable VerdictTable() const;
   /// The same of one rater, without what a rater may not know.
   StudyTable VerdictTableOf(std::int64_t rater) const;

@@ -85,7 +85,7 @@ std::optional<StudyRater> StudyStore::RaterOfSession(const std::string& secret) 
 
 StudyRater StudyStore::Rater(std::int64_t id) const {
   sqlite::Statement row = database_->connection.Query((std::string(kRaterColumns) + "WHERE r.id = ?").c_str(), id);
-  if (!row.Step()) throw InternalError("the study is damaged: there is no rater {}", id);
+  if (!row.Step()) throw DamagedStudy(folder(), fmt::format("there is no rater {}", id), "everyone whom a row names");
   return RaterOf(row);
 }
 

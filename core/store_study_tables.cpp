@@ -40,6 +40,7 @@ void Fill(StudyTable& table, sqlite::Statement row) {
 }  // namespace
 
 StudyTable StudyStore::VerdictTable() const {
+  RequireWhole();
   StudyTable table;
   table.columns.assign(std::begin(kOwnNames), std::end(kOwnNames));
   table.columns.insert(table.columns.end(), std::begin(kClipNames), std::end(kClipNames));

@@ -56,6 +56,7 @@ HttpAnswer Refused(int status, const char* error, const std::string& message) {
 /// @throws InvalidInput if the study is damaged: before raters are let in
 std::string IdOfWhole(const std::filesystem::path& folder) {
   const StudyStore study = StudyStore::Open(folder, StudyStore::Mode::kReadWrite);
+  study.RequireWhole();
   study.Rubrics();
   study.Clips();
   return study.Id();

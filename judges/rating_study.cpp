@@ -59,6 +59,16 @@ StudyClip ClipOf(const Episode& episode, const fs::path& run, bool is_real, cons
   return clip;
 }
 
+/// Without one every rater would decide by an idea of success of their own.
+void DemandRubrics(const std::vector<Candidate>& candidates) {
+  for (const Candidate& candidate : candidates) {
+    if (candidate.task.rubric.version != kNoRubric) continue;
+    throw InvalidInput("{}: task {} has no rubric: raters would not be told what success is; wanted a run of a suite "
+                       "with `rubric: {{success: …}}` beside its `recording` (docs/suite.md)",
+                       candidate.clip.run, candidate.clip.task);
+  }
+}
+
 /// The states of each task that are drawn.
 std::map<std::string, std::set<std::string>> DrawnStates(const std::vector<Candidate>& candidates,
                                                          const StudyOptions& options) {
@@ -88,8 +98,8 @@ class Collector {
 
   void Read(const fs::path& run) {
     const Store store = Store::Open(run, Store::Mode::kReadOnly);
-    std::map<std::string, Task> tasks;
-    for (const Task& task : store.Tasks()) tasks[task.id] = task;
+    tasks_.clear(), worlds_.clear();
+    for (const Task& task : store.Tasks()) tasks_[task.id] = task;
     for (const WorldInfo& world : store.Worlds()) worlds_[world.name] = world;
     const auto verdicts = store.CurrentVerdicts();
     int without_video = 0, failed = 0;
@@ -99,7 +109,7 @@ class Collector {
       else if (episode.video.empty())
         ++without_video;
       else
-        Add(episode, run, tasks.at(episode.key.pair.task), verdicts);
+        Add(episode, run, verdicts);
     }
     if (failed > 0)
       left_out.push_back(fmt::format("{}: {} failed episodes: there is nothing to rate", run.string(), failed));
@@ -111,9 +121,21 @@ class Collector {
   std::vector<std::string> left_out;
 
  private:
-  void Add(const Episode& episode, const fs::path& run, const Task& task,
+  /// @throws InvalidInput if the run says nothing of the episode's task or world
+  template <typename Info>
+  static const Info& Known(const std::map<std::string, Info>& by_name, const std::string& name, const char* what,
+                           const fs::path& run, const Episode& episode) {
+    const auto found = by_name.find(name);
+    if (found != by_name.end()) return found->second;
+    throw InvalidInput("{}: the run is damaged: episode {} names {} '{}', of which its database has no row; wanted the "
+                       "run as it was",
+                       run.string(), episode.key.Id(), what, name);
+  }
+
+  void Add(const Episode& episode, const fs::path& run,
            const std::map<std::string, std::map<std::string, Verdict>>& verdicts) {
-    const WorldInfo& world = worlds_[episode.key.world];
+    const Task& task = Known(tasks_, episode.key.pair.task, "task", run, episode);
+    const WorldInfo& world = Known(worlds_, episode.key.world, "world", run, episode);
     Candidate candidate{ClipOf(episode, run, world.is_real, RubricOf(task).hash), run / episode.video, task,
                         world.type == "evac"};
     const auto of_episode = verdicts.find(episode.key.Id());
@@ -129,7 +151,8 @@ class Collector {
   }
 
   const StudyOptions& options_;
-  std::map<std::string, WorldInfo> worlds_;
+  std::map<std::string, Task> tasks_;        // of the run that is read
+  std::map<std::string, WorldInfo> worlds_;  // likewise
 };
 
 /// How many clips are taken for what, in this order: never more than a quarter of all for one use.
@@ -333,6 +356,7 @@ StudyMade MakeStudy(const fs::path& folder, const StudyOptions& options,
   for (const fs::path& run : options.runs) collector.Read(fs::absolute(run).lexically_normal());
   std::vector<Candidate>& candidates = collector.candidates;
   if (candidates.empty()) throw InvalidInput("{}: no episode with a video to rate", options.runs.front().string());
+  DemandRubrics(candidates);
   LeaveOutWhatIsNotDrawn(candidates, options);
   if (!options.gold_from.empty()) ChooseKnown(candidates, options);
 

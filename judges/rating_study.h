@@ -47,7 +47,8 @@ struct StudyMade {
 /// @throws InvalidInput if a run is not there, no episode has a video, an option is out of range, or earlier waves were
 /// put through another codec, or through none, or are of another height than is asked for; or if a task's views do not
 /// fit into the study's clips even 64 px high; or if an episode whose clip is in the study has another video by now, or
-/// another process makes a wave of it.
+/// another process makes a wave of it; or if a task has no rubric (kNoRubric), or a run no row of an episode's task or
+/// world.
 StudyMade MakeStudy(const std::filesystem::path& folder, const StudyOptions& options,
                     const std::function<void(std::size_t, std::size_t)>& progress);
 

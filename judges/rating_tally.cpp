@@ -41,6 +41,7 @@ std::vector<std::int64_t> RatingTally::Disputes() const {
 
 void RatingTally::Begin(const StudyStore& store, int waves) {
   *this = RatingTally();
+  store.RequireWhole();  // votes of a rater who is missing would be counted as none
   raters_per_clip_ = store.info().raters_per_clip;
   for (StudyClip& clip : store.Clips()) {
     if (clip.use != Showing::kPractice && clip.use != Showing::kExample) {

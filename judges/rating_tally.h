@@ -17,6 +17,7 @@ namespace evac {
 class RatingTally {
  public:
   /// Of the study as it is now. Clips that were added make it read all anew. Always the same study.
+  /// @throws InvalidInput if it is damaged (StudyStore::RequireWhole).
   void Read(const StudyStore& store);
 
   /// Every clip of the study but practice and examples, in its order, with the votes that count.

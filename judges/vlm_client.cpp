@@ -137,6 +137,7 @@ bool VlmClient::MaySend() {
   if (budget.max_usd > 0 && spent_.Usd(budget) >= budget.max_usd)
     why = fmt::format("{:.2f} USD are spent of {:.2f}", spent_.Usd(budget), budget.max_usd);
   if (!why.empty() && !why_over_) why_over_ = "the budget is spent: " + why;
+  if (!why_over_ && options_.interrupted()) why_over_ = "interrupted";
   if (why_over_) return false;
   ++spent_.requests;
   return true;

@@ -31,6 +31,7 @@ struct VlmClientOptions {
   VlmBudget budget{};
   std::uint64_t seed = 7;                 ///< of the jitter between tries
   std::function<void(double)> sleep_s{};  ///< waits that long; must be given
+  std::function<bool()> interrupted = [] { return false; };  ///< asked before each request, by any thread
 };
 
 /// What one question came to, after all its tries.
@@ -49,6 +50,7 @@ struct VlmSaid {
 ///   timeouts               tried twice
 ///   400, 413, 422          not again: was_rejected
 ///   401, 403, 404          over
+///   interrupted            over; what was sent is waited for
 /// Over means: nothing more is sent, everything stored stays, WhyOver says why. Thread-safe.
 class VlmClient {
  public:

@@ -150,7 +150,7 @@ VlmAnswer VlmJudge::AnswerOf(const Clip& clip, VlmWording wording) {
   const VlmAnswer answer = Asked(clip, wording, call);
   call.latency_ms = std::chrono::duration_cast<std::chrono::milliseconds>(Clock::now() - before).count();
   call.created_at = options_.now();
-  cache_.Add(call);
+  if (call.attempts > 0) cache_.Add(call);  // what was never sent is no call
   if (const auto why = client_.WhyOver(); why && LabelOf(answer.outcome) == Label::kInvalid)
     throw InternalError("{}", *why).Called("judge_over");
   return answer;

@@ -7,8 +7,6 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
-#include "core/error.h"
-
 namespace evac {
 namespace {
 
@@ -176,29 +174,6 @@ std::string ToJson(const PolicySpec& spec) {
               {"cameras", cameras},
               {"needs", spec.needs}}
       .dump(-1, ' ', false, json::error_handler_t::replace);
-}
-
-PolicySpec SpecFromJson(const std::string& text) try {
-  const json page = json::parse(text);
-  PolicySpec spec;
-  page.at("name").get_to(spec.name);
-  page.at("checkpoint").get_to(spec.checkpoint);
-  page.at("action_space").get_to(spec.action_space);
-  page.at("frame").get_to(spec.frame);
-  page.at("quaternion_order").get_to(spec.quaternion_order);
-  page.at("image_format").get_to(spec.image_format);
-  page.at("gripper_open").get_to(spec.gripper_open);
-  page.at("gripper_closed").get_to(spec.gripper_closed);
-  page.at("arms").get_to(spec.arms);
-  page.at("period_s").get_to(spec.period_s);
-  page.at("chunk_size").get_to(spec.chunk_size);
-  page.at("needs").get_to(spec.needs);
-  for (const json& camera : page.at("cameras")) {
-    spec.cameras.push_back({camera.at("name"), camera.at("width_px"), camera.at("height_px")});
-  }
-  return spec;
-} catch (const json::exception& error) {
-  throw InvalidInput("a policy's declaration: {}", error.what());
 }
 
 }  // namespace evac

@@ -61,9 +61,7 @@ std::string Changes(const PolicySpec& before, const PolicySpec& now);
 /// Both declarations as a table, a row per field, a `*` before each row that does not fit and the reasons below.
 std::string SideBySide(const PolicySpec& harness, const PolicySpec& policy);
 
-/// As the store keeps it. FromJson(ToJson(spec)) == spec.
+/// As the store keeps it: every field under its name. Bytes that are no UTF-8 are shown as U+FFFD.
 std::string ToJson(const PolicySpec& spec);
-/// @throws InvalidInput naming the field.
-PolicySpec SpecFromJson(const std::string& json);
 
 }  // namespace evac

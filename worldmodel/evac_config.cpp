@@ -102,6 +102,7 @@ void ReadPublishedVae(const Config& page, nn::VaeConfig& vae) {
   const Config sizes = page.Section("ddconfig");
   Read(sizes, "ch", vae.channels);
   Read(sizes, "ch_mult", vae.channel_mult);
+  sizes.Require(!vae.channel_mult.empty() && vae.channel_mult.size() <= 8, "ch_mult", "1 to 8 levels");
   Read(sizes, "num_res_blocks", vae.num_res_blocks);
   Read(sizes, "z_channels", vae.z_channels);
 }

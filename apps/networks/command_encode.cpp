@@ -12,6 +12,7 @@
 #include "apps/commands.h"
 #include "apps/network_parts.h"
 #include "apps/networks/codec_identity.h"
+#include "apps/warnings.h"
 #include "core/config.h"
 #include "core/error.h"
 #include "core/file.h"
@@ -67,6 +68,16 @@ std::string ProductsOf(const EncodeArguments& arguments) {
   return std::string(arguments.bf16 ? "bfloat16" : "float32") + (arguments.device == "cpu" ? "" : " on cuda");
 }
 
+/// Beside latents that are to be made in `folder`: which evac began those that are so.
+/// @param how  whatever shard they are of
+void KeepWhoBeganLatents(const std::filesystem::path& folder, const std::vector<std::filesystem::path>& shards,
+                         const train::EncodeOptions& how) {
+  const bool is_begun = std::ranges::any_of(shards, [&](const std::filesystem::path& shard) {
+    return train::IsEncoded(folder / shard.filename(), how);
+  });
+  KeepWhoBegan(folder / "latents_begun_by", is_begun, "what is encoded in " + folder.string());
+}
+
 ExitCode Encode(const EncodeArguments& arguments) {
   const nn::ModelConfig config = ReadEvacConfig(arguments.config);
   train::CheckpointWeights file(arguments.codec);
@@ -75,6 +86,7 @@ ExitCode Encode(const EncodeArguments& arguments) {
   const nn::Vae vae(nn::Scope(weights, train::kCodecPrefix), config.vae);
   const std::string codec = CodecSha256(arguments.codec);
   const std::vector<std::filesystem::path> shards = train::ShardPaths(arguments.shards);
+  KeepWhoBeganLatents(arguments.shards, shards, {codec, "", ProductsOf(arguments), config.vae.scale_factor});
   std::atomic<std::size_t> encoded = 0;
   ForEachShard(arguments, shards.size(), [&](std::size_t i) {
     const train::EncodeOptions options{codec, Sha256HexOfFile(shards[i]), ProductsOf(arguments),
@@ -134,6 +146,8 @@ ExitCode Imagine(const EncodeArguments& arguments) {
     set.OpenLatents(config.vae.z_channels, config.vae.Stride(), config.vae.scale_factor);
     if (set.codec() != codec)
       throw TensorError(arguments.codec + " did not make the shards' latents: wanted `evac encode` with it first");
+    if (shards == 0)  // the first of both splits: nothing was refused
+      KeepWhoBeganLatents(to, train::ShardPaths(from), {codec, "", products, config.vae.scale_factor});
     ForEachShard(arguments, set.shards().size(), [&](std::size_t i) {
       const std::filesystem::path shard = set.shards()[i].path, own = to / shard.filename();
       LinkInto(to, shard);

@@ -11,7 +11,6 @@
 #include "core/config.h"
 #include "core/file.h"
 #include "core/hash.h"
-#include "core/version.h"
 #include "worldmodel/evac_config.h"
 #include "worldmodel/nn/library.h"
 
@@ -112,11 +111,7 @@ RunLock HoldFolder(const std::filesystem::path& out) {
 }
 
 void KeepWhoBegan(const std::filesystem::path& out) {
-  const std::filesystem::path file = out / "begun_by";
-  if (!std::filesystem::exists(out / "training.safetensors")) return WriteFileAtomically(file, EVAC_VERSION "\n");
-  std::string began = std::filesystem::exists(file) ? ReadFile(file) : "";
-  std::erase(began, '\n');
-  SayIfAnotherVersionBegan(out, began);
+  KeepWhoBegan(out / "begun_by", std::filesystem::exists(out / "training.safetensors"), out.string());
 }
 
 int LibraryThreadsOf(const train::JobPlace& place, const train::JobOptions& options) {

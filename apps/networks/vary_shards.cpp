@@ -14,12 +14,14 @@
 #include "apps/networks/packed_clips.h"
 #include "apps/networks/shard_rows.h"
 #include "apps/variation.h"
+#include "apps/warnings.h"
 #include "apps/work_share.h"
 #include "core/error.h"
 #include "core/file.h"
 #include "core/seed.h"
 #include "core/store_lock.h"
 #include "worldmodel/conditioning.h"
+#include "worldmodel/nn/number_text.h"
 
 namespace evac {
 namespace {
@@ -85,8 +87,8 @@ class VariedCollection {
   std::uint64_t seed_ = 0;
 };
 
-TensorMetadata MetadataOf(const VaryArguments& arguments, const train::Shard& shard) {
-  const auto file = TensorFile::Open(shard.path);
+TensorMetadata MetadataOf(const VaryArguments& arguments, const fs::path& shard) {
+  const auto file = TensorFile::Open(shard);
   return {{"format", "evac-variants"},
           {"version", "1"},
           {"recipe", file.metadata().at("recipe")},
@@ -152,7 +154,8 @@ class Varier {
     if (const auto arms = packing.find("arms_read"); arms != packing.end() && arms->second == "measured")
       throw InvalidInput("{}: arms_read is measured, wanted told: what is varied is what the arms were told", arguments_.shards.string());
     const std::string& period_s = packing.at("period_s");
-    if (std::abs(std::stod(period_s) - task.period_s) > 1e-9)
+    double packed_s = 0;
+    if (!nn::ParseNumber(period_s, packed_s) || std::abs(packed_s - task.period_s) > 1e-9)
       throw InvalidInput("{}: period_s is {}, wanted {} as {} has it", arguments_.shards.string(), period_s, task.period_s, task.id);
     const train::Shard& shard = set_.shards.shards()[clip.shard];
     const std::vector<Camera> cameras = CamerasOf(set_, clip, task);
@@ -215,6 +218,14 @@ bool IsThere(const fs::path& path, const TensorMetadata& metadata) {
   return fs::exists(path) && TensorFile::Open(path).metadata() == metadata;
 }
 
+/// Which evac began the variants that are as these shall be.
+void KeepWhoBeganVariants(const VaryArguments& arguments) {
+  const bool is_begun = std::ranges::any_of(train::ShardPaths(arguments.shards), [&](const fs::path& shard) {
+    return IsThere(train::VariantsPath(shard), MetadataOf(arguments, shard));
+  });
+  KeepWhoBegan(arguments.shards / "variants_begun_by", is_begun, "what is varied in " + arguments.shards.string());
+}
+
 /// Worlds that nobody works with.
 class Worlds {
  public:
@@ -255,7 +266,7 @@ Counts VarySplit(const VaryArguments& arguments, const VariedCollection& collect
     for (const PackedClip& clip : set.clips) {
       if (clip.shard == s) clips.push_back(&clip);
     }
-    const TensorMetadata metadata = MetadataOf(arguments, shard);
+    const TensorMetadata metadata = MetadataOf(arguments, shard.path);
     if (IsThere(train::VariantsPath(shard.path), metadata)) {
       for (std::size_t i = 0; i < clips.size(); ++i) progress.Count();
       continue;
@@ -284,6 +295,7 @@ Counts VarySplit(const VaryArguments& arguments, const VariedCollection& collect
 void VaryShards(const VaryArguments& arguments) {
   const VariedCollection collection(arguments);
   const RunLock lock(arguments.shards / "lock");
+  KeepWhoBeganVariants(arguments);
   Worlds worlds(collection.recipe());
   Counts all;
   for (const train::Split split : {train::Split::kTrain, train::Split::kHoldout}) {

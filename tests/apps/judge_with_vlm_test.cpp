@@ -3,7 +3,9 @@
 #include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <signal.h>
 
+#include <atomic>
 #include <fstream>
 #include <nlohmann/json.hpp>
 #include <utility>
@@ -71,8 +73,12 @@ class ASmallServer : public testing::Test {
     return count;
   }
 
+  std::atomic<int> asked_ = 0, ctrl_c_at_ = 0;  ///< somebody presses it while that request is answered; 0: nobody does
   StoredRun run_{"run", "s", "f", 24};
-  ScriptedServer server_{Cramped};
+  ScriptedServer server_{[this](const SeenRequest& request) {
+    if (++asked_ == ctrl_c_at_) ::raise(SIGINT);
+    return Cramped(request);
+  }};
   std::filesystem::path page_ = run_.folder().parent_path() / "page.yaml";
 };
 
@@ -95,6 +101,25 @@ TEST_F(ASmallServer, SaysHowFarItIsWhereNobodyLooksOn) {
   const std::string said = testing::internal::GetCapturedStderr();
   EXPECT_THAT(said, testing::ContainsRegex("2 of 2 episodes judged by vlm:gloomy-[0-9a-f]*, "));
   EXPECT_THAT(said, testing::ContainsRegex("2 of 2 episodes judged by vlm:gloomy-[0-9a-f]*:flip, "));
+}
+
+/// The first Ctrl-C killed the command in mid-answer, and said nothing.
+TEST_F(ASmallServer, AtTheFirstCtrlCWhatIsJudgedStaysAndTheSameCommandGoesOn) {
+  ::signal(SIGINT, SIG_DFL);  // as on a terminal, whatever the caller of the tests ignores
+  ctrl_c_at_ = 8;  // who it is, whether it sees, three refused wordings; the last small one about the first episode
+  try {
+    Judge();
+    ADD_FAILURE() << "it was interrupted";
+  } catch (const Error& error) {
+    EXPECT_THAT(testing::internal::GetCapturedStdout(), HasSubstr("1 rated (1 failure)"));
+    EXPECT_EQ(error.exit_code(), ExitCode::kInternal);
+    EXPECT_THAT(error.what(), testing::AllOf(HasSubstr("interrupted"),
+                                             HasSubstr("what was judged is stored; the same command goes on")));
+  }
+  EXPECT_EQ(Verdicts(), 1u);
+  EXPECT_EQ(asked_.load(), 8) << "nothing more is sent";
+  EXPECT_THAT(Judge(), HasSubstr("1 rated (1 failure), 1 had a verdict already"));
+  EXPECT_EQ(Verdicts(), 4u);
 }
 
 TEST_F(ASmallServer, WhatARetestWouldTakeIsSaidBefore) {

@@ -3,9 +3,15 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <functional>
+
+#include "apps/rate_status.h"
 #include "apps/rate_tables.h"
 #include "core/error.h"
 #include "core/store.h"
+#include "core/store_sqlite.h"
+#include "judges/rating_board.h"
+#include "judges/rating_server.h"
 #include "tests/judges/rating_support.h"
 
 namespace evac {
@@ -197,6 +203,58 @@ TEST_F(Resolving, AClipThatNobodySawGetsNobodysWord) {
               testing::ThrowsMessage<Error>(testing::AllOf(testing::HasSubstr(there), testing::HasSubstr(shown),
                                                            testing::HasSubstr("another than raters were shown"))));
   EXPECT_EQ(Store::Open(run, Store::Mode::kReadOnly).Judges(), std::vector<std::string>{"oracle"});
+}
+
+/// It ended with 4 in "map::at", or left the votes of who was missing out without a word.
+TEST_F(Resolving, AStudyWithoutARowThatAnotherNamesIsTheUsersAndSaysWhichRow) {
+  AtTheDesk ann(store, desk), bob(store, desk);
+  RateAll(ann, "success");
+  RateAll(bob, "success");
+  const std::pair<const char*, const char*> damages[] = {
+      {"DELETE FROM rubrics", "of clips names rubric_hash '"},
+      {"DROP TRIGGER clips_stay; DELETE FROM clips WHERE id = 1", "names clip '1', which clips does not have"},
+      {"DELETE FROM raters WHERE id = 1", "'1', which raters does not have"},
+      {"DELETE FROM study", "the table study has no row"}};
+  const TempFolder copies;
+  for (const auto& [sql, what] : damages) {
+    const std::filesystem::path folder = copies / "study";
+    std::filesystem::remove_all(folder);
+    std::filesystem::copy(study.folder(), folder, std::filesystem::copy_options::recursive);
+    const std::string file = (folder / "study.sqlite").string();
+    sqlite::Connection::OpenReadWrite(file).RunScript(std::string("PRAGMA foreign_keys = OFF; ") + sql);
+    const StudyStore damaged = StudyStore::Open(folder, StudyStore::Mode::kReadOnly);
+    const std::function<void()> uses[] = {[&] { ResolveStudy(damaged, {}); }, [&] { RatingBoard(damaged, 1); },
+                                          [&] { damaged.VerdictTable(); },
+                                          [&] { RatingServer({.study = folder}); }};
+    for (const auto& use : uses) {
+      try {
+        use();
+        ADD_FAILURE() << sql;
+      } catch (const Error& error) {
+        EXPECT_EQ(error.exit_code(), ExitCode::kInvalidInput) << error.what();
+        EXPECT_THAT(error.what(), testing::AllOf(testing::HasSubstr(file + ": the study is damaged"),
+                                                 testing::HasSubstr(what)))
+            << sql;
+      }
+    }
+  }
+  EXPECT_EQ(Store::Open(study.run().folder(), Store::Mode::kReadOnly).Judges(), std::vector<std::string>{"oracle"});
+}
+
+/// The lead's board said so, and who read the same interval on a terminal was not told.
+TEST_F(Resolving, TheStatusSaysHowManyReplicatesAlphasIntervalIsNotFrom) {
+  AtTheDesk ann(store, desk), bob(store, desk);
+  const auto status = [&] {
+    testing::internal::CaptureStdout();
+    PrintRatingStatus(store, 1, false);
+    return testing::internal::GetCapturedStdout();
+  };
+  RateAll(ann, "success");
+  EXPECT_THAT(status(), testing::Not(testing::HasSubstr("dropped")));
+  const std::int64_t odd = store.Clips().front().id;
+  bob.RateAll([odd](const StudyClip& clip) { return clip.id == odd ? "failure" : "success"; });
+  EXPECT_THAT(status(), testing::ContainsRegex("alpha -?[0-9.]+ \\[.*\\] \\([1-9][0-9]* replicates without any spread "
+                                               "dropped\\), Fleiss"));
 }
 
 TEST_F(Resolving, UnderTheNameOfAnotherJudgeOrOfNoneNothingIsWritten) {

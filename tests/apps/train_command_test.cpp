@@ -11,6 +11,7 @@
 #include "apps/networks/training_page.h"
 #include "core/file.h"
 #include "core/store_lock.h"
+#include "core/version.h"
 #include "tests/apps/learning_shards.h"
 #include "tests/apps/printed.h"
 #include "tests/support/command.h"
@@ -98,6 +99,26 @@ TEST_F(TrainCommand, SaysThatAnotherVersionOfEvacBeganTheTraining) {
   EXPECT_THAT(note(), HasSubstr("evac: note: " + Path("codec") + " was begun by evac 0.0.1; evac "));
   std::filesystem::remove(Path("codec/begun_by"));
   EXPECT_THAT(note(), HasSubstr("was begun by an evac that did not write down its version"));
+}
+
+/// Nothing said which version had made half of the latents.
+TEST_F(TrainCommand, EncodingSaysThatAnotherVersionOfEvacBeganIt) {
+  TrainCodec();
+  const auto note = [&] {
+    testing::internal::CaptureStderr();
+    Printed(AddEncode, {"encode", Path("shards"), "--config", Path("page.yaml"), "--codec", Path("codec/codec.safetensors")});
+    return testing::internal::GetCapturedStderr();
+  };
+  EXPECT_THAT(note(), Not(HasSubstr("was begun by")));
+  EXPECT_THAT(note(), Not(HasSubstr("was begun by"))) << "this one did";
+  WriteFileAtomically(Path("shards/latents_begun_by"), "0.0.1\n");
+  EXPECT_THAT(note(), HasSubstr("evac: note: what is encoded in " + Path("shards") + " was begun by evac 0.0.1; evac "));
+  std::filesystem::remove(Path("shards/latents_begun_by"));
+  EXPECT_THAT(note(), HasSubstr("was begun by an evac that did not write down its version"));
+  for (const char* latents : {"shards/latents_00000.safetensors", "shards/latents_00001.safetensors"})
+    std::filesystem::remove(Path(latents));
+  EXPECT_THAT(note(), Not(HasSubstr("was begun by"))) << "begun anew";
+  EXPECT_EQ(ReadFile(Path("shards/latents_begun_by")), EVAC_VERSION "\n");
 }
 
 TEST_F(TrainCommand, AFolderThatAnotherTrainingWritesIsRefusedWithItsProcess) {

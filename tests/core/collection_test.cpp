@@ -60,6 +60,15 @@ TEST(Collection, ACellWithCommasAndQuotesStaysOneCell) {
   EXPECT_THAT(CollectedCsvLine(Row()), HasSubstr(",\"stage place was not reached; nearest \"\"at\"\" 3.1 s, 4\"\n"));
 }
 
+/// They may have any name: one with a comma moved all that follows by a column.
+TEST(Collection, NamesOfABehaviourAndOfAThingAreOneCellEach) {
+  CollectedEpisode row = Row();
+  row.behaviour = "drop, \"late\"";
+  row.without = "ham, the second";
+  EXPECT_THAT(CollectedCsvLine(row), HasSubstr(",\"ham, the second\",0,drop,"));
+  EXPECT_THAT(CollectedCsvLine(row), HasSubstr(",collect-7-00001,\"drop, \"\"late\"\"\",visual_pick,"));
+}
+
 TEST(Collection, ABrokenRowIsRefusedByName) {
   for (const std::string text : {"", "[]", "{\"index\": 1}", "{\"index\": \"one\"}"}) {
     try {
@@ -82,6 +91,13 @@ TEST(Collection, ARowsNumbersAreTakenAsTheyStandOrNotAtAll) {
                 AllOf(HasSubstr("rows/a/1.json: "), HasSubstr(field.ends_with("seed") ? "seed" : field)))
         << found;
   }
+}
+
+/// The message showed all of it, and what writes JSON calls itself at every bracket: the process crashed.
+TEST(Collection, AMillionBracketsWhereANumberShouldBeAreRefusedInAWord) {
+  const std::string text = "{\"index\": " + std::string(1'000'000, '[') + std::string(1'000'000, ']') + "}";
+  EXPECT_EQ(MessageOf([&] { ParseCollected(text, "rows/a/1.json"); }),
+            "rows/a/1.json: index is array, wanted a whole number");
 }
 
 TEST(Collection, OnlyAnEpisodeThatDivergedHasNoFrames) {

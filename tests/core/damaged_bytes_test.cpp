@@ -36,5 +36,14 @@ TEST(DamagedBytes, ACountBeyondAnIntegerIsDamageAndNoNumber) {
   EXPECT_THAT(MessageOf([&] { codec::DecodeTask(text); }), HasSubstr("8.1e+87 is no count"));
 }
 
+/// The message showed all of it, and what writes JSON calls itself at every bracket: the process crashed.
+TEST(DamagedBytes, AMillionBracketsWhereACountShouldBeAreDamageToo) {
+  std::string text = codec::EncodeTask({});
+  const std::string before = "\"max_chunks\":";
+  const std::size_t at = text.find(before) + before.size();
+  text.replace(at, text.find(',', at) - at, std::string(1'000'000, '[') + std::string(1'000'000, ']'));
+  EXPECT_THAT(MessageOf([&] { codec::DecodeTask(text); }), HasSubstr("array is no count"));
+}
+
 }  // namespace
 }  // namespace evac

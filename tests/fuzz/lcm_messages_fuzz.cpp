@@ -19,7 +19,7 @@ void Convert(const evac::hello_t& hello) { evac::SideBySide(evac::PolicySpec(), 
 void Convert(const evac::declaration_t& declaration) {
   const evac::PolicySpec spec = evac::FromWire(declaration.policy);
   if (evac::FromWire(evac::ToWire(spec)) != spec) std::abort();
-  evac::SpecFromJson(evac::ToJson(spec));
+  evac::ToJson(spec);
 }
 void Convert(const evac::observation_t& header) {
   for (const auto& arm : header.arms) evac::FromWire(arm, "arm");

@@ -11,6 +11,7 @@
 #include "core/tensor_file.h"
 #include "policies/learned_input.h"
 #include "policies/messages.h"
+#include "tests/fuzz/small_recipe.h"
 #include "tests/fuzz/small_shards.h"
 #include "tests/support/synthetic_recording.h"
 
@@ -129,6 +130,12 @@ void MakeMessageSeeds(const fs::path& folder) {
   evac::WriteText(folder / "jpeg", std::string("\x08\x01\x40\x7f", 4));
 }
 
+/// A recipe with the pages it names, each after the letter that says which it is (collect_recipe_fuzz.cpp).
+void MakeRecipeSeeds(const fs::path& corpus) {
+  for (const RecipePage& page : kRecipePages)
+    evac::WriteText(corpus / "collect_recipe_fuzz" / page.file, page.letter + std::string(page.text));
+}
+
 /// What people and their browsers write: tables, a server's page, answers.
 void MakeTextSeeds(const fs::path& corpus) {
   evac::WriteText(corpus / "rating_csv_fuzz/small.csv",
@@ -158,9 +165,11 @@ void MakeTextSeeds(const fs::path& corpus) {
   for (const auto& [name, text] : words) evac::WriteText(corpus / "rating_words_fuzz" / name, text);
 }
 
-/// The project's own pages, each after the letter that says what it is (suite_fuzz.cpp).
-void MakePageSeeds(const fs::path& folder) {
-  const fs::path root = EVAC_SOURCE_DIR;
+/// The project's own pages, of suites each after the letter that says what it is (suite_fuzz.cpp).
+void MakePageSeeds(const fs::path& corpus) {
+  const fs::path root = EVAC_SOURCE_DIR, folder = corpus / "suite_fuzz";
+  for (const char* sizes : {"evac_published.yaml", "desk_model.yaml"})
+    evac::WriteText(corpus / "evac_config_fuzz" / sizes, evac::ReadFile(root / "apps/configs" / sizes));
   for (const char* suite : {"apps/configs/demo.yaml", "apps/configs/agibot_replay.yaml", "tests/system/faults.yaml"})
     evac::WriteText(folder / fs::path(suite).filename(), "1" + evac::ReadFile(root / suite));
   for (const auto& page : fs::directory_iterator(root / "worldmodel/sim/scenes")) {
@@ -227,8 +236,9 @@ void MakeCorpus(const fs::path& corpus) {
   MakeStoreSeeds(corpus / "store_fuzz");
   MakeStudySeed(corpus / "study_fuzz");
   MakeMessageSeeds(corpus / "lcm_messages_fuzz");
+  MakeRecipeSeeds(corpus);
   MakeTextSeeds(corpus);
-  MakePageSeeds(corpus / "suite_fuzz");
+  MakePageSeeds(corpus);
   MakeShardSeeds(corpus / "shards_fuzz");
   MakeTensorSeeds(corpus);
   fs::create_directories(corpus / "truth_fuzz");

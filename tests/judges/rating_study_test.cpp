@@ -10,6 +10,7 @@
 #include "core/file.h"
 #include "core/secret.h"
 #include "core/store_lock.h"
+#include "core/store_sqlite.h"
 #include "core/video.h"
 #include "tests/reports/stored_run.h"
 
@@ -182,6 +183,42 @@ TEST(RatingStudy, AnEpisodeThatIsAnotherByNowIsRefusedWithBothVideos) {
   EXPECT_THAT([&] { Make(folder, {.runs = {run.folder()}}); },
               testing::ThrowsMessage<Error>(testing::AllOf(HasSubstr(before), HasSubstr(after))));
   EXPECT_EQ(ClipsIn(folder).size(), 2u);
+}
+
+/// Raters were told of success: "A recording has no rubric of its own."
+TEST(RatingStudy, ATaskOfWhichNobodySaidWhatSuccessIsIsRefusedByNameBeforeAnythingIsMade) {
+  StoredRun run("begun", "s", "f");
+  Task bare = run.store().Tasks().front();
+  bare.id = "bare";
+  bare.rubric = {};
+  bare.rubric.version = kNoRubric;
+  run.store().AddTask(bare);
+  const fs::path folder = run.folder().parent_path() / "study";
+  Make(run.folder().parent_path() / "without_its_clips", {.runs = {run.folder()}, .height_px = 64});
+  run.AddEpisode({{"bare", "41-0000", "pick", "1", 1}, "real"}, 's');
+  EXPECT_THAT([&] { Make(folder, {.runs = {run.folder()}, .height_px = 64}); },
+              testing::ThrowsMessage<Error>(testing::AllOf(
+                  HasSubstr(run.folder().string() + ": task bare has no rubric"), HasSubstr("`rubric: {success: …}`"))));
+  EXPECT_FALSE(fs::exists(folder));
+}
+
+/// Of a task it ended with 4 in "map::at"; of a world, what was recorded in it was taken for a model's.
+TEST(RatingStudy, ARunWithoutTheRowOfATaskOrAWorldIsRefusedAsDamaged) {
+  const std::pair<const char*, const char*> damages[] = {
+      {"DELETE FROM tasks", "names task 'take'"}, {"DELETE FROM worlds WHERE name = 'real'", "names world 'real'"}};
+  for (const auto& [sql, what] : damages) {
+    const StoredRun run("damaged", "s", "f");
+    sqlite::Connection::OpenReadWrite(run.folder() / "evac.sqlite")
+        .RunScript(std::string("PRAGMA foreign_keys = OFF; ") + sql);
+    try {
+      Make(run.folder().parent_path() / "study", {.runs = {run.folder()}, .height_px = 64});
+      ADD_FAILURE() << sql;
+    } catch (const Error& error) {
+      EXPECT_EQ(error.exit_code(), ExitCode::kInvalidInput);
+      EXPECT_THAT(error.what(),
+                  testing::AllOf(HasSubstr(run.folder().string() + ": the run is damaged"), HasSubstr(what)));
+    }
+  }
 }
 
 TEST(RatingStudy, ATaskThatFitsIntoNoClipOfTheStudyIsRefusedByName) {

@@ -189,6 +189,19 @@ TEST(VlmClient, NothingIsSentBeyondTheBudget) {
   }
 }
 
+/// Six tries and their waits went on for minutes after Ctrl-C.
+TEST(VlmClient, NothingIsSentAfterAnInterruptAndNoBudgetIsBlamed) {
+  bool is_interrupted = false;
+  const ScriptedServer server([](const SeenRequest&) { return Answer(503, "{}"); });
+  VlmClient client({.base_url = server.Url(),
+                    .sleep_s = [&](double) { is_interrupted = true; },
+                    .interrupted = [&] { return is_interrupted; }});
+  client.Ask({{"model", "m"}});
+  client.Ask({{"model", "m"}});
+  EXPECT_EQ(server.Seen().size(), 1u);
+  EXPECT_EQ(client.WhyOver(), "interrupted");
+}
+
 TEST(VlmClient, TheServersNameOfTheModelIsTheSameAtEveryStart) {
   const auto models = [](const std::string& created) {
     return Answer(200, R"({"data": [{"id": "other"}, {"id": "m", "root": "org/m", "created": )" + created + "}]}");

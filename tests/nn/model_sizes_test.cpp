@@ -3,11 +3,16 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <limits>
 #include <set>
 
 #include "core/config.h"
+#include "core/error.h"
 #include "tests/nn/support.h"
+#include "tests/support/synthetic_recording.h"
+#include "tests/support/temp_folder.h"
 #include "worldmodel/evac_config.h"
+#include "worldmodel/nn/number_text.h"
 
 namespace evac::nn {
 namespace {
@@ -91,6 +96,53 @@ TEST(Sizes, TextThatIsNoneLeavesThemAsTheyWere) {
     }
   }
   EXPECT_EQ(AllOf(config), before);
+}
+
+/// The stride was counted before the levels were: a shift by more than there are bits.
+TEST(Sizes, APublishedPagesCodecOfNoLevelsOrTooManyIsRefusedByField) {
+  const TempFolder folder;
+  std::string many = "1";
+  for (int i = 0; i < 70; ++i) many += ", 1";
+  for (const std::string& levels : {std::string(), many}) {
+    WriteText(folder / "page.yaml", "model: {params: {image_size: [40, 64], first_stage_config: {params: {ddconfig: "
+                                    "{ch_mult: [" + levels + "]}}}}}\n");
+    EXPECT_THAT([&] { ReadEvacConfig(folder / "page.yaml"); },
+                ThrowsMessage<Error>(testing::AllOf(HasSubstr("page.yaml"), HasSubstr("ch_mult"),
+                                                    HasSubstr("1 to 8 levels"))));
+  }
+}
+
+/// What jobs, sizes, settings and shards were each reading by code of their own.
+TEST(NumberText, IsReadWholeOrLeavesWhatWasThere) {
+  double number = 7;
+  std::int64_t whole = 7;
+  std::uint64_t natural = 7;
+  bool flag = true;
+  for (const char* text : {"", "x", "1x", " 1", "1 ", "+1", "nan", "inf", "1e999", "True", "yes"}) {
+    EXPECT_FALSE(ParseNumber(text, number)) << text;
+    EXPECT_FALSE(ParseNumber(text, whole)) << text;
+    EXPECT_FALSE(ParseNumber(text, natural)) << text;
+    EXPECT_FALSE(ParseFlag(text, flag)) << text;
+  }
+  EXPECT_FALSE(ParseNumber("0.5", whole));
+  EXPECT_FALSE(ParseNumber("9223372036854775808", whole));
+  EXPECT_FALSE(ParseNumber("-1", natural));
+  EXPECT_FALSE(ParseFlag("1", flag));
+  EXPECT_EQ(number, 7);
+  EXPECT_EQ(whole, 7);
+  EXPECT_EQ(natural, 7U);
+  EXPECT_TRUE(flag);
+
+  EXPECT_TRUE(ParseNumber("-9223372036854775808", whole));
+  EXPECT_EQ(whole, std::numeric_limits<std::int64_t>::min());
+  EXPECT_TRUE(ParseNumber("18446744073709551615", natural));
+  EXPECT_EQ(natural, std::numeric_limits<std::uint64_t>::max());
+  EXPECT_TRUE(ParseFlag("false", flag));
+  EXPECT_FALSE(flag);
+  for (const double exact : {1.0 / 3, -0.1, 1e-300, 5e300, 0.0}) {
+    EXPECT_TRUE(ParseNumber(TextOfNumber(exact), number)) << exact;
+    EXPECT_EQ(number, exact);
+  }
 }
 
 TEST(Sizes, ByWhichOthersAreDividedAreAskedFor) {

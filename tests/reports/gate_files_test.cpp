@@ -124,5 +124,15 @@ TEST(PinnedResult, WhatIsNoPinnedResultIsRefusedWithItsField) {
   EXPECT_THAT(MessageOf([&] { ReadPinned(json.dump(), "p.json"); }), HasSubstr("wanted each state and seed once"));
 }
 
+/// The message showed what was found, and the hash is of all of it: the process crashed where that lies deep.
+TEST(PinnedResult, AMillionBracketsAreRefused) {
+  const std::string deep = std::string(1'000'000, '[') + std::string(1'000'000, ']');
+  EXPECT_EQ(MessageOf([&] { ReadPinned("{\"format\": " + deep + "}", "p.json"); }),
+            "p.json: lists and objects lie more than 32 deep");
+  std::string text = PinnedJson(Pinned());
+  text.insert(text.find('{') + 1, "\"notes\": " + deep + ",");
+  EXPECT_EQ(MessageOf([&] { ReadPinned(text, "p.json"); }), "p.json: lists and objects lie more than 32 deep");
+}
+
 }  // namespace
 }  // namespace evac

@@ -6,7 +6,7 @@
 #include "tests/support/command.h"
 #include "tests/support/temp_folder.h"
 
-/// `./run rate` in a folder where nothing is built and `evac` says what it was told.
+/// `./run` in a folder where nothing is built and programs say what they were told.
 namespace evac {
 namespace {
 
@@ -14,15 +14,14 @@ namespace fs = std::filesystem;
 using testing::HasSubstr;
 using testing::Not;
 
-class RunRate : public testing::Test {
+class RunFolder : public testing::Test {
  protected:
-  RunRate() {
+  /// @param packages  lines of cmake/packages.txt
+  explicit RunFolder(const std::string& packages) {
     fs::copy_file(EVAC_SOURCE_DIR "/run", folder_ / "run");
     fs::create_directories(folder_ / "cmake");
-    std::ofstream(folder_ / "cmake" / "packages.txt");
+    std::ofstream(folder_ / "cmake" / "packages.txt") << packages;
     for (const char* tool : {"bin/cmake", "bin/ip"}) Program(tool, "");
-    Program("build/release/bin/evac",
-            "echo evac \"$@\"\nif [ \"$1 $2\" = 'rate new' ]; then mkdir -p \"$3\" && touch \"$3/study.sqlite\"; fi\n");
   }
 
   void Program(const std::string& name, const std::string& text) const {
@@ -30,6 +29,16 @@ class RunRate : public testing::Test {
     fs::create_directories(file.parent_path());
     std::ofstream(file) << "#!/bin/sh\n" << text;
     fs::permissions(file, fs::perms::owner_all);
+  }
+
+  TempFolder folder_;
+};
+
+class RunRate : public RunFolder {
+ protected:
+  RunRate() : RunFolder("") {
+    Program("build/release/bin/evac",
+            "echo evac \"$@\"\nif [ \"$1 $2\" = 'rate new' ]; then mkdir -p \"$3\" && touch \"$3/study.sqlite\"; fi\n");
   }
 
   /// What `evac` was told.
@@ -43,8 +52,6 @@ class RunRate : public testing::Test {
   }
 
   std::string At(const std::string& name) const { return (fs::canonical(folder_.path()) / name).string(); }
-
-  TempFolder folder_;
 };
 
 TEST_F(RunRate, TheDemosStudyIsOutStudyHoweverItIsNamed) {
@@ -65,6 +72,54 @@ TEST_F(RunRate, AnotherRunHasAStudyOfItsOwn) {
   const std::string again = Rate("out/other run/");
   EXPECT_THAT(again, Not(HasSubstr("rate new")));
   EXPECT_THAT(again, HasSubstr("evac rate serve " + study + "\n"));
+}
+
+/// `./run build` where a package is missing, on a machine that has the programs in `bin` alone.
+class RunInstall : public RunFolder {
+ protected:
+  RunInstall() : RunFolder("# what is needed\nlibneeded-dev\n") {
+    for (const std::string tool : {"dirname", "grep", "mkdir", "env"})
+      fs::create_symlink("/usr/bin/" + tool, folder_ / "bin" / tool);
+    Program("bin/dpkg-query", "exit 1\n");
+    Program("bin/apt-get", "echo apt-get \"$@\"\n");
+  }
+
+  void HaveSudo() const { Program("bin/sudo", "echo sudo \"$@\"\nexec \"$@\"\n"); }
+
+  /// @param user  its number: 0 is root
+  CommandResult Build(int user) const {
+    Program("bin/id", "echo " + std::to_string(user) + "\n");
+    return RunCommand(
+        {"/usr/bin/env", "PATH=" + (folder_ / "bin").string(), "/bin/bash", (folder_ / "run").string(), "build"});
+  }
+};
+
+constexpr const char* kInstalls = "\napt-get install -y -qq --no-install-recommends libneeded-dev\n";
+
+TEST_F(RunInstall, AsRootItInstallsItselfThoughThereIsSudo) {
+  HaveSudo();
+  const CommandResult built = Build(0);
+  EXPECT_EQ(built.exit_code, 0) << built.err;
+  EXPECT_EQ(built.out, "apt-get update -qq\n");
+  EXPECT_THAT(built.err, HasSubstr(kInstalls));
+  EXPECT_THAT(built.err, Not(HasSubstr("sudo")));
+}
+
+TEST_F(RunInstall, AsAnotherUserItInstallsWithSudo) {
+  HaveSudo();
+  const CommandResult built = Build(1000);
+  EXPECT_EQ(built.exit_code, 0) << built.err;
+  EXPECT_EQ(built.out, "sudo apt-get update -qq\napt-get update -qq\n");
+  EXPECT_THAT(built.err, HasSubstr("\nsudo env DEBIAN_FRONTEND=noninteractive apt-get install -y"));
+  EXPECT_THAT(built.err, HasSubstr(kInstalls));
+}
+
+TEST_F(RunInstall, WithoutSudoItSaysWhatIsToBeDoneAsRootAndDoesNothing) {
+  const CommandResult built = Build(1000);
+  EXPECT_EQ(built.exit_code, 1) << built.err;
+  EXPECT_THAT(built.err, HasSubstr("there is no sudo here; as root, please: apt-get update -qq"));
+  EXPECT_EQ(built.out, "");
+  EXPECT_THAT(built.err, Not(HasSubstr("building")));
 }
 
 }  // namespace

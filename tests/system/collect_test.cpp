@@ -214,6 +214,40 @@ TEST(VaryCommand, DoesWhatWasToldAgainInTheSameScenes) {
   EXPECT_EQ(other_row.exit_code, 2);
   EXPECT_THAT(other_row.err, HasSubstr(row_path.string() + ": episode 0 is"));
   EXPECT_FALSE(fs::exists(path));
+  std::string shard = ReadFile(folder / "shards/shard_00000.safetensors");
+  const std::string period = "\"period_s\":\"0.1\"";
+  ASSERT_NE(shard.find(period), std::string::npos);
+  WriteFileAtomically(folder / "shards/shard_00000.safetensors",
+                      shard.replace(shard.find(period), period.size(), "\"period_s\":\"now\""));
+  const CommandResult other_period = vary("shards", "1", as_collected);
+  EXPECT_EQ(other_period.exit_code, 2) << other_period.err;
+  EXPECT_THAT(other_period.err, HasSubstr("period_s is now, wanted 0.1"));
+}
+
+/// Nothing said which version had made half of a folder's variants.
+TEST(VaryCommand, SaysThatAnotherVersionOfEvacBeganIt) {
+  const TempFolder folder;
+  ASSERT_EQ(RunCommand(Words(folder / "all", {"--episodes", "4"})).exit_code, 0);
+  const fs::path shards = folder / "shards", begun_by = shards / "variants_begun_by";
+  ASSERT_EQ(RunCommand({Binary("evac"), "pack", folder / "all", "--out", shards, "--config", kModel, "--cameras", "head",
+                        "--holdout", "0"}).exit_code, 0);
+  const auto vary = [&] {
+    const CommandResult varied = RunCommand({Binary("evac"), "vary", shards, folder / "all", "--recipe", kRecipe, "--set",
+                                             "max_chunks=3", "--count", "1"});
+    EXPECT_EQ(varied.exit_code, 0) << varied.err;
+    return varied.err;
+  };
+  EXPECT_THAT(vary(), Not(HasSubstr("was begun by")));
+  const std::string hash = Sha256HexOfFile(shards / "variants_00000.safetensors");
+  EXPECT_THAT(vary(), Not(HasSubstr("was begun by"))) << "this one did";
+  WriteFileAtomically(begun_by, "0.0.1\n");
+  EXPECT_THAT(vary(), HasSubstr("evac: note: what is varied in " + shards.string() + " was begun by evac 0.0.1; evac "));
+  fs::remove(begun_by);
+  EXPECT_THAT(vary(), HasSubstr("was begun by an evac that did not write down its version"));
+  fs::remove(shards / "variants_00000.safetensors");
+  EXPECT_THAT(vary(), Not(HasSubstr("was begun by"))) << "begun anew";
+  EXPECT_TRUE(fs::exists(begun_by));
+  EXPECT_EQ(Sha256HexOfFile(shards / "variants_00000.safetensors"), hash) << "trainings know variants by their bytes";
 }
 
 /// A mix of one checkpoint, chunks as long as its own.

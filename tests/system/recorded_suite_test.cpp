@@ -145,6 +145,24 @@ TEST_F(RecordedSuite, ThePageSaysWhatIsToBeDoneAndWhatSuccessIs) {
   EXPECT_THAT([&] { with("instruction: ''\n"); }, testing::ThrowsMessage<Error>(testing::HasSubstr("instruction")));
 }
 
+/// It was told the sentence that is made up for people.
+TEST_F(RecordedSuite, APolicyThatNeedsAnInstructionIsRefusedBeforeAnyEpisodeWhereThePageSaysNone) {
+  const fs::path run = folder_ / "run";
+  const std::string faulty = "{name: faulty, command: [faulty-policy, --declare, needs=instruction]}";
+  const auto with = [&](std::vector<std::string> assignments) {
+    assignments.push_back("policies=[{name: hold, command: [evac-policy, hold]}, " + faulty + "]");
+    return RunCommand(RunWords(WriteSuite(kEcho), run, assignments));
+  };
+  const CommandResult refused = with({});
+  EXPECT_EQ(refused.exit_code, 2) << refused.err;
+  EXPECT_THAT(refused.err, AllOf(HasSubstr("suite.yaml: field instruction: found none"),
+                                 HasSubstr("policy faulty@v1 needs an instruction")));
+  EXPECT_EQ(system_test::List(run), "[]\n") << "the policy before it did not run either";
+  fs::remove_all(run);
+  const CommandResult told = with({"instruction=Pour."});
+  EXPECT_EQ(told.exit_code, 0) << told.err;
+}
+
 TEST_F(RecordedSuite, OfWeightsThatDoNotSayTheirCamerasAsManyAreSeenAsThereAreViews) {
   WriteWeights("two", {});
   EXPECT_EQ(Cameras(Filled(kEvac)), (std::vector<std::string>{"head", "hand_left"}));

@@ -186,9 +186,39 @@ TEST(Trainer, RefusesATableOfSomebodysWhereNothingWasTrainedYet) {
   }
 }
 
+/// Whose checkpoint was thrown away or lost: a new training cut it to its header.
+TEST(Trainer, RefusesATableOfATrainingWhoseCheckpointIsGone) {
+  TrainerOptions options = QuickTrainer(4);
+  options.holdout_every = 2;
+  for (const auto& [name, other] : {std::pair("metrics.csv", "holdout.csv"), std::pair("holdout.csv", "metrics.csv")}) {
+    const TempFolder folder;
+    Regression trained, refused, anew;
+    Trainer(trained.Parameters(), options, folder.path())
+        .Run({.loss = [&](const StepPlace& place) { return trained.Loss(place); }, .holdout = [] { return 1.0; }});
+    for (const char* gone : {"training.safetensors", other}) ASSERT_TRUE(std::filesystem::remove(folder / gone));
+    const std::string table = (folder / name).string(), rows = Text(table);
+    EXPECT_THAT([&] { Trainer(refused.Parameters(), options, folder.path()); },
+                testing::ThrowsMessage<TensorError>(
+                    testing::AllOf(testing::HasSubstr(table), testing::HasSubstr("move it away to begin anew"))));
+    EXPECT_EQ(Text(table), rows);
+    std::filesystem::rename(table, folder / "kept.csv");
+    EXPECT_EQ(Trainer(anew.Parameters(), options, folder.path()).step(), 0);
+  }
+}
+
 TEST(Trainer, GoesOnFromItsTablesWhereItWasKilledBeforeItsFirstCheckpoint) {
   const TempFolder folder;
-  std::ofstream(folder / "metrics.csv") << "step,loss,learning_rate,gradient_norm,seconds\n0,1,1,1,1\n";
+  struct Killed {};
+  TrainerOptions options = QuickTrainer(10);
+  options.checkpoint_every_s = 1e9;
+  Regression killed;
+  EXPECT_THROW(Trainer(killed.Parameters(), options, folder.path()).Run({.loss = [&](const StepPlace& place) {
+                 if (place.step == 3) throw Killed();
+                 return killed.Loss(place);
+               }}),
+               Killed);
+  ASSERT_FALSE(std::filesystem::exists(folder / "training.safetensors"));
+  ASSERT_THAT(Text(folder / "metrics.csv"), testing::HasSubstr("\n2,"));
   std::ofstream(folder / "holdout.csv") << "";  // of a power cut
   Regression regression;
   Trainer(regression.Parameters(), QuickTrainer(10), folder.path());
@@ -316,6 +346,33 @@ TEST(Trainer, CountsTheStepsThatFitIntoTheMinutesOnceAndKeepsThem) {
   const TrainerSummary same = Trainer(again.Parameters(), options, folder.path()).Run({.loss = [&](const StepPlace& p) { return again.Loss(p); }});
   EXPECT_EQ(same.steps, summary.steps);
   EXPECT_TRUE(at::equal(first.All(), again.All()));
+}
+
+/// Steps of two minutes took eighteen of five: nine were done whatever they took, and four were not counted.
+TEST(Trainer, AStepThatWouldEndBehindTheMinutesIsNotBegunAndAKillChangesNothingOfThat) {
+  TrainerOptions options = QuickTrainer(100000);
+  options.minutes = 5;
+  const auto train = [&](const TempFolder& at, double step_s, Regression& regression) {
+    double now_s = 1000;
+    return Trainer(regression.Parameters(), options, at.path())
+        .Run({.loss =
+                  [&](const StepPlace& place) {
+                    now_s += step_s;
+                    return regression.Loss(place);
+                  },
+              .clock_s = [&] { return now_s; }});
+  };
+  for (const auto& [step_s, steps] : {std::pair(600, 1), std::pair(151, 1), std::pair(120, 2), std::pair(40, 7),
+                                      std::pair(30, 10), std::pair(1, 300)}) {
+    const TempFolder folder;
+    Regression first, again;
+    const TrainerSummary summary = train(folder, step_s, first);
+    EXPECT_EQ(summary.why, "done") << step_s;
+    EXPECT_EQ(summary.step, steps) << step_s;
+    EXPECT_EQ(summary.steps, steps) << step_s;
+    EXPECT_EQ(train(folder, 1, again).steps_now, 0) << "the plan stands, however fast it goes on: " << step_s;
+    EXPECT_TRUE(at::equal(first.All(), again.All())) << step_s;
+  }
 }
 
 TEST(Trainer, InterruptedBeforeItsMinutesArePlannedDoesNotSayThePagesSteps) {

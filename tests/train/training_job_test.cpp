@@ -84,6 +84,10 @@ TEST(TrainingJob, WhatIsWrongIsNamedWithItsLine) {
   EXPECT_THAT(parse(replaced("option batch 4", "option batsch 4")),
               ThrowsMessage<TensorError>(HasSubstr("found 'option batsch 4'")));
   EXPECT_THAT(parse(replaced("option steps 3", "option steps -3")), ThrowsMessage<TensorError>(HasSubstr("steps -3")));
+  EXPECT_THAT(parse(replaced("option steps 3", "option steps 1099511627776")),
+              ThrowsMessage<TensorError>(HasSubstr("steps 1099511627776")));
+  EXPECT_NO_THROW(parse(replaced("option steps 3", "option steps 1099511627775"))());
+  EXPECT_NO_THROW(parse(replaced("option seed 0\n", "option seed 18446744073709551615\n"))()) << "any 64 bits";
   EXPECT_THAT(parse(replaced("size chunk 3", "size chunk 0")), ThrowsMessage<TensorError>(HasSubstr("job: chunk is 0")));
   EXPECT_THAT([] { ReadTrainingJob("/no/such/job"); },
               ThrowsMessage<TensorError>(AllOf(HasSubstr("/no/such/job: cannot be read: "), HasSubstr("No such file"))));

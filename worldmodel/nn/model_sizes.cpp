@@ -1,11 +1,9 @@
 #include "worldmodel/nn/model_sizes.h"
 
 #include <algorithm>
-#include <charconv>
-#include <cmath>
-#include <cstdio>
-#include <type_traits>
 #include <utility>
+
+#include "worldmodel/nn/number_text.h"
 
 namespace evac::nn {
 namespace {
@@ -86,11 +84,7 @@ void AddEncoder(Sizes& sizes, ImageEncoderConfig& e) {
 
 std::string Text(std::int64_t value) { return std::to_string(value); }
 std::string Text(bool value) { return value ? "true" : "false"; }
-std::string Text(double value) {
-  char text[40];
-  std::snprintf(text, sizeof text, "%.17g", value);
-  return text;
-}
+std::string Text(double value) { return TextOfNumber(value); }
 std::string Text(const std::optional<double>& value) { return value ? Text(*value) : ""; }
 std::string Text(const std::vector<std::int64_t>& values) {
   std::string text;
@@ -101,23 +95,9 @@ std::string Text(const std::vector<std::int64_t>& values) {
   return text;
 }
 
-template <typename T>
-  requires(std::is_same_v<T, std::int64_t> || std::is_same_v<T, double>)
-bool Parse(const std::string& text, T& value) {
-  T found{};
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), found);
-  if (error != std::errc() || end != text.data() + text.size()) return false;
-  if constexpr (std::is_same_v<T, double>) {
-    if (!std::isfinite(found)) return false;
-  }
-  value = found;
-  return true;
-}
-bool Parse(const std::string& text, bool& value) {
-  if (text != "true" && text != "false") return false;
-  value = text == "true";
-  return true;
-}
+bool Parse(const std::string& text, std::int64_t& value) { return ParseNumber(text, value); }
+bool Parse(const std::string& text, double& value) { return ParseNumber(text, value); }
+bool Parse(const std::string& text, bool& value) { return ParseFlag(text, value); }
 bool Parse(const std::string& text, std::optional<double>& value) {
   double found = 0;
   if (!text.empty() && !Parse(text, found)) return false;

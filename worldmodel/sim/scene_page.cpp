@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <nlohmann/json.hpp>
 #include <string_view>
 #include <utility>
 
@@ -147,8 +148,9 @@ Task WithoutObject(const Task& task, const std::string& body) {
   for (std::size_t i = 0; i < objects.size(); ++i) {
     const Placement placement = ReadPlacement(objects[i]);
     if (placement.body != body) continue;
+    const std::string quoted = nlohmann::json(body).dump();  // YAML reads JSON's texts
     page.Set(fmt::format("mujoco.objects.{}={{body: {}, x_m: [3, 3], y_m: [-3, -3], z_m: {}, yaw_deg: [{}, {}]}}", i,
-                         body, placement.z_m - kFloorBelowTableM, placement.yaw_deg.low, placement.yaw_deg.high));
+                         quoted, placement.z_m - kFloorBelowTableM, placement.yaw_deg.low, placement.yaw_deg.high));
     Task without = task;
     without.page = page.Text();
     return without;

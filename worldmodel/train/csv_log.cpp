@@ -38,6 +38,13 @@ void CsvLog::RequireOwn(const std::filesystem::path& path, const std::string& he
                       "'), wanted that name free, or another folder");
 }
 
+void CsvLog::RequireNoRows(const std::filesystem::path& path, const std::string& header) {
+  if (TextOf(path).size() <= header.size() + 1) return;
+  throw TensorError(path.string() +
+                    ": holds rows of a training whose training.safetensors is not beside it, and they would be lost; "
+                    "wanted that name free (move it away to begin anew), or another folder");
+}
+
 void CsvLog::Trim(const std::filesystem::path& path, const std::string& header, std::int64_t from) {
   const std::string before = TextOf(path);
   std::string kept = header + "\n";

@@ -46,7 +46,8 @@ bool IsEncoded(const std::filesystem::path& shard, const EncodeOptions& options)
     const auto found = file.metadata().find(key);
     return found != file.metadata().end() && found->second == wanted;
   };
-  return says("codec", options.codec) && says("shard_sha256", options.shard_sha256) &&
+  return says("codec", options.codec) &&
+         (options.shard_sha256.empty() || says("shard_sha256", options.shard_sha256)) &&
          says("products", options.products) &&
          (!options.scale_factor || MayBeScaledBy(file.metadata(), *options.scale_factor));
 }

@@ -12,7 +12,7 @@ namespace evac::train {
 
 struct EncodeOptions {
   std::string codec;         ///< SHA-256 of its weights, kept in the file
-  std::string shard_sha256;  ///< of the shard's file, kept likewise
+  std::string shard_sha256;  ///< of the shard's file, kept likewise; empty: IsEncoded does not ask
   std::string products = "float32";  ///< what the codec computes with, kept likewise; or "bfloat16"
   /// Of the page, for IsEncoded; empty: not asked. What EncodeShard keeps is its codec's.
   std::optional<double> scale_factor = {};

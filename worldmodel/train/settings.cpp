@@ -1,13 +1,13 @@
 #include "worldmodel/train/settings.h"
 
-#include <charconv>
 #include <cmath>
-#include <cstdio>
 #include <cstdlib>
 #include <set>
 #include <sstream>
 #include <type_traits>
 #include <utility>
+
+#include "worldmodel/nn/number_text.h"
 
 namespace evac::train {
 namespace {
@@ -40,12 +40,6 @@ bool IsLengthOrLook(const std::string& name) {
   return kNames.contains(name);
 }
 
-std::string Text(double number) {
-  char text[40];
-  std::snprintf(text, sizeof text, "%.17g", number);
-  return text;
-}
-
 /// As trainings are told apart by: what is said of a flag is 0 or 1 there.
 std::string IdentityText(const Setting& setting) {
   const auto* flag = std::get_if<bool*>(&setting.field);
@@ -56,21 +50,12 @@ bool Parse(const std::string& text, std::string& field) {
   field = text;
   return true;
 }
-bool Parse(const std::string& text, bool& field) {
-  if (text != "true" && text != "false") return false;
-  field = text == "true";
-  return true;
-}
-template <typename Number>
-bool Parse(const std::string& text, Number& field) {
-  Number found{};
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), found);
-  if (error != std::errc() || end != text.data() + text.size()) return false;
-  if constexpr (std::is_floating_point_v<Number>) {
-    if (!std::isfinite(found)) return false;
-  } else if constexpr (std::is_signed_v<Number>) {
-    if (found < 0 || found >= Number{1} << 40) return false;  // as on the page
-  }
+bool Parse(const std::string& text, bool& field) { return nn::ParseFlag(text, field); }
+bool Parse(const std::string& text, double& field) { return nn::ParseNumber(text, field); }
+bool Parse(const std::string& text, std::uint64_t& field) { return nn::ParseNumber(text, field); }
+bool Parse(const std::string& text, std::int64_t& field) {
+  std::int64_t found = 0;
+  if (!nn::ParseNumber(text, found) || found < 0 || found >= std::int64_t{1} << 40) return false;  // as on the page
   field = found;
   return true;
 }
@@ -83,7 +68,7 @@ std::string TextOf(const Setting& setting) {
         using Type = std::decay_t<decltype(*field)>;
         if constexpr (std::is_same_v<Type, std::string>) return *field;
         else if constexpr (std::is_same_v<Type, bool>) return *field ? "true" : "false";
-        else if constexpr (std::is_same_v<Type, double>) return Text(*field);
+        else if constexpr (std::is_same_v<Type, double>) return nn::TextOfNumber(*field);
         else return std::to_string(*field);
       },
       setting.field);

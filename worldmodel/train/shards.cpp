@@ -1,7 +1,6 @@
 #include "worldmodel/train/shards.h"
 
 #include <algorithm>
-#include <charconv>
 #include <cstdio>
 #include <fstream>
 #include <iterator>
@@ -9,6 +8,8 @@
 #include <set>
 #include <sstream>
 #include <string_view>
+
+#include "worldmodel/nn/number_text.h"
 
 namespace evac::train {
 namespace {
@@ -121,8 +122,7 @@ std::int64_t ShardCount(const std::filesystem::path& shard) {
   const TensorFile file = TensorFile::Open(shard);
   const std::string text = Text(file, "shards");
   std::int64_t count = 0;
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), count);
-  if (error != std::errc() || end != text.data() + text.size() || count < 1)
+  if (!nn::ParseNumber(text, count) || count < 1)
     throw TensorError(file.name() + ": shards is '" + text + "', wanted how many its packing has");
   return count;
 }

@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <cerrno>
-#include <charconv>
 #include <chrono>
 #include <csignal>
 #include <cstdio>
@@ -16,6 +15,7 @@
 
 #include "worldmodel/nn/library.h"
 #include "worldmodel/nn/memory.h"
+#include "worldmodel/nn/number_text.h"
 #include "worldmodel/nn/open_blas.h"
 #include "worldmodel/nn/threads.h"
 #include "worldmodel/train/training_job.h"
@@ -46,8 +46,7 @@ struct Arguments {
 
 std::int64_t Whole(const std::string& option, const std::string& text, std::int64_t most) {
   std::int64_t value = 0;
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
-  if (error != std::errc() || end != text.data() + text.size() || value < 1 || value > most)
+  if (!nn::ParseNumber(text, value) || value < 1 || value > most)
     throw TensorError(option + ": found '" + text + "', wanted 1 to " + std::to_string(most));
   return value;
 }

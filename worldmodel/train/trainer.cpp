@@ -3,8 +3,12 @@
 #include <ATen/ops/zeros_like.h>
 
 #include <algorithm>
+#include <cerrno>
+#include <chrono>
 #include <cmath>
 #include <cstdio>
+#include <cstring>
+#include <fstream>
 #include <future>
 #include <utility>
 
@@ -65,8 +69,9 @@ std::string Duration(double seconds) {
   return seconds < 5400 ? Text("%.0f min", seconds / 60) : Text("%.1f h", seconds / 3600);
 }
 
-double SecondsSince(std::chrono::steady_clock::time_point start) {
-  return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+double Now_s(const TrainerCallbacks& callbacks) {
+  if (callbacks.clock_s) return callbacks.clock_s();
+  return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
 }
 
 }  // namespace
@@ -107,12 +112,20 @@ Trainer::Trainer(std::vector<NamedTensor> parameters, const TrainerOptions& opti
   if (options_.average_decay > 0) state_.average = parameters_.values().clone();
   planned_ = options_.minutes <= 0;
   std::filesystem::create_directories(folder_);
-  if (!Load()) {
-    CsvLog::RequireOwn(folder_ / "metrics.csv", kMetrics);
-    CsvLog::RequireOwn(folder_ / "holdout.csv", kHoldouts);
-  }
+  if (!Load()) BeginTables();
   CsvLog::Trim(folder_ / "metrics.csv", kMetrics, step_);
   CsvLog::Trim(folder_ / "holdout.csv", kHoldouts, step_ + 1);
+}
+
+/// Where there is no checkpoint. What it finds is its own where a training was killed before the first.
+void Trainer::BeginTables() const {
+  const bool was_killed = std::filesystem::exists(Unsaved());
+  for (const auto& [name, header] : {std::pair("metrics.csv", kMetrics), std::pair("holdout.csv", kHoldouts)}) {
+    CsvLog::RequireOwn(folder_ / name, header);
+    if (!was_killed) CsvLog::RequireNoRows(folder_ / name, header);
+  }
+  if (!std::ofstream(Unsaved(), std::ios::app))
+    throw TensorWriteError(Unsaved().string() + ": cannot be written: " + std::strerror(errno));
 }
 
 void Trainer::AddReplica(Replica replica) {
@@ -180,17 +193,19 @@ Trainer::StepOutcome Trainer::Step(const TrainerCallbacks& callbacks) {
   return outcome;
 }
 
-void Trainer::PlanSteps() {
+/// By the mean of the steps that are timed. Where the next would end behind the minutes, what is done is all.
+void Trainer::PlanSteps(double now_s) {
   const std::int64_t timed = run_steps_ - timed_from_;
-  if (run_steps_ == kPlanFrom) {
-    run_started_ = Clock::now();
+  const double timed_s = now_s - timed_from_s_, step_s = timed_s / static_cast<double>(timed);
+  const double left_s = options_.minutes * 60 - (now_s - began_s_);
+  const bool is_timed = run_steps_ > kPlanFrom && timed >= 4 && timed_s >= std::min(kPlanSeconds, options_.minutes * 6);
+  if (step_s > left_s || is_timed) {
+    steps_ = step_ + (step_s > left_s ? 0 : static_cast<std::int64_t>(left_s / step_s));
+    planned_ = true;
+  } else if (run_steps_ == kPlanFrom) {
     timed_from_ = run_steps_;
+    timed_from_s_ = now_s;
   }
-  const double seconds = SecondsSince(run_started_);
-  if (run_steps_ <= kPlanFrom || timed < 4 || (seconds < kPlanSeconds && seconds < options_.minutes * 6)) return;
-  const double rate = static_cast<double>(timed) / seconds;
-  steps_ = std::max<std::int64_t>(step_ + 1, step_ + static_cast<std::int64_t>(rate * (options_.minutes * 60 - seconds)));
-  planned_ = true;
 }
 
 /// A checkpoint that is to be kept after the end would never be written.
@@ -246,8 +261,9 @@ void Trainer::Record(const StepOutcome& outcome, double seconds) {
 void Trainer::Report(const TrainerCallbacks& callbacks) const {
   if (!callbacks.on_progress) return;
   const auto timed = static_cast<double>(run_steps_ - timed_from_);
-  callbacks.on_progress({step_, planned_ ? steps_ : 0, smooth_loss_, timed / std::max(SecondsSince(run_started_), 1e-6),
-                         last_score_, best_score_, left_out_});
+  const double timed_s = Now_s(callbacks) - timed_from_s_;
+  callbacks.on_progress({step_, planned_ ? steps_ : 0, smooth_loss_, timed / std::max(timed_s, 1e-6), last_score_,
+                         best_score_, left_out_});
 }
 
 std::string Trainer::WhyEnd(const TrainerCallbacks& callbacks) const {
@@ -258,18 +274,18 @@ std::string Trainer::WhyEnd(const TrainerCallbacks& callbacks) const {
 }
 
 TrainerSummary Trainer::Run(const TrainerCallbacks& callbacks) {
-  run_started_ = saved_ = Clock::now();
+  began_s_ = timed_from_s_ = saved_s_ = Now_s(callbacks);
   run_steps_ = timed_from_ = 0;
   CheckKept(callbacks);
   std::string why = WhyEnd(callbacks);
   while (why.empty()) {
-    const Clock::time_point started = Clock::now();
+    const double started_s = Now_s(callbacks);
     const StepOutcome outcome = Step(callbacks);
-    Record(outcome, SecondsSince(started));
+    Record(outcome, Now_s(callbacks) - started_s);
     ++step_;
     ++run_steps_;
     if (!planned_) {
-      PlanSteps();
+      PlanSteps(Now_s(callbacks));
       CheckKept(callbacks);
     }
     const bool last = planned_ && step_ >= steps_;
@@ -279,9 +295,9 @@ TrainerSummary Trainer::Run(const TrainerCallbacks& callbacks) {
       With(Averaged(), [&] { callbacks.keep(step_); });
     Report(callbacks);
     why = WhyEnd(callbacks);
-    if (!why.empty() || SecondsSince(saved_) >= options_.checkpoint_every_s) {
+    if (!why.empty() || Now_s(callbacks) - saved_s_ >= options_.checkpoint_every_s) {
       Save();
-      saved_ = Clock::now();
+      saved_s_ = Now_s(callbacks);
     }
   }
   WriteCurves(folder_);

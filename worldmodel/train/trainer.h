@@ -1,6 +1,5 @@
 #pragma once
 
-#include <chrono>
 #include <filesystem>
 #include <functional>
 #include <limits>
@@ -21,8 +20,9 @@ namespace evac::train {
 /// The defaults are the paper's (docs/train.md, the column `paper`).
 struct TrainerOptions {
   std::int64_t steps = 100'000;
-  /// Above 0: as many steps as fit into so many minutes. Counted once, after the first steps, and written into the
-  /// checkpoint: a training that is killed and goes on does the same steps. Other minutes are refused from then on.
+  /// Above 0: as many steps as fit into so many minutes, at least one. Counted once, after the first steps or before
+  /// one that would end behind the minutes, and written into the checkpoint: a training that is killed and goes on does
+  /// the same steps. Other minutes are refused from then on.
   double minutes = 0;
   double learning_rate = 5e-5;
   std::int64_t warmup_steps = 0;  ///< the rate rises from 0
@@ -68,6 +68,7 @@ struct TrainerCallbacks {
   std::function<void(std::int64_t step)> keep = {};
   std::function<bool()> interrupted = {};  ///< asked after every step; the checkpoint is written then
   std::function<void(const TrainerProgress&)> on_progress = {};
+  std::function<double()> clock_s = {};  ///< seconds that never go back; empty: the machine's
 };
 
 /// A second copy of what is trained, for a thread of its own: parts of a step are computed side by side.
@@ -96,11 +97,12 @@ struct TrainerSummary {
 ///   metrics.csv            step,loss,learning_rate,gradient_norm,seconds
 ///   holdout.csv            step,holdout
 ///   curves.svg             both as a picture (curves.h), after each hold-out and at the end
+///   training.unsaved       empty, until the first checkpoint: rows beside it are those of a training that was killed
 class Trainer {
  public:
   /// @param parameters  floats; they stay where their holders see them (FlatParameters)
   /// @throws TensorError for options that make no training, or if the folder holds another training's checkpoint, or
-  /// none and a metrics.csv or holdout.csv of somebody's
+  /// none and a metrics.csv or holdout.csv of somebody's, or of a training whose checkpoint is gone
   Trainer(std::vector<NamedTensor> parameters, const TrainerOptions& options, std::filesystem::path folder);
 
   /// From now on the parts of a step (`accumulate`) are shared out among the trainer's own loss and its replicas', each
@@ -117,20 +119,21 @@ class Trainer {
   void WithBest(const std::function<void()>& function) { With(best_score_ ? best_ : Averaged(), function); }
 
  private:
-  using Clock = std::chrono::steady_clock;
   struct StepOutcome {
     double loss = 0, gradient_norm = 0, learning_rate = 0;
   };
 
   bool Load();  ///< @returns false if there is no checkpoint
   void Save() const;
+  void BeginTables() const;
+  std::filesystem::path Unsaved() const { return folder_ / "training.unsaved"; }
   std::string Identity() const;
   double LossOfParts(std::size_t worker, const TrainerCallbacks& callbacks, double done) const;
   double LossOfStep(const TrainerCallbacks& callbacks);
   StepOutcome Step(const TrainerCallbacks& callbacks);
   void HoldOut(const TrainerCallbacks& callbacks);
   std::string WhyEnd(const TrainerCallbacks& callbacks) const;
-  void PlanSteps();
+  void PlanSteps(double now_s);
   std::int64_t StepsInAll() const;
   void CheckKept(const TrainerCallbacks& callbacks) const;
   void Report(const TrainerCallbacks& callbacks) const;
@@ -156,7 +159,7 @@ class Trainer {
   bool planned_ = false;  ///< the number of steps stands
   double smooth_loss_ = std::numeric_limits<double>::quiet_NaN();  ///< until there was one
   std::int64_t run_steps_ = 0, timed_from_ = 0;  ///< by this process; those after which time is taken
-  Clock::time_point run_started_, saved_;
+  double began_s_ = 0, timed_from_s_ = 0, saved_s_ = 0;  ///< by the clock: the run, `timed_from_`, the checkpoint
 };
 
 }  // namespace evac::train

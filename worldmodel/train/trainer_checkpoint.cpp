@@ -1,6 +1,7 @@
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
+#include <system_error>
 
 #include "worldmodel/nn/mapped_tensors.h"
 #include "worldmodel/train/trainer.h"
@@ -10,6 +11,7 @@ namespace {
 
 constexpr const char* kFile = "training.safetensors";
 constexpr const char* kFormat = "evac-training 1";
+constexpr const char* kTables = ", and its metrics.csv and holdout.csv";
 
 /// All 53 bits, so that a number read again is the number that was written.
 std::string Exact(double value) {
@@ -78,10 +80,10 @@ bool Trainer::Load() {
   if (metadata.Text("format") != kFormat)
     throw TensorError(path.string() + ": format '" + metadata.Text("format") + "', wanted '" + kFormat + "'");
   if (metadata.Text("layout") != parameters_.Layout())
-    throw TensorError(path.string() + " is a training of other parameters: another folder, or throw it away");
+    throw TensorError(path.string() + " is a training of other parameters: another folder, or throw it away" + kTables);
   if (metadata.Text("identity") != Identity())
     throw TensorError(path.string() + " is a training with other options (" + metadata.Text("identity") +
-                      "; wanted: " + Identity() + "): another folder, or throw it away");
+                      "; wanted: " + Identity() + "): another folder, or throw it away" + kTables);
   CopyFrom(file, "values", state_.values);
   CopyFrom(file, "first_moment", state_.first_moment);
   CopyFrom(file, "second_moment", state_.second_moment);
@@ -131,6 +133,8 @@ void Trainer::Save() const {
     views.push_back(nn::ViewOf(tensor.name, tensor.tensor));
   }
   WriteTensorFile(folder_ / kFile, views, metadata);
+  std::error_code ignored;
+  std::filesystem::remove(Unsaved(), ignored);
 }
 
 }  // namespace evac::train

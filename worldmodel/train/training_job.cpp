@@ -7,6 +7,7 @@
 #include <system_error>
 
 #include "worldmodel/nn/model_sizes.h"
+#include "worldmodel/nn/number_text.h"
 
 namespace evac::train {
 namespace {
@@ -18,20 +19,14 @@ Settings OptionsOf(TrainingJob& job) {
   return job.kind == TrainingKind::kCodec ? SettingsOf(job.codec) : SettingsOf(job.world);
 }
 
-bool Flag(const std::string& value, bool& field) {
-  if (value != "true" && value != "false") return false;
-  field = value == "true";
-  return true;
-}
-
 /// What stands on a line besides sizes and options.
 bool SetOther(TrainingJob& job, const std::string& name, const std::string& value) {
   if (name == "codec_sha256") job.start.codec_sha256 = value;
   else if (name == "init_except") job.start.init_except.push_back(value);
   else if (name == "begun_with") job.begun_with = value;
-  else if (name == "init_widen") return Flag(value, job.start.init_widen);
-  else if (name == "wants_init") return Flag(value, job.wants_init);
-  else if (name == "wants_forecast") return Flag(value, job.wants_forecast);
+  else if (name == "init_widen") return nn::ParseFlag(value, job.start.init_widen);
+  else if (name == "wants_init") return nn::ParseFlag(value, job.wants_init);
+  else if (name == "wants_forecast") return nn::ParseFlag(value, job.wants_forecast);
   else return false;
   return true;
 }

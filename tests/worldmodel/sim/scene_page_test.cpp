@@ -56,6 +56,19 @@ TEST(ScenePage, NumbersAreFiniteAndNoBodyIsPlacedTwice) {
   EXPECT_THAT(complaint("body: bottle", "body: box"), HasSubstr("wanted another body than those before it"));
 }
 
+/// Its name was put into the page as it stands: this one made the page no YAML, others another body or none.
+TEST(ScenePage, AThingOfAnyNameIsTakenAway) {
+  Task task = test::ReadTask("take_bottle");
+  const std::string before = "body: bottle";
+  task.page.replace(task.page.find(before), before.size(), R"(body: "a \"b\": [c}, #~")");
+  const std::string name = R"(a "b": [c}, #~)";
+  ASSERT_EQ(ReadScenePage(task).placements.at(1).body, name);
+  const Placement away = ReadScenePage(WithoutObject(task, name)).placements.at(1);
+  EXPECT_EQ(away.body, name);
+  EXPECT_EQ(away.inside, "");
+  EXPECT_EQ(away.x_m.low, 3);
+}
+
 TEST(ScenePage, AnEndlessAttributeIsReadWithoutRecursion) {
   EXPECT_THAT(RefusalWith("<include file=\"" + std::string(5'000'000, 'a') + "\"/>"), HasSubstr("wanted that file"));
   EXPECT_EQ(RefusalWith("<include file=\"" + std::string(100, ' ')), "");
