@@ -10,6 +10,7 @@
 #include "core/file.h"
 #include "core/geometry.h"
 #include "core/hash.h"
+#include "core/recording_writer.h"
 #include "core/scene_files.h"
 #include "core/seed.h"
 #include "core/task_page.h"
@@ -103,6 +104,7 @@ CollectTask ReadCollectTask(const Config& page) {
   page.AllowOnly({"page", "object", "middle_m"});
   CollectTask task;
   task.task = ReadTaskPage(page.Path("page"));
+  CheckReadableCameras(task.task.cameras, task.task.arms.size(), task.task.page_path);
   sim::ReadScenePage(task.task);
   task.object = page.Get<std::string>("object");
   task.without = sim::WithoutObject(task.task, task.object);

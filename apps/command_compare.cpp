@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "apps/commands.h"
+#include "apps/warnings.h"
 #include "core/statistics/sequential.h"
 #include "core/store.h"
 #include "reports/counted_judges.h"
@@ -206,6 +207,7 @@ void Compare(const CompareArguments& arguments) {
   const std::string a = PolicyOf(one, first.policy), b = PolicyOf(two, second.policy);
   const bool same_run = std::filesystem::equivalent(first.run, second.run);
   if (same_run && a == b) throw InvalidInput("compare: {} against itself", a);
+  const bool are_two_judges = one.summary.options.judge != two.summary.options.judge;
   std::vector<ComparedWorld> worlds;
   for (const std::string& world : WorldsOfBoth(one, two, arguments.world)) {
     ComparedPolicy left = Side(one, a, world), right = Side(two, b, world);
@@ -214,10 +216,15 @@ void Compare(const CompareArguments& arguments) {
       right.name = second.run + ":" + b;
     }
     ComparedWorld& compared = worlds.emplace_back(
-        ComparedWorld{world, arguments.judge, ComparePolicies(left, right, arguments.options), {}, {}});
+        ComparedWorld{world, one.summary.options.judge, ComparePolicies(left, right, arguments.options), {}});
+    if (are_two_judges) compared.second_judge = two.summary.options.judge;
     compared.other_judges = OtherJudges(one, two, compared);
     if (arguments.sequential) DemandPairs(compared.comparison);
   }
+  if (are_two_judges)
+    PrintWarnings({fmt::format("{} is judged by {} and {} by {}: what they differ by may be the judges', not the "
+                               "policies'; name one that judged both",
+                               first.run, one.summary.options.judge, second.run, two.summary.options.judge)});
   Json all = {{"schema", 1}, {"worlds", Json::array()}};
   for (ComparedWorld& compared : worlds) {
     if (arguments.sequential) compared.bets = Bet(compared.comparison, NameOfLooks(compared, one, two), first.run);

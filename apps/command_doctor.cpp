@@ -105,8 +105,8 @@ Finding LcmBuffers() {
   std::ifstream("/proc/sys/net/core/rmem_max") >> limit;
   if (limit >= kWanted) return Good(fmt::format("receive buffers of up to {} kB", limit / 1024));
   return Advice(
-      fmt::format("receive buffers are limited to {} kB: large images get lost and are sent again, which costs time "
-                  "and changes no result. "
+      fmt::format("receive buffers are limited to {} kB: large images get lost and are sent again, which costs time; "
+                  "messages larger than that (raw images) may never arrive, and fail their episodes. "
                   "sysctl -w net.core.rmem_max={}",
                   limit / 1024, kWanted));
 }

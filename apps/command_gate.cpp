@@ -43,10 +43,21 @@ PinnedResult PinRun(const std::string& run, const std::string& judge) {
   return Pin(SummaryOf(run, judge, options), run);
 }
 
-std::optional<PinnedResult> BaselineOf(const GateArguments& arguments, const std::string& judge) {
+/// A baseline in which nothing succeeded or failed would be found out by the first candidate, long after.
+void DemandOutcomes(const PinnedResult& pinned, const std::string& run, const std::string& judge) {
+  for (const PinnedCell& cell : pinned.cells) {
+    if (std::ranges::any_of(cell.outcomes, &PinnedOutcome::Counts)) return;
+  }
+  throw InvalidInput("{}: judge {}: found no episode that succeeded or failed, wanted a judge of this run (evac ls)",
+                     run, judge);
+}
+
+std::optional<PinnedResult> BaselineOf(const GateArguments& arguments, const GateRules& rules) {
   if (arguments.baseline.empty()) return std::nullopt;
-  if (fs::is_directory(arguments.baseline)) return PinRun(arguments.baseline, judge);
-  return ReadPinned(ReadFile(arguments.baseline), arguments.baseline);
+  if (!fs::is_directory(arguments.baseline)) return ReadPinned(ReadFile(arguments.baseline), arguments.baseline);
+  PinnedResult pinned = PinRun(arguments.baseline, rules.judge);
+  if (std::ranges::any_of(rules.rules, &GateRule::Compares)) DemandOutcomes(pinned, arguments.baseline, rules.judge);
+  return pinned;
 }
 
 /// A run that is being written cannot take it: the decision stands, and the bets stay valid, they only forget.
@@ -59,6 +70,18 @@ void Keep(const GateResult& result, const std::string& run) {
                        result.looks);
   } catch (const Error& error) {
     fmt::print(stderr, "evac: warning: this decision was not kept: {}\n", error.what());
+  }
+}
+
+/// A stored decision that others of its gate came after is the last again: it is what this run came to now.
+void KeepLast(const std::vector<GateRecord>& records, std::vector<GateRecord>::const_iterator stored,
+              const std::string& run) {
+  if (std::none_of(stored + 1, records.end(), [&](const GateRecord& later) { return later.gate == stored->gate; }))
+    return;
+  try {
+    Store::Open(run, Store::Mode::kReadWrite).RepeatGateRecord(stored->key);
+  } catch (const Error& error) {
+    fmt::print(stderr, "evac: warning: that this decision stands again was not kept: {}\n", error.what());
   }
 }
 
@@ -84,7 +107,7 @@ void DemandTheJudge(const GateRules& rules, const RunSummary& summary, const Gat
 
 /// The stored decision where these rules, this baseline and these data have been decided before; else a new one, kept.
 GateDecision DecisionOf(const GateRules& rules, const RunSummary& summary, const GateArguments& arguments) {
-  const std::optional<PinnedResult> baseline = BaselineOf(arguments, rules.judge);
+  const std::optional<PinnedResult> baseline = BaselineOf(arguments, rules);
   const auto looks = Store::Open(arguments.run, Store::Mode::kReadOnly).Looks();
   const GateResult result = Decide(rules, {summary, arguments.run, looks}, baseline ? &*baseline : nullptr);
   const auto& records = summary.data.gates;
@@ -92,6 +115,7 @@ GateDecision DecisionOf(const GateRules& rules, const RunSummary& summary, const
   if (stored != records.end()) {
     if (arguments.names_seed)
       fmt::print(stderr, "evac: note: --seed: this was decided before, and that decision stands\n");
+    KeepLast(records, stored, arguments.run);
     return GateDecisionFromJson(stored->document);
   }
   Keep(result, arguments.run);
@@ -113,7 +137,7 @@ ExitCode ExitCodeOf(GateOutcome outcome) {
 ExitCode Gate(const GateArguments& arguments) {
   const GateRules rules = ReadGateRules(Config::FromFile(arguments.rules));
   if (arguments.run.empty()) {  // before the run: what it will take
-    const std::optional<PinnedResult> baseline = BaselineOf(arguments, rules.judge);
+    const std::optional<PinnedResult> baseline = BaselineOf(arguments, rules);
     for (const std::string& size : SizesOf(rules, baseline ? &*baseline : nullptr)) fmt::print("{}.\n", size);
     return ExitCode::kOk;
   }
@@ -131,15 +155,6 @@ ExitCode Gate(const GateArguments& arguments) {
   return ExitCodeOf(decision.outcome);
 }
 
-/// A baseline in which nothing succeeded or failed would be found out by the first candidate, long after.
-void DemandOutcomes(const PinnedResult& pinned, const GateArguments& arguments) {
-  for (const PinnedCell& cell : pinned.cells) {
-    if (std::ranges::any_of(cell.outcomes, &PinnedOutcome::Counts)) return;
-  }
-  throw InvalidInput("{}: judge {}: found no episode that succeeded or failed, wanted a judge of this run (evac ls)",
-                     arguments.run, arguments.judge);
-}
-
 void AddPin(CLI::App& gate, ExitCode& exit_code) {
   const auto arguments = std::make_shared<GateArguments>();
   CLI::App* command =
@@ -150,7 +165,7 @@ void AddPin(CLI::App& gate, ExitCode& exit_code) {
   command->callback([arguments, &exit_code] {
     RefuseFolder(arguments->out);
     const PinnedResult pinned = PinRun(arguments->run, arguments->judge);
-    DemandOutcomes(pinned, *arguments);
+    DemandOutcomes(pinned, arguments->run, arguments->judge);
     MakeFolders(fs::path(arguments->out).parent_path());
     WriteFileAtomically(arguments->out, PinnedJson(pinned));
     fmt::print("{}\n", pinned.sha256);

@@ -64,7 +64,7 @@ void Import(const ImportArguments& arguments) {
   const RealTrialsCsv csv =
       ReadRealTrialsCsv(ReadFile(file), file.filename().string(), NamesOf(store, arguments.new_states));
   for (const std::string& warning : csv.warnings) fmt::print(stderr, "evac: warning: {}\n", warning);
-  std::vector<RealTrial> added = NewTrials(csv.trials, store.RealTrials());
+  std::vector<RealTrial> added = NewTrials(csv.trials, store.RealTrials(), csv.counted);
   const std::vector<fs::path> videos = VideosOf(added, file.parent_path());
   std::set<std::tuple<std::string, std::string>> states;
   for (std::size_t i = 0; i < added.size(); ++i) {

@@ -17,6 +17,7 @@ ExitCode Merge(const MergeArguments& arguments) {
   const MergeSummary summary = MergeRuns({arguments.shards.begin(), arguments.shards.end()}, arguments.out);
   fmt::print("{}: {} episodes of {} runs; {} were in more than one and the same in all\n", arguments.out,
              summary.episodes, arguments.shards.size(), summary.duplicates);
+  for (const std::string& note : summary.notes) fmt::print(stderr, "evac: note: {}\n", note);
   return ExitCode::kOk;
 }
 

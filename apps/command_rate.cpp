@@ -90,6 +90,7 @@ void New(RateArguments& arguments) {
   fmt::print("{}: {} clips to rate, {} gold, {} practice, {} examples; list {}\n", arguments.study, made.clips,
              made.gold, made.practice, made.examples, made.list_hash.substr(0, 12));
   for (const std::string& sentence : made.left_out) fmt::print("left out: {}\n", sentence);
+  for (const std::string& warning : made.warnings) fmt::print("note: {}\n", warning);
   if (options.gold_from.empty())
     fmt::print("no gold and no practice: --gold-from JUDGE takes them from a judge that is known to be right\n");
   fmt::print("next:\n  evac rate invite {0} --count {1}\n  evac rate serve {0}\n", arguments.study,

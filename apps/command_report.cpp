@@ -40,6 +40,23 @@ void WriteCharts(const std::vector<ChartFile>& charts, const fs::path& folder) {
   }
 }
 
+/// Of an earlier report, such as another judge's, that this one has no more. What evac did not write stays.
+void RemoveOtherCharts(const std::vector<ChartFile>& charts, const fs::path& folder) {
+  std::vector<fs::path> others;
+  for (const fs::directory_entry& entry : fs::directory_iterator(folder)) {
+    const fs::path& file = entry.path();
+    const std::string name = file.stem().string();
+    if (file.extension() != ".svg" || entry.symlink_status().type() != fs::file_type::regular) continue;
+    if (std::ranges::find(charts, name, &ChartFile::name) != charts.end()) continue;
+    if (IsChartFile(name, ReadFile(file))) others.push_back(file);
+  }
+  for (fs::path file : others) {
+    fs::remove(file);
+    file.replace_extension(".png");
+    if (fs::symlink_status(file).type() == fs::file_type::regular) fs::remove(file);
+  }
+}
+
 void CheckIsFolder(const fs::path& folder) {
   if (folder.extension() == ".html")
     throw InvalidInput("--out: found {}, wanted the name of a folder", folder.string());
@@ -86,7 +103,9 @@ fs::path WriteReport(const ReportArguments& arguments) {
   MakeFolders(folder);
   const fs::path run_folder = fs::canonical(arguments.run).lexically_relative(fs::canonical(folder));
   const ReportData report = ReportDataOf(std::move(summary), {.baseline = arguments.baseline, .trust = {}});
-  WriteCharts(ChartFilesOf(report), folder / "charts");
+  const std::vector<ChartFile> charts = ChartFilesOf(report);
+  WriteCharts(charts, folder / "charts");
+  RemoveOtherCharts(charts, folder / "charts");
   PageOptions page;
   page.run_folder = run_folder.generic_string();
   page.program = "evac " EVAC_VERSION;

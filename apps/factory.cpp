@@ -6,12 +6,12 @@
 #include <cstdlib>
 #include <random>
 #include <sstream>
-#include <thread>
 
 #include "apps/network_parts.h"
 #include "apps/recorded_suite.h"
 #include "core/config.h"
 #include "core/file.h"
+#include "harness/suite_hash.h"
 #include "judges/oracle_judge.h"
 #include "worldmodel/echo_world.h"
 #include "worldmodel/sim/mujoco_world.h"
@@ -26,7 +26,9 @@ std::string FindProgram(const std::string& program, const Suite& suite) {
   if (program.find('/') != std::string::npos) {
     const fs::path path = fs::path(program).is_absolute() ? fs::path(program) : fs::absolute(suite.path).parent_path() / program;
     if (::access(path.c_str(), X_OK) == 0) return path.lexically_normal().string();
-    throw InvalidInput("{}: a policy's command names {}, which is no program here", suite.path.string(), path.string());
+    throw InvalidInput("{}: a policy's command names {}: found no program at {} (a relative one is looked for in the suite's "
+                       "folder, also with --set)",
+                       suite.path.string(), program, path.lexically_normal().string());
   }
   const fs::path beside = fs::read_symlink("/proc/self/exe").parent_path() / program;
   if (::access(beside.c_str(), X_OK) == 0) return beside.string();
@@ -96,6 +98,15 @@ void CheckInstruction(const Suite& suite, const PolicySpec& declared) {
                      suite.path.string(), declared.name, declared.checkpoint);
 }
 
+/// What a page puts into each other does not come to rest: nothing of the machine's that a second try would mend.
+WorldStep Begun(World& world, const Task& task, const InitialState& initial) try {
+  return world.Reset(0, task, initial, 0);
+} catch (const Error& error) {
+  if (std::string_view(error.kind()) != Name(StopReason::kDiverged)) throw;
+  throw InvalidInput("{}: what initial state {} begins with does not come to rest: {}", task.page_path, initial.id,
+                     error.what());
+}
+
 }  // namespace
 
 void CheckRubrics(const Suite& suite) {
@@ -106,7 +117,7 @@ void CheckRubrics(const Suite& suite) {
 }
 
 void CheckStart(World& world, const Task& task, const InitialState& initial) {
-  const PrivilegedFrame frame = world.Reset(0, task, initial, 0).privileged;
+  const PrivilegedFrame frame = Begun(world, task, initial).privileged;
   if (frame.bodies.empty()) return;
   if (const auto wrong = WhatIsWrong(task.rubric, frame)) throw InvalidInput("{}: field rubric: {}", task.page_path, *wrong);
 }
@@ -119,13 +130,15 @@ void Declare(const Suite& suite, Store& store) {
     if (world.evac) {
       CheckNetwork(world, suite.tasks);
       profile_hash = world.evac->hash;
+      // Of one number of threads are its frames, which is in no hash of the suite's: a run goes on with that alone.
+      if (world.evac->all_threads_per_scene) profile_hash += fmt::format(" threads {}", Threads(suite));
     }
     store.AddWorld({.name = world.name, .type = world.type, .is_real = world.is_real, .profile_hash = profile_hash});
   }
 }
 
-int Threads(const Suite& suite) {
-  return suite.threads > 0 ? suite.threads : std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
+int Threads(const Suite& suite, unsigned cores) {
+  return suite.threads > 0 ? suite.threads : static_cast<int>(std::clamp(cores, 1u, 256u));
 }
 
 void NeedNetworksFor(const Suite& suite) {
@@ -135,8 +148,11 @@ void NeedNetworksFor(const Suite& suite) {
 std::unique_ptr<World> MakeWorld(const SuiteWorld& world, const Suite& suite, const Store* store) {
   if (world.type == "evac") return MakeEvacWorld(world, suite, store);
   if (world.type == "echo") return std::make_unique<EchoWorld>(RecordingsOf(suite), world.name);
-  return std::make_unique<sim::MujocoWorld>(
+  auto made = std::make_unique<sim::MujocoWorld>(
       sim::MujocoWorldOptions{.name = world.name, .profile = world.profile, .threads = Threads(suite), .film = world.film});
+  for (const Task& task : suite.tasks) made->Read(task);
+  DemandUnchanged(suite, world);  // what is stored bears the suite's hash
+  return made;
 }
 
 std::vector<std::string> CommandLine(const SuitePolicy& policy, const Suite& suite) {
@@ -153,13 +169,16 @@ RunningPolicy::RunningPolicy(const SuitePolicy& policy, const Suite& suite, cons
   options.start_s = suite.transport.start_s;
   options.keep_longer_chunks = suite.latency.kind != PolicyLatency::Kind::kOff;
   options.raw_images = suite.transport.images == "raw";
+  options.who = fmt::format("policy {}@{}", policy.name, policy.checkpoint);
   if (policy.command.empty()) {
     options.address = {policy.join_url, policy.join_token};
   } else {
     options.address = NewAddress(fmt::format("{} {}@{}", fs::absolute(run_folder).string(), policy.name, policy.checkpoint));
-    process_.emplace(ProcessOptions(policy, suite, run_folder, options.address));
+    const PolicyProcessOptions started = ProcessOptions(policy, suite, run_folder, options.address);
+    options.if_silent = fmt::format("its output: {}; `transport.start_s` gives it longer", started.log.string());
+    process_.emplace(started);
     options.why_gone = [this] { return process_->WhyGone(); };
-    options.restart = [this] { process_->Restart(); };
+    options.restart = [this](auto asked) { process_->Restart(asked); };
   }
   link_.emplace(std::move(options));
   spec_ = link_->Handshake(HarnessSpec(suite.tasks.front(), suite.chunk_size), suite.transport.start_s);

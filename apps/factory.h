@@ -5,6 +5,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <thread>
 #include <vector>
 
 #include "core/store.h"
@@ -21,16 +22,18 @@ namespace evac {
 void CheckRubrics(const Suite& suite);
 
 /// The world can start the task, and has the bodies that its rubric names (worlds without physics have none and are not
-/// asked). @throws InvalidInput naming page and body.
+/// asked). @throws InvalidInput naming page and body, or page and state where the physics diverges as it settles.
 void CheckStart(World& world, const Task& task, const InitialState& initial);
 
 /// Tasks and worlds, as the store keeps them; checks rubrics and networks first.
 void Declare(const Suite& suite, Store& store);
 
-/// As many as the suite says, or one per core.
-int Threads(const Suite& suite);
+/// As many as the suite says, or one per core, of which no world takes more than 256.
+int Threads(const Suite& suite, unsigned cores = std::thread::hardware_concurrency());
 
 /// @param store  of the run, where imagined episodes find the real ones' first frames; null: there is none yet
+/// @throws InvalidInput for what the world is made of that is wrong, or another than when the suite was read: network,
+///   profile, task pages, scenes.
 std::unique_ptr<World> MakeWorld(const SuiteWorld& world, const Suite& suite, const Store* store);
 
 /// The command line of a policy with its program found and `${recording}` filled in.
@@ -42,7 +45,8 @@ class RunningPolicy {
  public:
   /// Starts and greets it. @param interrupted  asked while waiting for it.
   /// @throws InvalidInput with both declarations if it does not fit the suite's tasks; naming the suite's field if it
-  /// needs an instruction and the suite says none of its recordings.
+  /// needs an instruction and the suite says none of its recordings; naming it, and the log of one that was started, if
+  /// it does not answer.
   RunningPolicy(const SuitePolicy& policy, const Suite& suite, const std::filesystem::path& run_folder,
                 std::function<bool()> interrupted);
 

@@ -36,9 +36,10 @@ void PrintRaters(const Json& board) {
       {"RATER", "NAME", "ROLE", "STATUS", "VERDICTS", "SUCCESS", "MEDIAN", "KNOWN", "AGAIN"}};
   for (const Json& rater : board.at("raters")) {
     const Json& median_s = rater.at("median_rt_s");
+    const int verdicts = rater.at("verdicts").get<int>();
     rows.push_back({rater.at("rater"), rater.at("name"), rater.at("role"), rater.at("status"),
-                    std::to_string(rater.at("verdicts").get<int>()),
-                    fmt::format("{:.0f} %", 100 * rater.at("success_share").get<double>()),
+                    std::to_string(verdicts),
+                    verdicts == 0 ? "-" : fmt::format("{:.0f} %", 100 * rater.at("success_share").get<double>()),
                     median_s.is_null() ? "-" : fmt::format("{:.1f} s", median_s.get<double>()),
                     fmt::format("{}/{}", rater.at("gold_right").get<int>(), rater.at("gold_seen").get<int>()),
                     fmt::format("{}/{}", rater.at("repeats_same").get<int>(), rater.at("repeats_seen").get<int>())});

@@ -15,7 +15,10 @@ constexpr int kReach = 12, kLift = 6, kEarliest = -4, kLatest = 4;  // frames: a
 Eigen::Vector3d Away_m(SplitMix64& random) {
   const bool wide = random.Uniform() < 0.5;
   const double across_m = wide ? 0.012 : 0.004, up_m = wide ? 0.006 : 0.003;
-  Eigen::Vector3d away_m(across_m * random.Normal(), across_m * random.Normal(), up_m * random.Normal());
+  const double z_m = up_m * random.Normal();  // before y and x: variations are what they were drawn as first
+  const double y_m = across_m * random.Normal();
+  const double x_m = across_m * random.Normal();
+  Eigen::Vector3d away_m(x_m, y_m, z_m);
   if (random.Uniform() >= kElsewhere) away_m.setZero();
   return away_m;
 }

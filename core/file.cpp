@@ -94,9 +94,19 @@ void SyncAndRename(const fs::path& from, const fs::path& to) {
   SyncFolder(to.parent_path());
 }
 
+fs::file_status StatusOf(const fs::path& path) {
+  std::error_code error;
+  const fs::file_status status = fs::status(path, error);
+  if (status.type() == fs::file_type::none)
+    throw InvalidInput("{}: cannot be looked at: {}", path.string(), error.message());
+  return status;
+}
+
 void MakeFolders(const fs::path& folder) {
-  if (folder.empty() || fs::is_directory(folder)) return;
-  if (fs::exists(folder)) throw InvalidInput("{}: cannot be made: what is there is no folder", folder.string());
+  if (folder.empty()) return;
+  const fs::file_status there = StatusOf(folder);
+  if (fs::is_directory(there)) return;
+  if (fs::exists(there)) throw InvalidInput("{}: cannot be made: what is there is no folder", folder.string());
   MakeFolders(folder.parent_path());
   std::error_code error;
   fs::create_directory(folder, error);

@@ -21,8 +21,14 @@ void LinkOrCopy(const std::filesystem::path& from, const std::filesystem::path& 
 /// Syncs a finished file to disk, renames it to its final name and syncs that folder.
 void SyncAndRename(const std::filesystem::path& from, const std::filesystem::path& to);
 
+/// What is at a path, links followed: of type not_found where nothing is.
+/// @throws InvalidInput naming it and the reason where nobody can know: a link to itself, a folder without rights, a
+///   name that is too long.
+std::filesystem::file_status StatusOf(const std::filesystem::path& path);
+
 /// Makes a folder and those above it, as far as they are missing, each of them synced into the one above.
-/// @throws InvalidInput naming what is no folder where one is wanted; Error naming the folder that cannot be made.
+/// @throws InvalidInput naming what is no folder where one is wanted, or as StatusOf; Error naming the folder that
+///   cannot be made.
 void MakeFolders(const std::filesystem::path& folder);
 
 /// For a file that is written at the end of long work: whether one can be there is known before.

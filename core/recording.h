@@ -49,6 +49,10 @@ struct Recording {
 ///   moves against its mount. `Error::kind` is one word for the reason (docs/formats/recording.md).
 Recording ReadRecording(const std::filesystem::path& folder, const RecordingOptions& options = {});
 
+/// Where a recording's camera of this name is mounted, as its files do not say: `hand_right` on the right gripper,
+/// `hand_left` on the left one, but on the base where the recording has one arm; any other on the base.
+Mount MountOf(const std::string& camera, std::size_t arms);
+
 /// What ReadRecording calls the recording in a folder, whatever is in it.
 std::string RecordingId(const std::filesystem::path& folder);
 

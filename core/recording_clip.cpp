@@ -46,11 +46,6 @@ double Snapped(double period_s) {
   return rate_hz > 0 && std::abs(period_s * rate_hz - 1) < kRateTolerance ? 1 / rate_hz : period_s;
 }
 
-Mount MountOf(const std::string& camera) {
-  if (camera == "hand_left") return Mount::kLeftGripper;
-  return camera == "hand_right" ? Mount::kRightGripper : Mount::kBase;
-}
-
 fs::path VideoOf(const ClipFolders& folders, const std::string& camera) {
   return folders.images / (camera + "_color.mp4");
 }
@@ -92,7 +87,7 @@ Camera ReadCamera(const Context& context, const std::string& name, const cv::Mat
   camera.name = name;
   camera.width_px = first.cols;
   camera.height_px = first.rows;
-  camera.mount = MountOf(name);
+  camera.mount = MountOf(name, 2);  // an absent left arm is dropped with its mount, later
   CheckPinhole(camera, intrinsics.string());
   const std::vector<Eigen::Isometry3d> poses = ParseExtrinsics(ReadFile(extrinsics), extrinsics.string());
   camera.mount_from_camera = FixedMount({camera.mount, poses, context.arms}, context.options, extrinsics.string());
@@ -148,6 +143,11 @@ void AddStillCamera(const Context& context, const std::vector<std::string>& name
 }
 
 }  // namespace
+
+Mount MountOf(const std::string& camera, std::size_t arms) {
+  if (camera == "hand_left") return arms == 2 ? Mount::kLeftGripper : Mount::kBase;
+  return camera == "hand_right" ? Mount::kRightGripper : Mount::kBase;
+}
 
 Recording ReadClipLayout(const ClipFolders& folders, const RecordingOptions& options) {
   std::vector<Arms> arms = Calling("broken_track", [&] { return ReadProprio(folders.proprio); });

@@ -17,6 +17,8 @@ constexpr double kClosedGripper = 120;                         // AgiBot's raw r
 constexpr double kLowestGripper = -10, kHighestGripper = 140;  // beyond these it is another unit
 constexpr double kUnitTolerance = 1e-3;
 constexpr unsigned kMaxSide_px = 8192;
+/// Parts of a side: lenses are not off by more, and intrinsics of pictures twice as large or half as large are.
+constexpr double kFirstCentral = 0.15, kLastCentral = 0.85;
 
 /// A side of the image out of the PNG's first chunk (big-endian), so that a lying file cannot ask for gigabytes.
 unsigned PngSide(const std::string& bytes, std::size_t at) {
@@ -60,11 +62,14 @@ void CheckPinhole(const Camera& camera, const std::string& where) {
   if (!(camera.fx_px > 0 && camera.fy_px > 0 && std::isfinite(camera.fx_px) && std::isfinite(camera.fy_px))) {
     throw InvalidInput("{}: focal lengths {}, {} px, wanted positive numbers", where, camera.fx_px, camera.fy_px);
   }
-  const bool inside =
-      camera.cx_px > 0 && camera.cx_px < camera.width_px && camera.cy_px > 0 && camera.cy_px < camera.height_px;
-  if (!inside) {
-    throw InvalidInput("{}: principal point ({:.1f}, {:.1f}) px, wanted one inside the image of {}x{}", where,
-                       camera.cx_px, camera.cy_px, camera.width_px, camera.height_px);
+  const auto is_central = [](double at_px, int side_px) {
+    return at_px >= kFirstCentral * side_px && at_px <= kLastCentral * side_px;
+  };
+  if (!is_central(camera.cx_px, camera.width_px) || !is_central(camera.cy_px, camera.height_px)) {
+    throw InvalidInput(
+        "{}: principal point ({:.1f}, {:.1f}) px in an image of {}x{}, wanted one within {} … {} of each side: "
+        "intrinsics of another size?",
+        where, camera.cx_px, camera.cy_px, camera.width_px, camera.height_px, kFirstCentral, kLastCentral);
   }
 }
 

@@ -32,9 +32,8 @@ ArmState ArmFromRaw(const RawArm& raw, const std::string& where);
 Eigen::Isometry3d RigidOrThrow(const Eigen::Matrix3d& rotation, const Eigen::Vector3d& translation_m,
                                const std::string& where);
 
-/// @throws InvalidInput unless the focal lengths are positive and the principal point lies inside the image (else the
-/// intrinsics
-///   belong to an image of another size).
+/// @throws InvalidInput unless the focal lengths are positive and the principal point lies within 0.15 … 0.85 of each
+///   side (else the intrinsics belong to an image of another size).
 void CheckPinhole(const Camera& camera, const std::string& where);
 
 /// An 8-bit RGB image of at most 8192 x 8192 from a PNG file.

@@ -5,6 +5,7 @@
 #include "core/error.h"
 #include "core/file.h"
 #include "core/geometry.h"
+#include "core/recording.h"
 #include "core/recording_parts.h"
 
 namespace evac {
@@ -52,10 +53,29 @@ void CheckLengths(const TreePlace& place, const RecordedEpisode& episode) {
                       episode.told.size(), episode.pictures.size());
 }
 
+const char* NameOf(Mount mount) {
+  if (mount == Mount::kBase) return "base";
+  return mount == Mount::kLeftGripper ? "left_gripper" : "right_gripper";
+}
+
 }  // namespace
+
+void CheckReadableCameras(const std::vector<Camera>& cameras, std::size_t arms, const std::string& where) {
+  bool has_head = false;
+  for (const Camera& camera : cameras) {
+    has_head |= camera.name == "head";
+    const Mount read = MountOf(camera.name, arms);
+    if (camera.mount == read) continue;
+    throw InvalidInput("{}: camera '{}' is mounted on {}, a recording's camera of that name is read as on {}: wanted "
+                       "hand_left on the left gripper, hand_right on the right one, other names on the base",
+                       where, camera.name, NameOf(camera.mount), NameOf(read));
+  }
+  if (!has_head) throw InvalidInput("{}: found no camera 'head', wanted one: no recording is read without it", where);
+}
 
 void WriteRecording(const TreePlace& place, const RecordedEpisode& episode, const RecordingVideo& video) {
   CheckLengths(place, episode);
+  CheckReadableCameras(episode.cameras, episode.arms.front().size(), place.Folder().string());
   const fs::path videos = place.Folder() / "videos";
   const fs::path pages = place.root / "parameters" / place.task / place.episode / "parameters" / "camera";
   const fs::path proprio = place.root / "proprio_stats" / place.task / place.episode;

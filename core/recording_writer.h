@@ -36,10 +36,18 @@ struct RecordingVideo {
   std::string preset = "superfast";  ///< of x264: pictures with a sensor's noise gain nothing from a slower one
 };
 
+/// Before hours go into what nobody can read back.
+/// @param arms   how many the robot has
+/// @param where  for the message: a task page, a folder
+/// @throws InvalidInput naming the camera: one that is not mounted where readers take its name to be (MountOf), or no
+///   `head`, which every recording has.
+void CheckReadableCameras(const std::vector<Camera>& cameras, std::size_t arms, const std::string& where);
+
 /// Writes the episode's videos, camera pages (in pixels of the videos, a pose per step) and proprio_stats.h5; each file
 /// whole or not at all. The same episode gives the same bytes. A wrist camera's pose is that of the measured arm.
 /// Thread-safe.
-/// @throws InternalError if tracks and pictures disagree in length; Error if the disk refuses.
+/// @throws InternalError if tracks and pictures disagree in length; InvalidInput as CheckReadableCameras; Error if the
+///   disk refuses.
 void WriteRecording(const TreePlace& place, const RecordedEpisode& episode, const RecordingVideo& video);
 
 }  // namespace evac

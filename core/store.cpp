@@ -96,9 +96,9 @@ Store::~Store() = default;
 Store Store::CreateOrContinue(const fs::path& folder, const RunInfo& run) {
   MakeFolders(folder);
   const fs::path file = DatabaseIn(folder);
-  if (!fs::exists(file)) run_files::RequireNoOthersFiles(folder);
+  if (!fs::exists(StatusOf(file))) run_files::RequireNoOthersFiles(folder);
   auto lock = std::make_unique<RunLock>(folder / run_files::kLock);
-  if (fs::exists(file)) {  // looked at before anything is written: it may be a newer evac's
+  if (fs::exists(StatusOf(file))) {  // looked at before anything is written: it may be a newer evac's
     sqlite::Connection reading = sqlite::Connection::OpenReadOnly(file);
     schema::Version(reading, schema::Steps(), file);
   }
@@ -110,7 +110,7 @@ Store Store::CreateOrContinue(const fs::path& folder, const RunInfo& run) {
 
 Store Store::Open(const fs::path& folder, Mode mode) {
   const fs::path file = DatabaseIn(folder);
-  if (!fs::is_regular_file(file))
+  if (!fs::is_regular_file(StatusOf(file)))
     throw InvalidInput("{}: there is no run ({} is missing)", folder.string(), run_files::kDatabase);
   sqlite::Connection reading = sqlite::Connection::OpenReadOnly(file);
   const int version = schema::Version(reading, schema::Steps(), file);
@@ -258,6 +258,10 @@ void Store::AddGateRecord(const GateRecord& record, const std::vector<Sequential
     rows::InsertGateRecord(connection, record);
     for (const SequentialLook& look : looks) rows::InsertLook(connection, look);
   });
+}
+
+void Store::RepeatGateRecord(const std::string& key) {
+  database_->Write([&](auto& connection) { rows::MoveGateRecordLast(connection, key); });
 }
 
 std::vector<GateRecord> Store::GateRecords() const { return database_->Read(rows::SelectGateRecords); }

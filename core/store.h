@@ -65,7 +65,7 @@ struct SequentialLook {
   bool operator==(const SequentialLook&) const = default;
 };
 
-/// What a gate decided of this run, append-only: the same key gets the stored decision again.
+/// What a gate decided of this run, never changed: the same key gets the stored decision again.
 struct GateRecord {
   std::string key;       ///< what the decision follows from: rules, baseline, data
   std::string gate;      ///< the name of the rules
@@ -96,10 +96,11 @@ class Store {
   /// Begins a run in `folder` (made if absent), or continues the one there if it has the same suite hash. One of another
   /// suite that never came to an episode makes room.
   /// @throws InvalidInput if another run is there, another process writes it, its schema is newer than this program, or
-  /// `folder` is a file or lies in one; also where somebody's files would be in the way: in videos/ or thumbs/ (or these
-  /// are links) of a folder without a run, or a file called lock that is none.
+  /// `folder` is a file, lies in one or cannot be looked at; also where somebody's files would be in the way: in videos/
+  /// or thumbs/ (or these are links) of a folder without a run, or a file called lock that is none.
   static Store CreateOrContinue(const std::filesystem::path& folder, const RunInfo& run);
-  /// @throws InvalidInput if there is no run in `folder`. Older schemas are migrated (kReadWrite) or read as they are.
+  /// @throws InvalidInput if there is no run in `folder`, or nobody can know (StatusOf). Older schemas are migrated
+  /// (kReadWrite) or read as they are.
   static Store Open(const std::filesystem::path& folder, Mode mode);
   /// For tests: nothing on disk but the videos, which go to `folder`.
   static Store InMemory(const std::filesystem::path& folder, const RunInfo& run);
@@ -172,7 +173,9 @@ class Store {
 
   /// A decision and the looks it took, both or neither. @throws InternalError if there is a decision with that key.
   void AddGateRecord(const GateRecord& record, const std::vector<SequentialLook>& looks);
-  /// In the order they were made.
+  /// The decision with that key stands again: it becomes the newest, as it is. Without one nothing changes.
+  void RepeatGateRecord(const std::string& key);
+  /// In the order they were made, or last asked for again.
   std::vector<GateRecord> GateRecords() const;
 
   /// Adds to the run's counters.

@@ -1,6 +1,7 @@
 #include "core/store_calls.h"
 
 #include "core/error.h"
+#include "core/file.h"
 #include "core/store_sqlite.h"
 
 namespace evac {
@@ -35,7 +36,7 @@ void Check(sqlite::Connection& connection, const std::filesystem::path& file) {
 
 std::vector<CallTotals> TotalsOfCalls(const std::filesystem::path& run) {
   const std::filesystem::path file = run / CallCache::kFile;
-  if (!std::filesystem::exists(file)) return {};
+  if (!std::filesystem::exists(StatusOf(file))) return {};
   sqlite::Connection connection = sqlite::Connection::OpenReadOnly(file);
   if (Pragma(connection, "SELECT count(*) FROM sqlite_schema") == 0) return {};  // a judge that was stopped as it began
   Check(connection, file);

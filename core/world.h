@@ -39,7 +39,7 @@ class World {
 
   /// Puts `scene` into the initial state. The same (task, initial, seed) gives the same bytes.
   /// @param seed  the world's own randomness (sensor noise, hidden truth), apart from the initial state's.
-  /// @throws Error if this episode cannot start here.
+  /// @throws Error if this episode cannot start here; called `diverged` if its physics did before the first frame.
   virtual WorldStep Reset(SceneId scene, const Task& task, const InitialState& initial, std::uint64_t seed) = 0;
 
   /// Executes one chunk per named scene. Each scene is named at most once and was Reset before.

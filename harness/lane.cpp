@@ -27,10 +27,9 @@ cv::Mat Enlarged(const cv::Mat& image, int scale) {
   return large;
 }
 
-/// A world that imagines reads there where the episode begins: what the disk refuses then is no failure of its.
-bool IsOfStore(const std::exception& error) {
+bool IsCalled(const char* kind, const std::exception& error) {
   const auto* ours = dynamic_cast<const Error*>(&error);
-  return ours != nullptr && std::string_view(ours->kind()) == kStoreError;
+  return ours != nullptr && std::string_view(ours->kind()) == kind;
 }
 
 }  // namespace
@@ -56,8 +55,10 @@ std::optional<WorldStep> Lane::ResetWorld(World& world) try {
   if (const auto wrong = WhatIsWrong(first.observation, *job_.task)) throw InternalError("{}", *wrong);
   return first;
 } catch (const std::exception& error) {
-  if (IsOfStore(error)) throw;
-  Fail({StopReason::kWorldError, error.what()});
+  // A world that imagines reads there where the episode begins: what the disk refuses then is no failure of its.
+  if (IsCalled(kStoreError, error)) throw;
+  const bool diverged = IsCalled(Name(StopReason::kDiverged), error);
+  Fail({diverged ? StopReason::kDiverged : StopReason::kWorldError, error.what()});
   return std::nullopt;
 }
 

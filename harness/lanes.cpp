@@ -8,6 +8,7 @@ int Lanes::Refill(JobQueue& jobs, Policy& policy, World& world) {
   int held = 0;
   for (std::size_t i = 0; i < lanes_.size(); ++i) {
     if (!lanes_[i]) {
+      if (held > 0 && options_.interrupted && options_.interrupted()) continue;  // a Reset may take seconds
       std::optional<Job> job = jobs.Next();
       if (!job) continue;
       lanes_[i] = std::make_unique<Lane>(static_cast<SceneId>(i), std::move(*job), options_.lane, store_);

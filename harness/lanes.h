@@ -13,7 +13,8 @@ class Lanes {
  public:
   Lanes(Store& store, const RolloutOptions& options) : store_(store), options_(options), lanes_(options.lanes) {}
 
-  /// Free lanes take the next jobs: Reset on both sides. @returns the number of lanes that hold an episode.
+  /// Free lanes take the next jobs: Reset on both sides, of one at least, and of no more once the user wants an end.
+  /// @returns the number of lanes that hold an episode: none where there is no job left.
   int Refill(JobQueue& jobs, Policy& policy, World& world);
 
   /// Asks the policy for all of them. What it throws is every live episode's failure.

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <map>
 #include <set>
+#include <string_view>
 #include <tuple>
 #include <utility>
 
@@ -13,6 +14,7 @@
 #include "core/file.h"
 #include "core/hash.h"
 #include "core/store.h"
+#include "core/store_calls.h"
 #include "core/store_lock.h"
 
 namespace evac {
@@ -53,6 +55,8 @@ std::string Fingerprint(const Store& store, Episode episode) {
   for (const Observation& observation : episode.observations) text += TextOf(observation.arms);
   for (const PrivilegedFrame& frame : store.LoadPrivileged(episode.key.Id())) {
     for (const PrivilegedFrame::Body& body : frame.bodies) text += body.name + TextOf(body.base_from_body);
+    for (const PrivilegedFrame::Contact& contact : frame.contacts)
+      text += fmt::format("{} {} {} ", contact.a, contact.b, contact.force_n);
   }
   return text;
 }
@@ -259,9 +263,40 @@ void Empty(const fs::path& part) {
   }
 }
 
+/// By whom the shards were begun, each version once: that of a merged run may be several already.
+std::vector<std::string> VersionsOf(const std::vector<Store>& stores) {
+  constexpr std::string_view kBetween = ", ";
+  std::vector<std::string> versions;
+  for (const Store& store : stores) {
+    for (std::string left = store.run().evac_version, next; !left.empty(); left = next) {
+      const std::size_t end = left.find(kBetween);
+      next = end == std::string::npos ? "" : left.substr(end + kBetween.size());
+      left.resize(std::min(end, left.size()));
+      if (std::ranges::find(versions, left) == versions.end()) versions.push_back(left);
+    }
+  }
+  return versions;
+}
+
+/// What whoever merges may want to know, and no reason to refuse it.
+std::vector<std::string> NotesOn(const std::vector<Store>& stores) {
+  std::vector<std::string> notes;
+  const std::vector<std::string> versions = VersionsOf(stores);
+  if (versions.size() > 1)
+    notes.push_back(fmt::format("the runs were begun by evac {}, and one version need not come to what another did",
+                                fmt::join(versions, " and ")));
+  for (const Store& store : stores) {
+    const fs::path calls = store.folder() / CallCache::kFile;
+    if (fs::exists(calls)) notes.push_back(fmt::format("{} is not merged: its answers stay there", calls.string()));
+  }
+  return notes;
+}
+
 /// What was chosen of all, in the folder where it is made.
 void Fill(const fs::path& part, const std::vector<Store>& stores, const Choice& choice) {
-  Store merged = Store::CreateOrContinue(part, stores.front().run());
+  RunInfo run = stores.front().run();
+  run.evac_version = fmt::format("{}", fmt::join(VersionsOf(stores), ", "));
+  Store merged = Store::CreateOrContinue(part, run);
   for (std::size_t s = 0; s < stores.size(); ++s) {
     CopyDeclarations(stores[s], merged);
     CopyEpisodes(choice.episodes[s], stores[s], merged);
@@ -293,7 +328,7 @@ MergeSummary MergeRuns(const std::vector<fs::path>& shards, const fs::path& want
   fs::remove(lock_file);
   std::size_t count = 0;
   for (const std::vector<Episode>& taken : choice.episodes) count += taken.size();
-  return {.episodes = static_cast<int>(count), .duplicates = choice.duplicates};
+  return {.episodes = static_cast<int>(count), .duplicates = choice.duplicates, .notes = NotesOn(stores)};
 }
 
 int TakeEpisodes(const Store& from, const std::function<bool(const EpisodeKey&)>& wanted, Store& to) {

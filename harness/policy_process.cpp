@@ -99,9 +99,10 @@ void PolicyProcess::Stop() {
   if (supervisor_.joinable()) supervisor_.join();
 }
 
-void PolicyProcess::Restart() {
+void PolicyProcess::Restart(Clock::time_point asked) {
   const std::lock_guard lock(mutex_);
-  if (alive_pipe_ >= 0) ::close(std::exchange(alive_pipe_, -1));  // the guardian ends it; Supervise sees a death
+  if (alive_pipe_ < 0 || started_ > asked) return;
+  ::close(std::exchange(alive_pipe_, -1));  // the guardian ends it; Supervise sees a death
 }
 
 std::optional<std::string> PolicyProcess::WhyGone() const {
@@ -164,6 +165,7 @@ int PolicyProcess::RunOnce() {
     throw InternalError("cannot start {}: {}", options_.command.front(), std::strerror(errno));
   }
   alive_pipe_ = alive[1];
+  started_ = Clock::now();
   lock.unlock();
 
   int status = 0;

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <chrono>
 #include <condition_variable>
 #include <cstdint>
 #include <filesystem>
@@ -46,7 +47,8 @@ class PolicyProcess {
   void Stop();
 
   /// Ends it, as Stop does, to be started again after the usual back-off: it hangs. Returns at once. Thread-safe.
-  void Restart();
+  /// @param asked  what it did not answer; one that was started since is loading, and goes on
+  void Restart(std::chrono::steady_clock::time_point asked);
 
   /// Why it is not coming back: "its process ended 6 times within 60 s, at last with exit code 3: <its last line>
   /// (policy.log)". Nothing while it runs or is about to be restarted, and after Stop. Thread-safe.
@@ -64,6 +66,7 @@ class PolicyProcess {
   std::condition_variable stopping_changed_;
   bool stopping_ = false;
   int alive_pipe_ = -1;  ///< closing it asks the guardian to end
+  std::chrono::steady_clock::time_point started_;  ///< when that process was
   int restarts_ = 0;
   std::int64_t log_before_ = 0;  ///< bytes that the log had when the process was last started
   std::optional<std::string> why_gone_;

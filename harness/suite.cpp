@@ -301,13 +301,17 @@ Suite Build(const Config& page) {
   suite.chunk_size = page.Get<int>("chunk_size", suite.chunk_size);
   suite.lanes = page.Get<int>("lanes", suite.lanes);
   suite.threads = page.Get<int>("threads", suite.threads);
-  page.Require(suite.threads >= 0 && suite.threads <= 1024, "threads", "0 (one per core) … 1024");
+  page.Require(suite.threads >= 0 && suite.threads <= 256, "threads", "0 (one per core) … 256");
   suite.error_budget = page.Get<double>("error_budget", suite.error_budget);
   suite.judges = page.Get<std::vector<std::string>>("judges", {});
   suite.video = ReadVideo(page);
   suite.transport = ReadTransport(page);
   ReadPolicySection(page, suite);
   CheckWhole(suite, page);
+  for (const Task& task : suite.tasks) suite.page_hashes[task.page_path] = PageHash(task.page_path);
+  for (const SuiteWorld& world : suite.worlds) {
+    if (!world.profile.empty()) suite.page_hashes[world.profile] = PageHash(world.profile);
+  }
   suite.hash = SuiteHash(page, suite);
   suite.reality_hash = RealityHash(page, suite);
   return suite;

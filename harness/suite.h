@@ -59,6 +59,7 @@ struct Suite {
   std::string text;  ///< the effective suite: after `--set`
   std::string hash;  ///< of everything that can change a result: the effective suite and every page and scene it names
   std::string reality_hash;  ///< the same without the worlds of type evac, the policies and the number of initial states
+  std::map<std::filesystem::path, std::string> page_hashes = {};  ///< PageHash of task pages and profiles, when read
   std::vector<SuiteWorld> worlds;
   std::vector<Task> tasks;  ///< cameras resized to `image`; those of a recording are filled in by apps/recorded_suite
   std::vector<SuitePolicy> policies;

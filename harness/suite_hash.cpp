@@ -45,30 +45,6 @@ std::string HashOfTree(const fs::path& path, const std::string& but = "") {
   return Sha256Hex(text);
 }
 
-/// The page's content and that of every file that a scalar in it names (the scene's XML), and that those name.
-std::string HashOfPage(const fs::path& path) {
-  const Config page = Config::FromFile(path);
-  std::string text = page.Canonical();
-  std::set<fs::path> scenes, known;
-  std::istringstream lines(page.Canonical());
-  for (std::string line; std::getline(lines, line);) {
-    const std::string value = line.substr(line.find('=') + 1);
-    const fs::path named = path.parent_path() / value;
-    std::error_code ignored;
-    if (value.find('.') == std::string::npos || !fs::is_regular_file(named, ignored)) continue;
-    text += value + " " + Sha256HexOfFile(named) + "\n";
-    known.insert(fs::canonical(named));
-    if (named.extension() == ".xml") scenes.insert(named);
-  }
-  for (const fs::path& scene : scenes) {
-    for (const fs::path& file : FilesOfScene(scene)) {
-      if (known.insert(fs::canonical(file)).second)
-        text += file.lexically_relative(scene.parent_path()).string() + " " + Sha256HexOfFile(file) + "\n";
-    }
-  }
-  return Sha256Hex(text);
-}
-
 /// Whether a line of the page says something of a world model: ".worlds.2.weights=…", and world 2 is of type evac.
 bool IsOfModel(const std::string& line, const Suite& suite) {
   for (std::size_t i = 0; i < suite.worlds.size(); ++i) {
@@ -117,9 +93,10 @@ std::string HashOf(const Config& page, const Suite& suite, bool whole) {
                               ".transport.repeat_after_s=", ".transport.start_s=", ".policy.start_probe="}))
       text << line << "\n";
   }
-  for (const Task& task : suite.tasks) text << "task " << task.id << " " << HashOfPage(task.page_path) << "\n";
+  for (const Task& task : suite.tasks)
+    text << "task " << task.id << " " << suite.page_hashes.at(task.page_path) << "\n";
   for (const SuiteWorld& world : suite.worlds) {
-    if (!world.profile.empty()) text << "profile " << world.name << " " << HashOfPage(world.profile) << "\n";
+    if (!world.profile.empty()) text << "profile " << world.name << " " << suite.page_hashes.at(world.profile) << "\n";
   }
   for (const SuiteWorld& world : suite.worlds) {
     if (world.evac && whole) text << "evac " << world.name << " " << world.evac->hash << "\n";
@@ -153,9 +130,46 @@ std::vector<std::string> FilesInNoHash(const Suite& suite, const SuitePolicy& po
   return found;
 }
 
+std::string PageHash(const fs::path& path) {
+  const Config page = Config::FromFile(path);
+  std::string text = page.Canonical();
+  std::set<fs::path> scenes, known;
+  std::istringstream lines(page.Canonical());
+  for (std::string line; std::getline(lines, line);) {
+    const std::string value = line.substr(line.find('=') + 1);
+    const fs::path named = path.parent_path() / value;
+    std::error_code ignored;
+    if (value.find('.') == std::string::npos || !fs::is_regular_file(named, ignored)) continue;
+    text += value + " " + Sha256HexOfFile(named) + "\n";
+    known.insert(fs::canonical(named));
+    if (named.extension() == ".xml") scenes.insert(named);
+  }
+  for (const fs::path& scene : scenes) {
+    for (const fs::path& file : FilesOfScene(scene)) {
+      if (known.insert(fs::canonical(file)).second)
+        text += file.lexically_relative(scene.parent_path()).string() + " " + Sha256HexOfFile(file) + "\n";
+    }
+  }
+  return Sha256Hex(text);
+}
+
 std::string SuiteHash(const Config& page, const Suite& suite) { return HashOf(page, suite, true); }
 
 std::string RealityHash(const Config& page, const Suite& suite) { return HashOf(page, suite, false); }
+
+void DemandUnchanged(const Suite& suite, const SuiteWorld& world) {
+  const auto demand = [&](const fs::path& page) {
+    const auto known = suite.page_hashes.find(page);
+    if (known == suite.page_hashes.end()) return;
+    const std::string found = PageHash(page);
+    if (found == known->second) return;
+    throw InvalidInput("{}: it, or a file that it names, is another than when the suite was read: found SHA-256 {}, "
+                       "wanted {}",
+                       page.string(), found, known->second);
+  };
+  if (!world.profile.empty()) demand(world.profile);
+  for (const Task& task : suite.tasks) demand(task.page_path);
+}
 
 std::string PolicyHash(const SuitePolicy& policy) {
   std::ostringstream text;

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <filesystem>
 #include <string>
 #include <vector>
 
@@ -7,6 +8,16 @@
 #include "harness/suite.h"
 
 namespace evac {
+
+/// SHA-256 of what a page says, and of every file that a scalar in it names (the scene's XML), and that those name.
+std::string PageHash(const std::filesystem::path& page);
+
+/// Between the reading of a suite and a world's turn lie hours: what the world was made of is to be what the suite's
+/// hash says. To be called after its profile and the tasks' scenes were read, so that what was written to meanwhile is
+/// noticed.
+/// @throws InvalidInput naming the page and both hashes if the profile, a task's page or a file that one of them names
+///   is another by now.
+void DemandUnchanged(const Suite& suite, const SuiteWorld& world);
 
 /// SHA-256 of everything in a suite that can change a result, wherever its files lie: fields by value, files by
 /// content, a recording also by what its task is called, from which seeds are drawn. Left out: lanes, threads,

@@ -186,9 +186,19 @@ struct RatingHttp::Impl {
     }
     Response response = ResponseOf(std::move(answer), keep_alive);
     if (parser.get().method() == http::verb::head) response.body().clear();
-    stream.expires_after(Seconds(limits.answer_s));
-    co_await http::async_write(stream, response, asio::redirect_error(asio::use_awaitable, error));
+    error = co_await Send(stream, response);
     co_return !error && keep_alive;
+  }
+
+  /// The clock begins anew with every piece that is taken: a clip over a thin line takes longer than any fixed time.
+  asio::awaitable<beast::error_code> Send(beast::tcp_stream& stream, const Response& response) {
+    beast::error_code error;
+    http::response_serializer<http::string_body> pieces(response);
+    while (!error && !pieces.is_done()) {
+      stream.expires_after(Seconds(limits.answer_s));
+      co_await http::async_write_some(stream, pieces, asio::redirect_error(asio::use_awaitable, error));
+    }
+    co_return error;
   }
 
   asio::awaitable<HttpAnswer> Ask(HttpAsked asked) {

@@ -35,14 +35,14 @@ struct HttpServerLimits {
   std::size_t header_bytes = 8192, body_bytes = 65536;
   int idle_s = 75;     ///< a connection that asks nothing
   int request_s = 10;  ///< from a request's first byte to its last
-  int answer_s = 60;   ///< until an answer is taken
+  int answer_s = 60;   ///< in which nothing of an answer is taken
   std::size_t connections = 1000;
   int threads = 2;
 };
 
 /// An HTTP/1.1 server, by Boost.Beast, which nothing else here knows. A connection costs a socket, not a thread: a
-/// thousand that do nothing hinder nobody. What is malformed, too large, too slow, chunked or has two lengths is
-/// answered 4xx and closed.
+/// thousand that do nothing hinder nobody. What is malformed, too large, chunked or has two lengths is answered 4xx and
+/// closed; what is too slow is closed without an answer, or in the middle of one.
 class RatingHttp {
  public:
   using Reply = std::function<void(HttpAnswer)>;

@@ -327,6 +327,29 @@ void RemoveWhatNoRowNames(const StudyStore& store) {
   for (const fs::path& file : left) fs::remove(file, next_time);
 }
 
+/// Bytes of the longest clip that is there.
+std::uintmax_t LongestIn(const StudyStore& store) {
+  std::uintmax_t longest = 0;
+  for (const StudyClip& clip : store.Clips()) {
+    std::error_code gone;  // it is said where somebody should see it
+    const std::uintmax_t bytes = fs::file_size(store.folder() / clip.file, gone);
+    if (!gone) longest = std::max(longest, bytes);
+  }
+  return longest;
+}
+
+/// How long all clips of a wave are made: browsers are told, so as long as those that are there if they can be.
+/// @param there  bytes of these, 0 of a new study
+std::uintmax_t LengthOf(const Encoded& encoded, std::uintmax_t there, StudyMade& made) {
+  constexpr std::uintmax_t kRound = 1 << 16;  // room for a later wave
+  const std::uintmax_t needed = (encoded.longest + 8 + kRound - 1) / kRound * kRound;
+  if (there > 0 && needed > there)
+    made.warnings.push_back(fmt::format("the clips of this wave are {} bytes long, those before {}: who looks at what "
+                                        "the browser is sent can tell them apart",
+                                        needed, there));
+  return std::max(needed, there);
+}
+
 std::vector<StudyRubric> RubricsOf(const std::vector<Candidate>& candidates) {
   std::map<std::string, StudyRubric> by_hash;
   for (const Candidate& candidate : candidates) by_hash[candidate.clip.rubric_hash] = RubricOf(candidate.task);
@@ -377,9 +400,8 @@ StudyMade MakeStudy(const fs::path& folder, const StudyOptions& options,
   const StudyInfo info = is_new ? InfoFor(candidates, options, folder) : store->info();
   LayOut(candidates, info, folder);
   Encoded encoded = EncodeAll(candidates, info, options, folder, progress);
-  constexpr std::uintmax_t kRound = 1 << 16;  // of one wave all are of one length, of several nearly
-  const std::uintmax_t bytes = (encoded.longest + 8 + kRound - 1) / kRound * kRound;
   StudyMade made;
+  const std::uintmax_t bytes = LengthOf(encoded, is_new ? 0 : LongestIn(*store), made);
   for (StudyClip& clip : encoded.clips) {
     PadClip(BareOf(folder / clip.file), bytes, folder / clip.file);
     clip.video_sha256 = Sha256HexOfFile(folder / clip.file);

@@ -37,12 +37,14 @@ struct StudyMade {
   int clips = 0, gold = 0, practice = 0, examples = 0;
   std::string list_hash;
   std::vector<std::string> left_out;  ///< why episodes are not in it, a sentence each
+  std::vector<std::string> warnings;  ///< by what raters can tell its clips from those that were there
 };
 
 /// Freezes the episodes of runs that have a video into a study: encodes every clip anew (rating_clip.h), gives it a
 /// name that says nothing, and writes the list. A study that is there gets another wave with what it does not hold yet,
-/// as high as the first; views of a task that would be wider than its clips are made smaller. A call that is broken off
-/// leaves no wave; the next one encodes what that one had not come to, and leaves in clips/ what the study names alone.
+/// as high as the first and as long in bytes as what is there, or longer with a warning; views of a task that would be
+/// wider than its clips are made smaller. A call that is broken off leaves no wave; the next one encodes what that one
+/// had not come to, and leaves in clips/ what the study names alone.
 /// @param progress  called after every clip with how many are done, of how many.
 /// @throws InvalidInput if a run is not there, no episode has a video, an option is out of range, or earlier waves were
 /// put through another codec, or through none, or are of another height than is asked for; or if a task's views do not

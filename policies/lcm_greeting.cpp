@@ -18,6 +18,8 @@ Clock::time_point In(double seconds) {
   return Clock::now() + std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(seconds));
 }
 
+std::string Before(const std::string& who) { return who.empty() ? "" : who + ": "; }
+
 }  // namespace
 
 spec_t LcmGreeting::Await(const PolicySpec& harness, double wait_s,
@@ -28,7 +30,7 @@ spec_t LcmGreeting::Await(const PolicySpec& harness, double wait_s,
     if (Clock::now() > end) ThrowNobodyAnswers(wait_s);
     if (interrupted && interrupted()) throw InternalError("interrupted while the policy was starting");
     if (const auto why = why_gone ? why_gone() : std::nullopt)
-      throw InvalidInput("the policy is gone before it declared itself: {}", *why);
+      throw InvalidInput("{}the policy is gone before it declared itself: {}", Before(who), *why);
     SayHello(harness);
     link.Handle(kBetweenHellos_s);
   }
@@ -63,10 +65,11 @@ void LcmGreeting::ThrowNobodyAnswers(double wait_s) const {
   const std::string hint =
       found == counters.end() ? ""
                               : fmt::format("; {} answers came in another version of the message types", found->second);
-  throw InvalidInput(
-      "no policy answered within {} s on {} with token {}{}. One that runs elsewhere joins with these as "
-      "EVAC_LCM_URL and EVAC_TOKEN, or as --url and --token",
-      wait_s, address.url, address.token, hint);
+  const std::string help = if_silent.empty() ? ". One that runs elsewhere joins with these as EVAC_LCM_URL and EVAC_TOKEN, "
+                                               "or as --url and --token"
+                                             : "; " + if_silent;
+  throw InvalidInput("{}no policy answered within {} s on {} with token {}{}{}", Before(who), wait_s, address.url,
+                     address.token, hint, help);
 }
 
 }  // namespace evac

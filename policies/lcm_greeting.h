@@ -19,10 +19,11 @@ struct LcmGreeting {
   std::function<std::optional<std::string>()> why_gone;  ///< asked while waiting; may be empty
   std::function<bool()> interrupted;                     ///< the same
   const Counters& counters;                              ///< undecodable_replies explains a silence
+  std::string who{}, if_silent{};                        ///< as in LcmPolicyOptions
 
   /// @param declarations  by server; filled by whoever handles the link's messages.
   /// @returns the one policy's declaration.
-  /// @throws InvalidInput if nobody answers within `wait_s`, the policy is gone, or two answer.
+  /// @throws InvalidInput, beginning with `who`, if nobody answers within `wait_s` or the policy is gone; if two answer.
   spec_t Await(const PolicySpec& harness, double wait_s, std::map<std::string, declaration_t>& declarations) const;
 
   /// Asks for declarations, once.

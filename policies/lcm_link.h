@@ -36,7 +36,8 @@ struct LcmAddress {
 };
 
 /// How fast bytes may leave, so that a receiver's socket buffer bears it: unpaced bursts of 150 kB lose most of their
-/// messages on loopback, the same at 75 MB/s none (measured). A burst below `burst_bytes` goes out at once.
+/// messages on loopback, the same at 75 MB/s none (measured). A burst below `burst_bytes` goes out at once; so does one
+/// message above it, whose fragments LCM sends without a pause.
 struct Pacing {
   double bytes_per_s = 50e6;
   double burst_bytes = 64e3;

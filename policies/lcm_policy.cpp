@@ -77,7 +77,7 @@ struct LcmPolicy::Impl {
     if (lane.sendings > 0) ++counters["repeats"];
     if (lane.has_started) {
       lane.header.attempt = lane.sendings;
-      lane.header.deadline_s = options.deadline_s - Waited_s(lane);
+      lane.header.deadline_s = Deadline_s() - Waited_s(lane);
       link.Publish(options.address.Channel("observation"), lane.header);
       for (const image_t& image : lane.images) link.Publish(options.address.Channel("image"), image);
     } else {
@@ -99,20 +99,31 @@ struct LcmPolicy::Impl {
         next = std::min(next, lane->send_at);
       }
       if (is_complete) return;
-      link.Handle(std::max(0.0, Seconds(next - Clock::now()).count()));
+      const Clock::time_point before = Clock::now();
+      const double wait_s = std::max(0.0, Seconds(next - before).count());
+      link.Handle(wait_s);
+      LeaveOutWhatWasSlept(before, wait_s);
       GiveUpWhereHopeless(asked);
     }
+  }
+
+  /// Who was stopped (SIGSTOP) has not waited for anybody meanwhile: the policy may have been stopped with it.
+  void LeaveOutWhatWasSlept(Clock::time_point before, double wait_s) {
+    constexpr double kAwake_s = 1;  // for the messages that were handled
+    const double slept_s = Seconds(Clock::now() - before).count() - wait_s;
+    if (slept_s > kAwake_s) last_answer = std::min(Clock::now(), After(last_answer, slept_s));
   }
 
   void GiveUpWhereHopeless(std::span<LcmLane* const> asked) {
     const std::optional<std::string> why_gone = WhyGone();
     const bool interrupted = options.interrupted && options.interrupted();
+    const double deadline_s = Deadline_s();
     for (LcmLane* lane : asked) {
       if (lane->answer) continue;
       if (why_gone) lane->answer = Failure{StopReason::kPolicyError, "the policy is gone: " + *why_gone};
       if (interrupted) lane->answer = Failure{StopReason::kPolicyError, "interrupted"};
       const double waited_s = Waited_s(*lane);
-      if (!lane->answer && waited_s > Deadline_s(*lane)) TimeOut(*lane, waited_s);
+      if (!lane->answer && waited_s > deadline_s) TimeOut(*lane, waited_s, deadline_s);
     }
   }
 
@@ -122,11 +133,13 @@ struct LcmPolicy::Impl {
     return Seconds(Clock::now() - std::max(lane.answerable_at, last_answer)).count();
   }
 
-  double Deadline_s(const LcmLane& lane) const {
-    return lane.has_started ? options.deadline_s : std::max(options.start_s, options.deadline_s);
+  /// Of all who wait: while one's start is not acknowledged, the policy may be busy with it, and answers nobody.
+  double Deadline_s() const {
+    const auto is_starting = [](const auto& entry) { return !entry.second.has_started && !entry.second.answer; };
+    return std::ranges::any_of(lanes, is_starting) ? std::max(options.start_s, options.deadline_s) : options.deadline_s;
   }
 
-  void TimeOut(LcmLane& lane, double waited_s) {
+  void TimeOut(LcmLane& lane, double waited_s, double deadline_s) {
     ++counters["timeouts"];
     gave_up.insert(lane.header.episode);
     lane.gave_up = true;
@@ -139,7 +152,7 @@ struct LcmPolicy::Impl {
     if (noise > 0) heard += fmt::format("; {} messages came that are none", noise);
     lane.answer = Failure{StopReason::kPolicyTimeout,
                           fmt::format("no answer to {} within {:.1f} s (sent {} times; deadline {} s){}", what,
-                                      waited_s, lane.sendings, Deadline_s(lane), heard)};
+                                      waited_s, lane.sendings, deadline_s, heard)};
     RestartIfSilentSince(lane.answerable_at);
   }
 
@@ -148,7 +161,7 @@ struct LcmPolicy::Impl {
     const auto is_later = [asked](const std::optional<Clock::time_point>& when) { return when && *when >= asked; };
     if (!options.restart || is_later(last_heard) || is_later(restarted)) return;
     restarted = Clock::now();
-    options.restart();
+    options.restart(asked);
   }
 
   std::optional<std::string> WhyGone() const { return options.why_gone ? options.why_gone() : std::nullopt; }
@@ -241,7 +254,10 @@ struct LcmPolicy::Impl {
     return {StopReason::kPolicyError, message};
   }
 
-  LcmGreeting Greeting() { return {link, options.address, client, options.why_gone, options.interrupted, counters}; }
+  LcmGreeting Greeting() {
+    return {link,     options.address, client,           options.why_gone, options.interrupted,
+            counters, options.who,     options.if_silent};
+  }
 
   LcmPolicyOptions options;
   LcmLink link;
@@ -254,7 +270,7 @@ struct LcmPolicy::Impl {
   std::set<std::int64_t> gave_up;                     ///< episodes that ended by timeout
   std::map<std::string, std::int64_t> last_sequence;  ///< by server
   std::optional<Clock::time_point> last_heard, restarted;
-  Clock::time_point last_answer;  ///< to a start or a request of this Act, or when it began
+  Clock::time_point last_answer;  ///< to a start or a request of this Act, or when it began; later by what was slept
   int noise = 0;  ///< undecodable replies since the last Act
   Counters counters;
 };

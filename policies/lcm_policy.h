@@ -1,5 +1,6 @@
 #pragma once
 
+#include <chrono>
 #include <functional>
 #include <map>
 #include <memory>
@@ -17,7 +18,8 @@ struct LcmPolicyOptions {
   LcmAddress address{};
   double deadline_s = 20;  ///< from a request's first sending, or the last answer to another of the same Act, to giving
                            ///< it up as policy_timeout: one that answers in turn is given its time for each
-  double start_s = 0;      ///< for an episode's start, if longer: a process that was restarted may have much to load
+  double start_s = 0;  ///< for an episode's start, if longer: a process that was restarted may have much to load. So
+                       ///< long waits meanwhile whoever else asks: a policy that begins one's episode answers nobody
   double repeat_after_s =
       0.5;                  ///< before the first repeat of what was not answered; doubles with each, up to eightfold
   bool raw_images = false;  ///< exact pixels instead of JPEG; for tests
@@ -25,12 +27,14 @@ struct LcmPolicyOptions {
   Pacing pacing{};
   /// Asked while waiting: why nobody will ever answer (PolicyProcess::WhyGone), so that nobody waits for the deadline.
   std::function<std::optional<std::string>()> why_gone{};
-  /// Called when the policy was silent for a whole deadline, once for all who wait: it hangs (PolicyProcess::Restart).
-  /// May be empty.
-  std::function<void()> restart{};
+  /// Called when the policy was silent for a whole deadline, once for all who wait, with the time at which it was asked:
+  /// it hangs, unless it was started since (PolicyProcess::Restart). May be empty.
+  std::function<void(std::chrono::steady_clock::time_point asked)> restart{};
   /// Asked while waiting: the user wants an end. Who waits gets a Failure at once; nobody is to keep it. May be empty.
   std::function<bool()> interrupted{};
   bool keep_longer_chunks = false;  ///< a chunk longer than the harness executes stays whole (policy latency needs it)
+  std::string who{};        ///< "policy good@v1": begins what a handshake says that nobody answers. May be empty
+  std::string if_silent{};  ///< what helps then, its end; empty: how a policy that runs elsewhere joins
 };
 
 /// A policy in another process, at the end of an LCM link (docs/formats/policy_wire.md).

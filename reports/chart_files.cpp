@@ -6,6 +6,7 @@
 #include <set>
 
 #include "reports/charts.h"
+#include "reports/counted_judges.h"
 #include "reports/wording.h"
 
 namespace evac {
@@ -54,7 +55,7 @@ std::string Key(const std::vector<std::string>& worlds) {
   return key;
 }
 
-void AddRates(const RunSummary& summary, Files& files) {
+void AddRates(const RunSummary& summary, const std::string& judge, Files& files) {
   for (const Task& task : summary.data.tasks) {
     RowChart chart;
     chart.words = fmt::format("Success rates on {}, percent.", task.id);
@@ -68,11 +69,12 @@ void AddRates(const RunSummary& summary, Files& files) {
                               cell.rate, WorldIndex(summary, cell.world), false});
       }
     }
-    if (!chart.rows.empty()) files.Add("rates-" + task.id, RowsDrawing(chart), "Success rate at " + task.id + ", %");
+    if (!chart.rows.empty())
+      files.Add("rates-" + task.id, RowsDrawing(chart), "Success rate at " + task.id + ", %\n" + judge);
   }
 }
 
-void AddTrust(const ReportData& report, Files& files) {
+void AddTrust(const ReportData& report, const std::string& judge, Files& files) {
   for (const TrustReport& trust : report.trust) {
     RowChart chart;
     chart.words = fmt::format("Success rate in {} minus the real one, in points.", trust.world);
@@ -85,19 +87,19 @@ void AddTrust(const ReportData& report, Files& files) {
                             fmt::format("{}, n = {}", PointsWithInterval(task.bias), task.pairs.n()), task.bias,
                             WorldIndex(report.summary, trust.world), false});
     }
-    files.Add("trust-" + trust.world, RowsDrawing(chart), fmt::format("Bias of {}, points", trust.world));
+    files.Add("trust-" + trust.world, RowsDrawing(chart), fmt::format("Bias of {}, points\n{}", trust.world, judge));
   }
 }
 
-void AddComparisons(const RunSummary& summary, Files& files) {
+void AddComparisons(const RunSummary& summary, const std::string& judge, Files& files) {
   for (const WorldComparison& comparison : summary.comparisons) {
     if (comparison.points.empty()) continue;
     files.Add("worlds-" + comparison.other, ScatterDrawing(comparison, StylesOf(summary, comparison)),
-              fmt::format("{} against {}", comparison.other, comparison.real));
+              fmt::format("{} against {}\n{}", comparison.other, comparison.real, judge));
   }
 }
 
-void AddStates(const RunSummary& summary, Files& files) {
+void AddStates(const RunSummary& summary, const std::string& judge, Files& files) {
   for (const WorldComparison& comparison : summary.comparisons) {
     for (const PairTable& table : comparison.tables) {
       std::vector<StateOutcomes> states;
@@ -111,25 +113,25 @@ void AddStates(const RunSummary& summary, Files& files) {
           comparison.real, table.other_only, comparison.other, table.both_fail);
       files.Add(fmt::format("states-{}-{}-{}", comparison.other, table.task, table.policy),
                 StatesDrawing(states, words),
-                fmt::format("{}, {}\nupper half {}, lower half {}; filled: success; a bar below marks a flip",
-                            table.policy, table.task, comparison.real, comparison.other));
+                fmt::format("{}, {}, {}\nupper half {}, lower half {}; filled: success; a bar below marks a flip",
+                            table.policy, table.task, judge, comparison.real, comparison.other));
     }
   }
 }
 
-void AddStages(const StageReport& stages, Files& files) {
+void AddStages(const StageReport& stages, const std::string& judge, Files& files) {
   for (const StageFunnel& funnel : stages.funnels) {
     std::vector<std::string> worlds;
     for (const StageRow& row : funnel.worlds) worlds.push_back(row.world);
     files.Add(fmt::format("stages-{}-{}", funnel.task, funnel.policy), StageDrawing(funnel),
-              fmt::format("{}, {}\nreached, %: {}", funnel.policy, funnel.task, Key(worlds)));
+              fmt::format("{}, {}\nreached, %: {}; {}", funnel.policy, funnel.task, Key(worlds), judge));
   }
 }
 
-void AddCheckpoints(const std::vector<CheckpointCurve>& curves, Files& files) {
+void AddCheckpoints(const std::vector<CheckpointCurve>& curves, const std::string& judge, Files& files) {
   for (const CheckpointCurve& curve : curves) {
     files.Add(fmt::format("checkpoints-{}-{}", curve.policy, curve.task), CheckpointDrawing(curve),
-              fmt::format("{}, {}\nsuccess, %: {}", curve.policy, curve.task, Key(curve.worlds)));
+              fmt::format("{}, {}\nsuccess, %: {}; {}", curve.policy, curve.task, Key(curve.worlds), judge));
   }
 }
 
@@ -141,14 +143,21 @@ std::vector<ChartFile> AsFiles(const std::vector<NamedDrawing>& drawings) {
   return files.Take();
 }
 
+bool IsChartFile(const std::string& name, const std::string& svg) {
+  static constexpr const char* kKinds[] = {"rates-", "trust-", "worlds-", "states-", "stages-", "checkpoints-"};
+  const auto begins = [&](const char* kind) { return name.starts_with(kind); };
+  return std::ranges::any_of(kKinds, begins) && Slug(name) == name.substr(0, 80) && IsSvgFile(svg);
+}
+
 std::vector<ChartFile> ChartFilesOf(const ReportData& report) {
   Files files;
-  AddRates(report.summary, files);
-  AddTrust(report, files);
-  AddComparisons(report.summary, files);
-  AddStates(report.summary, files);
-  AddStages(report.stages, files);
-  AddCheckpoints(report.checkpoints, files);
+  const std::string judge = "judge " + JudgeWords(report.summary.options.judge);
+  AddRates(report.summary, judge, files);
+  AddTrust(report, judge, files);
+  AddComparisons(report.summary, judge, files);
+  AddStates(report.summary, judge, files);
+  AddStages(report.stages, judge, files);
+  AddCheckpoints(report.checkpoints, judge, files);
   return files.Take();
 }
 

@@ -22,6 +22,9 @@ struct NamedDrawing {
 /// Names that would be the same get a number.
 std::vector<ChartFile> AsFiles(const std::vector<NamedDrawing>& drawings);
 
+/// Whether ChartFilesOf a run could have made it. @param name  without ending
+bool IsChartFile(const std::string& name, const std::string& svg);
+
 /// Every chart of the page: rates per task, bias per world, worlds compared, states and stages per policy and task,
 /// checkpoints. In the order of the page.
 std::vector<ChartFile> ChartFilesOf(const ReportData& report);

@@ -48,12 +48,26 @@ std::vector<double> Places(std::size_t columns, std::size_t series, std::size_t 
   return places;
 }
 
+/// Letters that fit between one named column and the next; names of neighbours stand on two lines.
+std::size_t Room(std::size_t every, std::size_t columns) { return 300 * every / (7 * columns); }
+
+/// 1, or where too little would be left of a name: 2, 3, … so that every second column, third, … has its whole name.
+std::size_t NamedEvery(const std::vector<std::string>& names) {
+  constexpr std::size_t kLegible = 5;
+  std::size_t longest = 0, every = 1;
+  for (const std::string& name : names) longest = std::max(longest, name.size());
+  if (2 * Room(1, names.size()) >= std::min(longest, kLegible)) return 1;
+  while (every < names.size() && 2 * Room(every, names.size()) < longest) ++every;
+  return every;
+}
+
 std::string ColumnNames(const std::vector<std::string>& names) {
+  if (names.empty()) return "";
   const std::vector<double> places = Places(names.size(), 0, 1);
-  const std::size_t room = names.empty() ? 0 : static_cast<std::size_t>(300 / (7 * names.size()));
+  const std::size_t every = NamedEvery(names), room = Room(every, names.size());
   std::string svg;
-  for (std::size_t i = 0; i < names.size(); ++i) {
-    const bool lower = names.size() > 1 && i % 2 == 1 && names[i].size() > room;
+  for (std::size_t i = 0; i < names.size(); i += every) {
+    const bool lower = names.size() > 1 && (i / every) % 2 == 1 && names[i].size() > room;
     svg += fmt::format("<text x=\"{:.1f}\" y=\"{:g}\" text-anchor=\"middle\">{}</text>", places[i],
                        kBottom + (lower ? 28 : 16), Escaped(Shortened(names[i], 2 * room)));
   }

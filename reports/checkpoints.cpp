@@ -77,14 +77,17 @@ void AddEnds(const RunSummary& summary, CheckpointCurve& curve) {
   }
 }
 
-int Rises(const CheckpointCurve& curve, std::size_t world) {
-  int rises = 0;
+/// "1 of 3 steps rise", of the neighbours that both have a rate.
+std::string RisesInWords(const CheckpointCurve& curve, std::size_t world) {
+  std::int64_t rises = 0, steps = 0;
   for (std::size_t i = 1; i < curve.points.size(); ++i) {
     const Number& before = curve.points[i - 1].rate[world].value;
     const Number& after = curve.points[i].rate[world].value;
-    rises += before && after && *after > *before;
+    if (!before || !after) continue;
+    ++steps;
+    rises += *after > *before;
   }
-  return rises;
+  return steps == 0 ? "no two neighbours are judged" : fmt::format("{} of {} rise", rises, Counted(steps, "step"));
 }
 
 /// Where the digits begin that end before `end`; `end` where there are none.
@@ -134,10 +137,9 @@ std::string TrendInWords(const CheckpointCurve& curve, std::size_t world) {
   const ComparisonRow& row = curve.ends[world]->all;
   if (!row.first.value || !row.second.value || !row.difference.interval || !row.p)
     return lead + ": no episodes of both count.";
-  return fmt::format("{}: {} → {}, {} ({}, {}, {}); {} of {} rise.", lead, Percent(*row.second.value),
+  return fmt::format("{}: {} → {}, {} ({}, {}, {}); {}.", lead, Percent(*row.second.value),
                      Percent(*row.first.value), PointsWithInterval(row.difference), row.test, PValue(*row.p),
-                     row.is_paired ? Counted(row.shared, "pair") : "unpaired", Rises(curve, world),
-                     Counted(static_cast<std::int64_t>(curve.points.size()) - 1, "step"));
+                     row.is_paired ? Counted(row.shared, "pair") : "unpaired", RisesInWords(curve, world));
 }
 
 }  // namespace evac

@@ -30,7 +30,7 @@ struct CheckpointCurve {
 std::vector<CheckpointCurve> CheckpointsOf(const RunSummary& summary);
 
 /// "In real, from good to bad: 90 % → 33 %, -57 points [-68, -43], p < 0.001 (exact McNemar, 20 pairs); 0 of 3 steps
-/// rise."
+/// rise." A step is from one checkpoint to the next where both have a rate.
 std::string TrendInWords(const CheckpointCurve& curve, std::size_t world);
 
 /// The number at the end of a checkpoint's name: "step_20000" → 20000, "120k" → 120000, "0.5M" → 500000, "good" → none.

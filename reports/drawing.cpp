@@ -24,6 +24,8 @@ std::map<std::string, std::string> VariablesOf(const std::string& colours) {
 }
 
 constexpr double kMargin = 14, kTitle = 26, kNote = 18;
+constexpr std::string_view kSvgHead =
+    "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n<svg xmlns=\"http://www.w3.org/2000/svg\" class=\"chart\" ";
 
 }  // namespace
 
@@ -43,13 +45,15 @@ std::string WithoutVariables(std::string css, const std::string& colours) {
   return css;
 }
 
+bool IsSvgFile(std::string_view bytes) { return bytes.starts_with(kSvgHead); }
+
 std::string AsSvgFile(const Drawing& drawing, const std::string& title) {
   const std::size_t line = title.find('\n');
   const std::string note = line == std::string::npos ? "" : title.substr(line + 1);
   const double head = kTitle + (note.empty() ? 0 : kNote);
   const double width = drawing.width + 2 * kMargin, height = drawing.height + 2 * kMargin + head;
-  std::string svg = fmt::format(
-      "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n<svg xmlns=\"http://www.w3.org/2000/svg\" class=\"chart\" "
+  std::string svg = std::string(kSvgHead);
+  svg += fmt::format(
       "width=\"{0:g}\" height=\"{1:g}\" viewBox=\"0 0 {0:g} {1:g}\">\n<title>{2}</title>\n<desc>{3}</desc>\n",
       width, height, Escaped(title), Escaped(drawing.words));
   svg += "<style>" + WithoutVariables(ChartsCss(), ColoursCss()) +

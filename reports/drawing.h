@@ -19,6 +19,9 @@ std::string InPage(const Drawing& drawing, std::string_view classes = "");
 /// written out, no variables, so that every program that reads SVG draws it alike.
 std::string AsSvgFile(const Drawing& drawing, const std::string& title);
 
+/// Whether AsSvgFile wrote it.
+bool IsSvgFile(std::string_view bytes);
+
 /// CSS with every var(--name) replaced by the value that the first block of `colours` gives it.
 std::string WithoutVariables(std::string css, const std::string& colours);
 

@@ -113,6 +113,8 @@ Fidelity FidelityOf(FidelityInput input);
 /// Whether reality is held against itself over other pairs than the model is: clips that its judge could not tell, or that
 /// failed, are in one and not in the other.
 bool HasOtherPairs(const Fidelity& fidelity);
+/// " of 40" to stand after a cell's `again` where it is over another number of pairs than the rest; else empty.
+std::string OfOtherPairs(const FidelityCell& cell);
 /// "38", or "38 of 40" where some of those asked have no outcome.
 std::string PairsText(const OutcomeMatch& match);
 

@@ -165,6 +165,10 @@ std::string DriftText(const std::vector<ChunkDrift>& chunks) {
 
 }  // namespace
 
+std::string OfOtherPairs(const FidelityCell& cell) {
+  return cell.again && cell.n_again != cell.n ? fmt::format(" of {}", cell.n_again) : "";
+}
+
 std::string FidelityJson(const Fidelity& fidelity) {
   const CorrelationGroup& correlation = fidelity.model.correlation;
   NumberWriter all;
@@ -217,7 +221,7 @@ std::string FidelityText(const Fidelity& fidelity) {
   std::vector<std::vector<std::string>> rows = {{"task", "policy", "n", "real", "again", "model", "agreement"}};
   for (const FidelityCell& cell : fidelity.cells)
     rows.push_back({cell.task, PolicyLabel(cell.policy, cell.checkpoint), std::to_string(cell.n), Words(cell.real),
-                    Words(cell.again), Words(cell.model), Words(cell.agreement)});
+                    Words(cell.again) + OfOtherPairs(cell), Words(cell.model), Words(cell.agreement)});
   std::string text = TextTable(rows) + "\n";
   std::vector<std::vector<std::string>> whole = {{"", "n", "agreement", "hallucinated", "missed"}};
   const auto add = [&](const std::string& name, const OutcomeMatch& match) {

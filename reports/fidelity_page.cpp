@@ -84,7 +84,7 @@ std::string CellTable(const Fidelity& fidelity) {
     rows += fmt::format("<tr><th scope=\"row\">{} <span class=\"quiet\">{}</span></th><td class=\"num\">{}</td><td class=\"num\">{}</td>"
                         "<td class=\"num\">{}</td><td class=\"num\">{}</td><td class=\"num\">{}</td></tr>",
                         Breakable(PolicyLabel(cell.policy, cell.checkpoint)), Breakable(cell.task), cell.n, Percent(cell.real),
-                        Percent(cell.again), Percent(cell.model), Percent(cell.agreement));
+                        Percent(cell.again) + OfOtherPairs(cell), Percent(cell.model), Percent(cell.agreement));
   return TableHead({"policy, task", "pairs", "real", "real again", "imagined", "agreement"}) + rows + "</tbody></table></div>";
 }
 

@@ -124,6 +124,7 @@ GateResult Decide(const GateRules& rules, const GateCandidate& candidate, const 
   GateResult result;
   GateDecision& decision = result.decision;
   decision.name = rules.name;
+  decision.judge = data.judge;
   decision.rules_hash = rules.hash;
   decision.baseline_hash = baseline ? baseline->sha256 : "";
   decision.data_hash = data.store_hash;

@@ -121,6 +121,7 @@ Json JsonOf(const GateDecision& decision) {
   Json json = {{"schema", 1},
                {"name", decision.name},
                {"outcome", Name(decision.outcome)},
+               {"judge", decision.judge},
                {"rules_hash", decision.rules_hash},
                {"baseline_hash", decision.baseline_hash},
                {"data_hash", decision.data_hash},
@@ -135,6 +136,7 @@ GateDecision GateDecisionFromJson(const std::string& document) {
     const Json json = Json::parse(document);
     GateDecision decision;
     decision.name = json.at("name").get<std::string>();
+    decision.judge = json.value("judge", std::string());
     decision.rules_hash = json.at("rules_hash").get<std::string>();
     decision.baseline_hash = json.at("baseline_hash").get<std::string>();
     decision.data_hash = json.at("data_hash").get<std::string>();

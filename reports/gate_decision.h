@@ -45,6 +45,7 @@ struct RuleDecision {
 
 struct GateDecision {
   std::string name;           ///< of the rules
+  std::string judge;          ///< whose verdicts were counted, in full; empty in a decision that was kept without
   std::string rules_hash;     ///< SHA-256 of the rules' meaning
   std::string baseline_hash;  ///< the pinned result's own; empty without a baseline
   std::string data_hash;      ///< SHA-256 of everything that was counted of the run

@@ -35,10 +35,11 @@ Number PairsToShow(int side, const GateRule& rule, const FlipRates& rates) {
 }
 
 /// Pairs of which the lower end of the difference would clear -margin, and those that would show it worse, both if the
-/// flips stay as seen and further pairs repeat states as these do.
+/// flips stay as seen and further pairs repeat states as these do. Without a pair nothing was seen.
 std::string MorePairs(const GateRule& rule, const PairedOutcomes& seen, std::int64_t effective) {
+  if (seen.pairs == 0) return "";
   const Repeated have{seen.pairs, effective};
-  const double each = seen.pairs > 0 ? static_cast<double>(effective) / static_cast<double>(seen.pairs) : 1;
+  const double each = static_cast<double>(effective) / static_cast<double>(seen.pairs);
   const double n = static_cast<double>(effective) + 1;
   const FlipRates rates{(static_cast<double>(seen.flips.only_first) * each + 0.5) / n,
                         (static_cast<double>(seen.flips.only_second) * each + 0.5) / n};

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 
+#include "reports/counted_judges.h"
 #include "reports/text_table.h"
 #include "reports/wording.h"
 
@@ -30,7 +31,8 @@ std::string ExamplesText(const RuleDecision& rule) {
     rows.push_back({"   ", OneLine(example.task + " " + example.initial_state), std::to_string(example.seed),
                     Clip(example.candidate_video), Clip(example.baseline_video)});
   }
-  const auto more = rule.flips_worse - static_cast<std::int64_t>(shown);
+  const std::int64_t all = std::max(rule.flips_worse, std::ssize(rule.counter_examples));  // a bet is on fewer
+  const std::int64_t more = all - static_cast<std::int64_t>(shown);
   return TextTable(rows) + (more > 0 ? fmt::format("     and {} more\n", more) : "");
 }
 
@@ -52,7 +54,8 @@ std::string GateText(const GateDecision& decision) {
     text += ExamplesText(rule);
   }
   return text +
-         fmt::format("\nGate {}: {}. Data {:.12}, rules {:.12}{}.\n", OneLine(decision.name), Name(decision.outcome),
+         fmt::format("\nGate {}: {}.{} Data {:.12}, rules {:.12}{}.\n", OneLine(decision.name), Name(decision.outcome),
+                     decision.judge.empty() ? "" : " Judge " + OneLine(JudgeWords(decision.judge)) + ".",
                      decision.data_hash, decision.rules_hash,
                      decision.baseline_hash.empty() ? "" : fmt::format(", baseline {:.12}", decision.baseline_hash));
 }

@@ -137,6 +137,35 @@ void HoldCorrelation(const GateRule& rule, const RunSummary& run, const GateSide
                                    Counted(held.value.n, "point"), Counted(decision.states, "pair"), dropped);
 }
 
+/// Of a judge that never differed from the other, whose kappa shows no spread. It may differ in a share of the states
+/// all the same: in none of G it then does with the chance tail = (1 - share)^G, as docs/decisions/0012 has it.
+struct Unerring {
+  double share_to_kappa = 0;  ///< 1 / (1 - chance): two for outcomes that are as many
+  double states = 0;
+
+  Interval At(double confidence) const {
+    const double share = 1 - std::pow((1 - confidence) / 2, 1 / states);
+    return {std::max(-1.0, 1 - share_to_kappa * share), 1};
+  }
+  /// From how many states on the low end reaches `threshold`, one-sided at alpha; 0: no number is enough.
+  double StatesFor(double threshold, double alpha) const {
+    const double share = (1 - threshold) / share_to_kappa;
+    return share > 0 && share < 1 ? std::ceil(std::log(alpha) / std::log1p(-share)) : 0;
+  }
+};
+
+void HoldUnerringKappa(const GateRule& rule, const Unerring& judge, Estimate kappa, Evidence& evidence) {
+  kappa.confidence = 1 - 2 * rule.alpha;
+  kappa.interval = judge.At(kappa.confidence);
+  kappa.method = "no state of all differs";
+  Hold(rule, {kappa, [=](double c) { return Defined<Interval>(judge.At(c)); }, *rule.at_least}, evidence);
+  const double wanted = judge.StatesFor(*rule.at_least, rule.alpha);
+  evidence.more = fmt::format("The two never differed, but in {} only: ",
+                              Counted(static_cast<std::int64_t>(judge.states), "initial state")) +
+                  (wanted > 0 ? fmt::format("{:.0f} of which none differs would show it.", wanted)
+                              : "no number of them would show it.");
+}
+
 void HoldKappa(const GateRule& rule, const RunSummary& run, const GateSides& sides, Evidence& evidence) {
   if (std::ranges::find(run.judges, rule.against) == run.judges.end())
     throw InvalidInput("gate rule '{}': against: found '{}', wanted a judge of the run: {}", rule.name, rule.against,
@@ -155,7 +184,13 @@ void HoldKappa(const GateRule& rule, const RunSummary& run, const GateSides& sid
   }
   const Confusion table = SumOf(states);
   const auto kappa = [&](double confidence) { return StatisticsByState(states, confidence).kappa; };
-  Hold(rule, {kappa(1 - 2 * rule.alpha), [=](double c) { return kappa(c).interval; }, *rule.at_least}, evidence);
+  const Estimate seen = kappa(1 - 2 * rule.alpha);
+  if (seen.value && !seen.interval && table.only_judge_success + table.only_human_success == 0) {
+    const double chance = *StatisticsOf(table).chance;
+    HoldUnerringKappa(rule, {1 / (1 - chance), static_cast<double>(states.size())}, seen, evidence);
+  } else {
+    Hold(rule, {seen, [=](double c) { return kappa(c).interval; }, *rule.at_least}, evidence);
+  }
   RuleDecision& decision = evidence.decision;
   decision.states = std::ssize(states);
   decision.statement = fmt::format(

@@ -24,7 +24,10 @@ std::string TagOf(const Estimate& difference, const Number& p) {
 std::vector<HeadlineItem> GateItems(const ReportData& report) {
   std::vector<HeadlineItem> items;
   for (const ShownGate& gate : report.gates) {
-    std::string text = fmt::format("gate {}{}", gate.decision.name, gate.is_current ? "" : " (of older data)");
+    const std::string& judge = gate.decision.judge;
+    std::string text = "gate " + gate.decision.name;
+    if (!judge.empty() && judge != report.summary.options.judge) text += fmt::format(" (judge {})", JudgeWords(judge));
+    if (!gate.is_current) text += " (of older data)";
     for (const RuleDecision& rule : gate.decision.rules) {
       if (rule.outcome != gate.decision.outcome) continue;
       text += ": " + rule.statement;
@@ -54,13 +57,20 @@ HeadlineItem CandidateItem(const Candidate& candidate) {
 /// What is worse comes first, then what is open.
 int Urgency(const HeadlineItem& item) { return item.tag == "worse" ? 0 : item.tag == "not decided" ? 1 : 2; }
 
+/// Of a report without candidates.
+std::string WhyNothingIsHeldAgainst(const ReportData& report) {
+  const std::size_t policies = report.summary.policies.size();
+  if (policies == 0) return "The run has no policy yet: nothing to compare.";
+  if (policies == 1) return "The run has one policy: nothing to compare it with. Its rates are below.";
+  return "No policy of the run is compared with another. Their rates are below.";
+}
+
 Headline Worse(const ReportData& report) {
   Headline headline;
   headline.items = GateItems(report);
   if (report.candidates.empty()) {
     headline.question = "Is the candidate worse?";
-    if (headline.items.empty())
-      headline.items = {{"", "The run has one policy: nothing to compare it with. Its rates are below.", "#rates"}};
+    if (headline.items.empty()) headline.items = {{"", WhyNothingIsHeldAgainst(report), "#rates"}};
     return headline;
   }
   headline.question = report.candidates.size() == 1
@@ -155,9 +165,12 @@ Headline Trusted(const ReportData& report) {
 
 void AddMissing(const RunSummary& summary, std::vector<HeadlineItem>& items) {
   if (const auto unjudged = summary.Count(Outcome::kUnjudged); unjudged > 0) {
+    const std::string with_small = CountedWithSmall(summary);
+    const std::string commands =
+        with_small.empty() ? fmt::format("{}", fmt::join(JudgingCommands(LastJudge(summary.options.judge)), ", then "))
+                           : "evac report RUN --judge " + with_small;
     items.push_back({"",
-                     fmt::format("{} not judged yet: {}", Counted(unjudged, "episode is", "episodes are"),
-                                 fmt::join(JudgingCommands(LastJudge(summary.options.judge)), ", then ")),
+                     fmt::format("{} not judged yet: {}", Counted(unjudged, "episode is", "episodes are"), commands),
                      "#clips"});
   }
   if (const auto errors = summary.Count(Outcome::kError); errors > 0)

@@ -33,8 +33,8 @@ std::string ExamplesOf(const RuleDecision& rule) {
                         example.candidate_video.empty() ? "without a clip" : example.candidate_video,
                         example.baseline_video.empty() ? "without a clip" : example.baseline_video);
   }
-  if (rule.flips_worse > static_cast<std::int64_t>(std::min(rule.counter_examples.size(), kMostExamples)))
-    text += fmt::format("{} initial states in all\n", rule.flips_worse);
+  const std::int64_t listed = std::ssize(rule.counter_examples), all = std::max(rule.flips_worse, listed);
+  if (all > std::min(listed, std::int64_t{kMostExamples})) text += Counted(all, "pair") + " in all\n";
   return text;
 }
 

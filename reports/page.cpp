@@ -60,6 +60,13 @@ std::string MissingVerdicts(const RunSummary& summary) {
   for (const std::string& judge : summary.judges) {
     if (!IsCounted(judge, summary.options.judge)) others += (others.empty() ? "" : ", ") + Escaped(judge);
   }
+  const std::string with_small = CountedWithSmall(summary);
+  if (!with_small.empty())
+    return fmt::format(
+        "<p class=\"notice\" role=\"note\"><strong>{} no verdict by {}.</strong> No rate counts such. Some were judged "
+        "from smaller pictures: <code>evac report RUN --judge {}</code> counts these.</p>",
+        unjudged == 1 ? "1 episode has" : fmt::format("{} episodes have", unjudged),
+        Escaped(JudgeWords(summary.options.judge)), Escaped(with_small));
   std::string commands;
   for (const std::string& command : JudgingCommands(LastJudge(summary.options.judge)))
     commands += "<code>" + Escaped(command) + "</code>, then ";

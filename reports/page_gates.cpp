@@ -4,6 +4,7 @@
 #include <string_view>
 #include <utility>
 
+#include "reports/counted_judges.h"
 #include "reports/html.h"
 #include "reports/page_parts.h"
 #include "reports/wording.h"
@@ -62,7 +63,8 @@ std::string GatesPart(const ReportData& report, const PageOptions& options) {
     html += "<dl>";
     for (const RuleDecision& rule : gate.decision.rules) html += Rule(rule, report.summary, options);
     html +=
-        fmt::format("</dl><p class=\"quiet\">Rules <code>{}</code>, data <code>{}</code></p>",
+        fmt::format("</dl><p class=\"quiet\">{}Rules <code>{}</code>, data <code>{}</code></p>",
+                    gate.decision.judge.empty() ? "" : "Judge " + Escaped(JudgeWords(gate.decision.judge)) + ". ",
                     Escaped(gate.decision.rules_hash.substr(0, 12)), Escaped(gate.decision.data_hash.substr(0, 12)));
   }
   return html + "</section>";

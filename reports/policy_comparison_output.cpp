@@ -77,6 +77,13 @@ std::string AskAnother(const ComparedWorld& compared) {
                      fmt::join(compared.other_judges, " or "));
 }
 
+/// "classifier:abc", "classifier:abc of a@1 and classifier:def of b@1".
+std::string Judges(const ComparedWorld& compared) {
+  if (compared.second_judge.empty()) return compared.judge;
+  return fmt::format("{} of {} and {} of {}", compared.judge, compared.comparison.first, compared.second_judge,
+                     compared.comparison.second);
+}
+
 const char* Name(Winner winner) {
   switch (winner) {
     case Winner::kFirst:
@@ -161,7 +168,7 @@ std::string ComparisonText(const ComparedWorld& compared) {
       {"TASK", "N", comparison.first, comparison.second, "DIFFERENCE", "FLIPS", "TEST", "P", "HOLM", ""}};
   for (const ComparisonRow& row : comparison.tasks) rows.push_back(Cells(row, comparison));
   if (comparison.tasks.size() > 1) rows.push_back(Cells(comparison.all, comparison));
-  return fmt::format("World {}, judge {}. {}\n\n{}{}{}{}{}", compared.world, compared.judge, DecisionOf(comparison),
+  return fmt::format("World {}, judge {}. {}\n\n{}{}{}{}{}", compared.world, Judges(compared), DecisionOf(comparison),
                      TextTable(rows), LeftOut(comparison), Apart(comparison), AskAnother(compared),
                      BetsText(compared));
 }
@@ -170,6 +177,7 @@ nlohmann::ordered_json ComparisonJson(const ComparedWorld& compared) {
   const PolicyComparison& comparison = compared.comparison;
   Json json = {{"world", compared.world},
                {"judge", compared.judge},
+               {"second_judge", compared.second_judge.empty() ? compared.judge : compared.second_judge},
                {"other_judges", compared.other_judges},
                {"first", comparison.first},
                {"second", comparison.second},

@@ -25,6 +25,7 @@ struct ComparedWorld {
   PolicyComparison comparison;
   std::vector<BetState> bets;
   std::vector<std::string> other_judges = {};  ///< who told an outcome where `judge` told none; else empty
+  std::string second_judge = {};               ///< who judged the second policy, if it was not `judge`; else empty
 };
 
 /// A sentence, then the table.

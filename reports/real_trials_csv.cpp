@@ -82,6 +82,9 @@ std::optional<std::int64_t> WholeNumber(std::string_view cell) {
 using Key = std::tuple<std::string, std::string, std::string, std::string>;
 Key KeyOf(const RealTrial& trial) { return {trial.task, trial.initial_state, trial.policy, trial.checkpoint}; }
 
+/// "trials.csv" of "trials.csv:12".
+std::string FileOf(const RealTrial& trial) { return trial.source.substr(0, trial.source.rfind(':')); }
+
 /// Turns rows into trials, complaining of each that is none.
 class Reader {
  public:
@@ -103,7 +106,9 @@ class Reader {
     if (!outcome) Complain(kOutcome, "success, failure, cannot_tell, invalid, 1 or 0");
     trial.outcome = outcome.value_or(Label::kInvalid);
     trial.trial = Number(trial);
-    if (is_good_) result_.trials.push_back(std::move(trial));
+    if (!is_good_) return;
+    if (Cell(kTrial).empty()) result_.counted.insert(result_.trials.size());
+    result_.trials.push_back(std::move(trial));
   }
   void ComplainOfLength(const CsvRow& row, std::size_t wanted) {
     complaints_.Add(
@@ -191,12 +196,14 @@ RealTrialsCsv ReadRealTrialsCsv(std::string_view text, const std::string& file, 
   return result;
 }
 
-std::vector<RealTrial> NewTrials(const std::vector<RealTrial>& trials, const std::vector<RealTrial>& stored) {
+std::vector<RealTrial> NewTrials(const std::vector<RealTrial>& trials, const std::vector<RealTrial>& stored,
+                                 const std::set<std::size_t>& counted) {
   std::map<std::pair<Key, std::int64_t>, const RealTrial*> known;
   for (const RealTrial& trial : stored) known[{KeyOf(trial), trial.trial}] = &trial;
   Complaints complaints("nothing was imported; repeats of one initial state are told apart by a column 'trial'");
   std::vector<RealTrial> added;
-  for (const RealTrial& trial : trials) {
+  for (std::size_t place = 0; place < trials.size(); ++place) {
+    const RealTrial& trial = trials[place];
     const auto there = known.find({KeyOf(trial), trial.trial});
     if (there == known.end()) {
       added.push_back(trial);
@@ -205,6 +212,11 @@ std::vector<RealTrial> NewTrials(const std::vector<RealTrial>& trials, const std
                                  trial.source, Name(trial.outcome), trial.trial, trial.task,
                                  trial.policy + "@" + trial.checkpoint, trial.initial_state,
                                  Name(there->second->outcome), there->second->source));
+    } else if (counted.contains(place) && FileOf(trial) != FileOf(*there->second)) {
+      complaints.Add(fmt::format("{}: found no number of the trial, wanted one: as trial {} of {} by {} in {} it was "
+                                 "imported from {}",
+                                 trial.source, trial.trial, trial.task, trial.policy + "@" + trial.checkpoint,
+                                 trial.initial_state, there->second->source));
     }
   }
   complaints.ThrowIfAny();

@@ -22,14 +22,18 @@ struct KnownNames {
 struct RealTrialsCsv {
   std::vector<RealTrial> trials;      ///< in the order of the file; `video` as written, `source` "trials.csv:12"
   std::vector<std::string> warnings;  ///< one sentence each
+  std::set<std::size_t> counted;      ///< places in `trials` of those whose number the file does not give
 };
 
 /// @param file  what messages call the text.
 /// @throws InvalidInput naming every wrong line (at most 20) and what was wanted there; nothing is read in part.
 RealTrialsCsv ReadRealTrialsCsv(std::string_view text, const std::string& file, const KnownNames& known);
 
-/// Those of `trials` that `stored` does not hold yet. @throws InvalidInput naming every one (at most 20) that is there
-/// with another outcome.
-std::vector<RealTrial> NewTrials(const std::vector<RealTrial>& trials, const std::vector<RealTrial>& stored);
+/// Those of `trials` that `stored` does not hold yet.
+/// @param counted  as in RealTrialsCsv
+/// @throws InvalidInput naming every one (at most 20) that is there with another outcome, or that is one of `counted` and
+/// there from a file of another name: it may be a repeat.
+std::vector<RealTrial> NewTrials(const std::vector<RealTrial>& trials, const std::vector<RealTrial>& stored,
+                                 const std::set<std::size_t>& counted = {});
 
 }  // namespace evac

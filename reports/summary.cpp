@@ -168,6 +168,16 @@ RunSummary Summarise(RunData data, const SummaryOptions& options) {
   return summary;
 }
 
+std::string CountedWithSmall(const RunSummary& summary) {
+  const std::string small = LastJudge(summary.options.judge) + ":small";
+  const auto is_missed = [&](const JudgedEpisode& judged) {
+    const auto verdicts = summary.data.verdicts.find(judged.episode.key.Id());
+    return judged.outcome == Outcome::kUnjudged && verdicts != summary.data.verdicts.end() &&
+           verdicts->second.contains(small);
+  };
+  return std::ranges::any_of(summary.episodes, is_missed) ? summary.options.judge + "," + small : "";
+}
+
 std::vector<JudgeRates> RatesOfOtherJudges(const RunSummary& summary) {
   std::vector<JudgeRates> others;
   for (const std::string& judge : summary.judges) {

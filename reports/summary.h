@@ -65,6 +65,10 @@ struct RunSummary {
 /// @throws InvalidInput unless 0 < confidence < 1 and bootstrap_replicates > 0.
 RunSummary Summarise(RunData data, const SummaryOptions& options);
 
+/// "vlm:x,vlm:x:small": whom to count so that clips which the last judge was shown small are judged, too; empty where none
+/// of those that are not judged was.
+std::string CountedWithSmall(const RunSummary& summary);
+
 /// The same episodes as another judge counts them: `rates` as they would be with `options.judge` = `judge`.
 struct JudgeRates {
   std::string judge;

@@ -51,6 +51,7 @@ class Bounded {
 void AddGate(const ShownGate& gate, Bounded& page) {
   const GateDecision& decision = gate.decision;
   page.Add(fmt::format("## Gate {}: {}\n\n", MarkdownText(decision.name), Name(decision.outcome)));
+  if (!decision.judge.empty()) page.Add("Judge " + MarkdownText(JudgeWords(decision.judge)) + ".\n\n");
   if (!gate.is_current) page.Add("**Of older data:** the run has changed since.\n\n");
   page.Add("| rule | outcome | what was found |\n|---|---|---|\n");
   for (const RuleDecision& rule : decision.rules) {

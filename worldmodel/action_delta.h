@@ -18,7 +18,7 @@ enum class Side { kLeft, kRight };
 struct GripperPose {
   Eigen::Vector3d xyz_m = Eigen::Vector3d::Zero();
   Eigen::Quaterniond base_from_gripper = Eigen::Quaterniond::Identity();  ///< of unit length
-  double closure = 0;  ///< 0 open … 1 closed; recordings exceed it a little
+  double closure = 0;  ///< 0 open … 1 closed; readings beyond 120 are clamped where they are read
 };
 
 /// Left and right. With one arm the other stands still where `Task` has none: its deltas are zero.

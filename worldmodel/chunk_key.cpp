@@ -5,6 +5,7 @@
 
 #include "core/hash.h"
 #include "core/version.h"
+#include "worldmodel/nn/library.h"
 
 namespace evac {
 namespace {
@@ -32,22 +33,21 @@ class Collected {
 /// One more whenever the same weights give other bits.
 constexpr int kArithmetic = 4;
 
-/// The deltas and maps say what statistics, stride and sizes of discs do, so those are not listed.
-std::string Settings(const ImaginerOptions& options) {
+}  // namespace
+
+std::string ChunkSettings(const ImaginerOptions& options) {
   const nn::ImagineOptions& sampler = options.sampler;
-  return fmt::format("evac {} arithmetic {} {} solver {} steps {} eta {} guidance {} {} memory_not_scaled {} "
+  return fmt::format("evac {} arithmetic {} {} {} solver {} steps {} eta {} guidance {} {} memory_not_scaled {} "
                      "residual_noise {}",
-                     EVAC_VERSION, kArithmetic, options.identity, static_cast<int>(sampler.solver), sampler.steps,
-                     sampler.eta, sampler.guidance, sampler.guidance_rescale, sampler.memory_not_scaled,
+                     EVAC_VERSION, kArithmetic, nn::Arithmetic(), options.identity, static_cast<int>(sampler.solver),
+                     sampler.steps, sampler.eta, sampler.guidance, sampler.guidance_rescale, sampler.memory_not_scaled,
                      sampler.residual_noise);
 }
-
-}  // namespace
 
 std::string ChunkKey(const ImaginerOptions& options, const ImaginedScene& scene,
                      const ChunkConditioning& conditioning) {
   Collected all;
-  all.Add(Settings(options));
+  all.Add(ChunkSettings(options));
   all.Add(fmt::format("seed {} frames {} count {} memory {}", scene.seed, scene.frames.size(), conditioning.count,
                       fmt::join(conditioning.memory, " ")));
   for (const std::size_t frame : conditioning.memory) all.Add(scene.frames.at(frame).latent);

@@ -17,7 +17,7 @@ struct Crop {
   int x_px = 0, y_px = 0, width_px = 0, height_px = 0;
 };
 
-/// Anywhere in the picture, at least seven eighths of either side less what lies before it: as the reference
+/// Begins within the first eighth of either side and keeps seven eighths of it or more: as the reference
 /// (docs/evac_quirks.md) crops what it trains on.
 Crop RandomCrop(const cv::Size& picture_px, SplitMix64& random);
 

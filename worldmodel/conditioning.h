@@ -37,7 +37,9 @@ using DeltaRow = std::array<float, 14>;
 
 struct ConditioningOptions {
   ActionStatistics statistics = AgiBotWorldStatistics();
-  double stride = 3;  ///< frames of 30 Hz that one step spans: the statistics are per such frame
+  /// Frames of 30 Hz that one step spans: the statistics are per such frame. Training of the published network divided
+  /// by 3 whatever lay between two frames (max_sep): that is what weights mean that do not say their period.
+  double stride = 3;
   PoseMapOptions pose_map;
 };
 

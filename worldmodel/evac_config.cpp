@@ -108,6 +108,9 @@ void ReadPublishedVae(const Config& page, nn::VaeConfig& vae) {
 }
 
 void ReadPublishedScalars(const Config& params, nn::ModelConfig& config) {
+  if (params.Has("parameterization"))
+    params.Require(params.Get<std::string>("parameterization") == "v", "parameterization",
+                   "v: the network predicts velocities");
   Read(params, "linear_start", config.schedule.linear_start);
   Read(params, "linear_end", config.schedule.linear_end);
   Read(params, "timesteps", config.schedule.steps);

@@ -71,10 +71,9 @@ EvacWorld::EvacWorld(Imaginer imaginer, FirstScene first_scene, EvacWorldOptions
 }
 
 WorldStep EvacWorld::Reset(SceneId scene, const Task& task, const InitialState& initial, std::uint64_t seed) {
-  const double period_s = imaginer_.options().conditioning.stride / kStatisticsFrames_hz;
-  if (std::abs(task.period_s - period_s) > 1e-6)
-    throw InvalidInput("world {}: its frames are {:.4g} s apart, those of task {} {:.4g} s", options_.name, period_s,
-                       task.id, task.period_s);
+  if (std::abs(task.period_s - options_.period_s) > 1e-6)
+    throw InvalidInput("world {}: its frames are {:.4g} s apart, those of task {} {:.4g} s", options_.name,
+                       options_.period_s, task.id, task.period_s);
   CheckViews(task, imaginer_.config().views, "world " + options_.name);
   const InitialScene start = first_scene_(task, initial);
   CheckFits(task, start, options_.name);

@@ -19,7 +19,8 @@ void CheckViews(const Task& task, int views, const std::string& who);
 
 struct EvacWorldOptions {
   std::string name = "evac";
-  int threads = 2;  ///< in all
+  double period_s = 0.1;  ///< between two of its frames, and of every task
+  int threads = 2;        ///< in all
   /// false: one thread per scene, as many scenes at once as there are threads. What a scene answers has the same bits
   /// whatever their number, and small networks gain nothing from a second thread. true: all threads work on one scene,
   /// one after the other; the same bits for one number of threads, ±1 grey level across numbers.
@@ -40,7 +41,7 @@ class EvacWorld : public World {
   EvacWorld(Imaginer imaginer, FirstScene first_scene, EvacWorldOptions options);
 
   std::string Name() const override { return options_.name; }
-  /// @throws InvalidInput if there is no first scene, it is not the task's, or the task's period is not the network's.
+  /// @throws InvalidInput if there is no first scene, it is not the task's, or the task's period is not the world's.
   WorldStep Reset(SceneId scene, const Task& task, const InitialState& initial, std::uint64_t seed) override;
   std::vector<Advanced> Advance(std::span<const SceneChunk> batch) override;
 

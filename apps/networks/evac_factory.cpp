@@ -34,8 +34,10 @@ ImaginerOptions OptionsOf(const SuiteEvac& evac, const nn::ModelConfig& config, 
   options.sampler.guidance_rescale = evac.cfg_rescale;
   options.sampler.memory_not_scaled = has("memory_not_scaled");
   options.sampler.residual_noise = has("residual_noise");
-  options.conditioning.statistics = TrainedFor::Read(evac.weights).StatisticsOr(evac.statistics);
-  options.conditioning.stride = evac.period_s * kStatisticsFrames_hz;
+  const TrainedFor trained = TrainedFor::Read(evac.weights);
+  options.conditioning.statistics = trained.StatisticsOr(evac.statistics);
+  // Others' weights were trained with the reference's 3 whatever lay between two frames, as `evac imagine` takes it.
+  if (trained.period_s) options.conditioning.stride = evac.period_s * kStatisticsFrames_hz;
   options.conditioning.pose_map = PoseMapsOf(evac, config);
   options.conditioning.pose_map.draw_behind_camera = has("draw_behind_camera");
   options.decoded_start = has("decoded_start");
@@ -161,7 +163,10 @@ std::unique_ptr<World> MakeEvacWorld(const SuiteWorld& world, const Suite& suite
   auto model = Load(evac, config);
   DemandUnchanged(evac);  // what is stored and cached bears the suite's hash
   return std::make_unique<EvacWorld>(Imaginer(std::move(model), options), FirstSceneOf(suite, store, world.name),
-                                     EvacWorldOptions{world.name, threads, evac.all_threads_per_scene});
+                                     EvacWorldOptions{.name = world.name,
+                                                      .period_s = evac.period_s,
+                                                      .threads = threads,
+                                                      .all_threads_per_scene = evac.all_threads_per_scene});
 }
 
 }  // namespace evac

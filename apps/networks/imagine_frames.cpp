@@ -184,6 +184,9 @@ ExitCode ImagineFrames(ImagineArguments arguments) {
   MakeFolders(arguments.out);
   const RunLock lock(arguments.out / "lock");
   const Sidecar sidecar(arguments, start, std::move(job));
+  if (!trained.statistics && arguments.statistics.empty())
+    fmt::print(stderr, "evac: warning: neither --statistics nor {} says the statistics of the arms' motion: taken are "
+               "AgiBot World's\n", arguments.weights);
   sidecar.WriteBegun();
   const ChunkFolder chunks(arguments.out / "chunks", sidecar.hash(), config);
   const MapPainter painter(start, config, imaginer.options().conditioning.pose_map);

@@ -9,6 +9,7 @@
 #include "core/error.h"
 #include "core/geometry.h"
 #include "core/names.h"
+#include "core/recording.h"
 #include "policies/learned_input.h"
 #include "worldmodel/train/option_limits.h"
 
@@ -35,12 +36,6 @@ Eigen::Isometry3d PoseFrom(const at::Tensor& c2w) {
     for (int column = 0; column < 4; ++column) pose(row, column) = numbers[4 * row + column];
   }
   return pose;
-}
-
-/// A robot that has no left arm may call a fixed camera so (docs/formats/recording.md).
-Mount MountOf(const std::string& camera, std::size_t arms) {
-  if (camera == "hand_left") return arms == 2 ? Mount::kLeftGripper : Mount::kBase;
-  return camera == "hand_right" ? Mount::kRightGripper : Mount::kBase;
 }
 
 /// One row of `actions`: the arm that carries a camera. @param mount  not kBase

@@ -56,8 +56,17 @@ const acts = {
   S: () => word('success'), F: () => word('failure'), U: () => word('cannot_tell'),
 };
 
+/** Many keyboards have [ and ] with AltGr (for Windows that is Ctrl and Alt) or Option alone, often on a digit. */
+const isBracketByAlt = event => (event.key === '[' || event.key === ']') && !event.metaKey && (event.altKey || event.getModifierState('AltGraph'));
+
+/** A button that was clicked lets go of the keys: Space plays, and Enter does not press it again. Who came by Tab (no detail) stays on it. */
+document.addEventListener('click', event => {
+  if (event.detail > 0) event.target.closest('.rate button, .rate summary')?.blur();
+}, true);
+
 document.addEventListener('keydown', event => {
-  if (event.ctrlKey || event.metaKey || event.altKey || event.isComposing || $('#dialog').open) return;
+  const isPlain = !event.ctrlKey && !event.metaKey && !event.altKey;
+  if (!(isPlain || isBracketByAlt(event)) || event.isComposing || $('#dialog').open) return;
   const target = event.target;
   if (target.matches('textarea, input[type=text]')) {
     if (event.key === 'Escape') { target.blur(); event.preventDefault(); }
@@ -74,7 +83,8 @@ function onRateScreen(event) {
   if (!player) return false;
   const isButton = event.target.matches('button, summary') && (event.key === ' ' || event.key === 'Enter');
   if (isButton) return false;
-  const digit = /^(?:Digit|Numpad)([1-9])$/.exec(event.code), right = isRightHanded() ? rightDigits.indexOf(event.code) : -1;
+  const code = isBracketByAlt(event) ? '' : event.code;
+  const digit = /^(?:Digit|Numpad)([1-9])$/.exec(code), right = isRightHanded() ? rightDigits.indexOf(code) : -1;
   if (right >= 0) return onDigit(right, event.shiftKey, player), true;
   if (digit) return onDigit(Number(digit[1]) - 1, event.shiftKey, player), true;
   if (event.key === '?') return openHelp(), true;

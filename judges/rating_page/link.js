@@ -11,6 +11,9 @@ class Refusal extends Error {
 }
 class Offline extends Error {}
 
+/** No word on what was asked: of a server that is in trouble, or of a proxy before it (520 is one's own). The same may be asked again. */
+const isAway = status => status >= 500 || status === 408;
+
 /** This browser is somebody else's by now, or the address another study's: loading the page again says whose. */
 const isNotOurs = refusal => refusal instanceof Refusal && (refusal.status === 401 || refusal.error === 'csrf');
 
@@ -26,7 +29,7 @@ async function request(path, body) {
   } catch (error) {
     throw new Offline('no connection');
   }
-  if (answer.status === 503 || answer.status === 502 || answer.status === 504) throw new Offline('the server is away');
+  if (isAway(answer.status)) throw new Offline('the server is away');
   let json = {};
   try { json = await answer.json(); } catch (error) { if (answer.ok) throw new Offline('half an answer'); }
   if (answer.status === 429) { await sleep(1500); return request(path, body); }

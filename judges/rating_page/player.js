@@ -6,7 +6,7 @@ if (!speeds.includes(sticky.speed)) sticky.speed = 1;
 /** The clip's bytes, kept as a whole: it plays, scrubs and steps without the network. */
 async function fetchClip(presentation) {
   const answer = await fetch('/clip/' + presentation, {credentials: 'same-origin', cache: 'no-store'}).catch(() => { throw new Offline('no connection'); });
-  if (answer.status >= 500) throw new Offline('the server is away');
+  if (isAway(answer.status) || answer.status === 429) throw new Offline('the server is away');
   if (!answer.ok) throw new Refusal(answer.status, {error: 'clip', message: 'the clip cannot be loaded'});
   return URL.createObjectURL(await answer.blob().catch(() => { throw new Offline('half a clip'); }));
 }

@@ -70,7 +70,7 @@ function goOn() {
   rating.player.back();
   keepPlace();
   refresh();
-  $('.feedback .primary, .feedback .kept')?.focus();
+  $('.feedback .primary, .others')?.focus();
   if (!rating.isBusy && !rating.player.isCovered(session.me.cover)) rating.player.play();
 }
 

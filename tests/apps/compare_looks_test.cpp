@@ -116,5 +116,22 @@ TEST_F(CompareLooks, TheJudgeIsNamedInFull) {
               HasSubstr("judge classifier:abc and classifier:def"));
 }
 
+TEST_F(CompareLooks, TwoJudgesOfOneShortNameAreBothNamedAndWarnedOf) {
+  const std::string a = Write("a", {"good", "aaa", Label::kSuccess, "classifier:abc"});
+  const std::string b = Write("b", {"poor", "bbb", Label::kFailure, "classifier:def"});
+  const std::string c = Write("c", {"poor", "ccc", Label::kFailure, "classifier:abc"});
+  testing::internal::CaptureStderr();
+  EXPECT_THAT(Printed(AddCompare, {"compare", a, b, "--judge", "classifier"}),
+              HasSubstr("World sim, judge classifier:abc of visual_pick@good and classifier:def of visual_pick@poor."));
+  EXPECT_THAT(testing::internal::GetCapturedStderr(),
+              HasSubstr("warning: " + a + " is judged by classifier:abc and " + b + " by classifier:def: "));
+  testing::internal::CaptureStderr();
+  EXPECT_THAT(Printed(AddCompare, {"compare", a, c, "--judge", "classifier"}),
+              HasSubstr("World sim, judge classifier:abc. "));
+  const auto json = nlohmann::json::parse(Printed(AddCompare, {"compare", a, c, "--judge", "classifier", "--json"}));
+  EXPECT_EQ(json.at("worlds").at(0).at("second_judge"), "classifier:abc");
+  EXPECT_EQ(testing::internal::GetCapturedStderr(), "");
+}
+
 }  // namespace
 }  // namespace evac

@@ -5,6 +5,7 @@
 #include <nlohmann/json.hpp>
 
 #include "apps/commands.h"
+#include "core/file.h"
 #include "core/store.h"
 #include "tests/core/store_samples.h"
 #include "tests/apps/printed.h"
@@ -183,6 +184,24 @@ TEST_F(Deciding, APlanNeedsNoRun) {
   EXPECT_THAT(Printed(AddPlan, {"plan", "--rate", "0.28", "--difference", "0.08"}), HasSubstr("533 episodes of each"));
   EXPECT_EQ(nlohmann::json::parse(Printed(AddPlan, {"plan", "--json"})).at("options").at("trials"), 40);
   EXPECT_THROW(Printed(AddPlan, {"plan", "--rate", "2"}), Error);
+}
+
+TEST_F(Deciding, AReportLeavesNoChartOfAnEarlierOneAndEveryFileOfOthers) {
+  Printed(AddReport, {"report", Run()});
+  const std::filesystem::path charts = folder_ / "run/report/charts";
+  const std::string chart = ReadFile(charts / "rates-take_bottle.svg");
+  EXPECT_THAT(chart, HasSubstr(">judge oracle</text>"));
+  WriteFileAtomically(charts / "stages-take_bottle-gone.svg", chart);
+  WriteFileAtomically(charts / "stages-take_bottle-gone.png", "png");
+  WriteFileAtomically(charts / "rates-mine.svg", "<svg xmlns=\"http://www.w3.org/2000/svg\"/>");
+  WriteFileAtomically(charts / "rates-mine.png", "png");
+  WriteFileAtomically(charts / "for the paper.svg", chart);
+  Printed(AddReport, {"report", Run()});
+  for (const char* gone : {"stages-take_bottle-gone.svg", "stages-take_bottle-gone.png"})
+    EXPECT_FALSE(std::filesystem::exists(charts / gone)) << gone;
+  for (const char* there : {"rates-mine.svg", "rates-mine.png", "for the paper.svg", "rates-take_bottle.svg",
+                            "rates-take_bottle.png"})
+    EXPECT_TRUE(std::filesystem::exists(charts / there)) << there;
 }
 
 }  // namespace

@@ -257,6 +257,18 @@ TEST_F(Resolving, TheStatusSaysHowManyReplicatesAlphasIntervalIsNotFrom) {
                                                "dropped\\), Fleiss"));
 }
 
+/// It was "0 %", as of somebody who has seen nothing but failures.
+TEST_F(Resolving, TheStatusGivesWhoHasSaidNothingNoShareOfSuccesses) {
+  AtTheDesk ann(store, desk), bob(store, desk);
+  RateAll(ann, "failure");
+  testing::internal::CaptureStdout();
+  PrintRatingStatus(store, 1, false);
+  const std::string status = testing::internal::GetCapturedStdout();
+  const std::string person = " +Ann +rater +active +";
+  EXPECT_THAT(status, testing::ContainsRegex(fmt::format("r{}{}[1-9][0-9]* +0 % ", ann.id, person)));
+  EXPECT_THAT(status, testing::ContainsRegex(fmt::format("r{}{}0 +- ", bob.id, person)));
+}
+
 TEST_F(Resolving, UnderTheNameOfAnotherJudgeOrOfNoneNothingIsWritten) {
   Import("ann", "failure");
   Import("bob", "failure");

@@ -61,6 +61,29 @@ TEST(Variation, ErrsAboutWhereAndWhenAHandClosesAndGoesThereSmoothly) {
   EXPECT_GT(later, 20);
 }
 
+/// Three draws were arguments of one call, and which came first was the compiler's choice: with another one, other
+/// shards.
+TEST(Variation, GoesWhereTheOrderOfItsDrawsSays) {
+  const std::vector<Arms> told = Told();
+  int elsewhere = 0;
+  for (std::uint64_t seed = 0; seed < 50; ++seed) {
+    SplitMix64 random(seed), again(seed);
+    const std::vector<Arms> varied = Varied(told, random);
+    if (again.Uniform() < 0.1) continue;
+    again.Below(1);  // of one closing
+    const bool wide = again.Uniform() < 0.5;
+    const double z_m = (wide ? 0.006 : 0.003) * again.Normal();
+    const double y_m = (wide ? 0.012 : 0.004) * again.Normal();
+    const double x_m = (wide ? 0.012 : 0.004) * again.Normal();
+    const Eigen::Vector3d away_m = again.Uniform() < 0.7 ? Eigen::Vector3d(x_m, y_m, z_m) : Eigen::Vector3d::Zero();
+    const Eigen::Vector3d went_m =
+        varied[20][0].base_from_gripper.translation() - told[20][0].base_from_gripper.translation();
+    EXPECT_LT((went_m - away_m).norm(), 1e-12) << seed;
+    elsewhere += away_m.norm() > 0;
+  }
+  EXPECT_GT(elsewhere, 20);
+}
+
 TEST(Variation, IsDecidedByItsSeed) {
   SplitMix64 a(5), b(5), c(6);
   const std::vector<Arms> told = Told(), varied = Varied(told, a);

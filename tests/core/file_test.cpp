@@ -145,5 +145,27 @@ TEST(File, WhatIsNoFolderWhereOneIsWantedIsTheUsersToMove) {
   }
 }
 
+/// Commands ended with 4 and "internal error: filesystem error".
+TEST(File, APathThatNobodyCanLookAtIsTheUsersToMend) {
+  const TempFolder folder;
+  fs::create_symlink("loop", folder / "loop");
+  const std::pair<fs::path, const char*> paths[] = {{folder / "loop/below", "Too many levels of symbolic links"},
+                                                    {folder / "loop", "Too many levels of symbolic links"},
+                                                    {folder / std::string(300, 'n'), "File name too long"}};
+  for (const auto& [path, reason] : paths) {
+    for (const bool makes : {false, true}) {
+      try {
+        makes ? MakeFolders(path) : static_cast<void>(StatusOf(path));
+        ADD_FAILURE() << path;
+      } catch (const Error& error) {
+        EXPECT_EQ(error.exit_code(), ExitCode::kInvalidInput);
+        EXPECT_THAT(error.what(), AllOf(HasSubstr(path.string() + ": cannot be looked at: "), HasSubstr(reason)));
+      }
+    }
+  }
+  EXPECT_EQ(StatusOf(folder / "missing/f").type(), fs::file_type::not_found);
+  EXPECT_TRUE(fs::is_directory(StatusOf(folder.path())));
+}
+
 }  // namespace
 }  // namespace evac

@@ -98,6 +98,13 @@ TEST(Recording, ABrokenExampleIsRefusedWithTheFileAndTheRow) {
   WriteExample(bad, Actions(3));
   WriteNpy(bad / "intrinsics.npy", {"<f8", {3, 3}, {400, 0, 320, 0, 400, 240, 0, 0, 1}});
   EXPECT_THAT(ErrorOf(bad), AllOf(HasSubstr("intrinsics.npy"), HasSubstr("48x32")));
+  // Of the picture before it was made smaller: of a lens that was a little off its middle lay inside the small one too.
+  for (const double cx : {47.0, 41.0, 7.0}) {
+    WriteNpy(bad / "intrinsics.npy", {"<f8", {3, 3}, {40, 0, cx, 0, 40, 16, 0, 0, 1}});
+    EXPECT_THAT(ErrorOf(bad), AllOf(HasSubstr("wanted one within 0.15 … 0.85"), HasSubstr("intrinsics of another size?")));
+  }
+  WriteNpy(bad / "intrinsics.npy", {"<f8", {3, 3}, {40, 0, 40.5, 0, 40, 5, 0, 0, 1}});
+  EXPECT_EQ(ErrorOf(bad), "it was read") << "a lens may be off by a third of the picture";
   WriteExample(bad, Actions(3));
   WriteNpy(bad / "extrinsics.npy", {"<f8", {4, 4}, {2, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1}});
   EXPECT_THAT(ErrorOf(bad), AllOf(HasSubstr("extrinsics.npy"), HasSubstr("no rotation")));

@@ -136,5 +136,40 @@ TEST(RecordingWriter, TracksOfDifferentLengthsAreRefused) {
   EXPECT_THROW(WriteRecording({folder.path(), "task", "1"}, episode, {}), Error);
 }
 
+/// A mount is no field of the files: a camera on the gripper that was called `wrist` was taken to stand on the base,
+/// and its recording refused as of a camera that moves. `evac collect` had written a thousand of them.
+TEST(RecordingWriter, ACameraThatReadersWouldTakeToBeElsewhereIsRefused) {
+  const TempFolder folder;
+  const auto error_of = [&](const std::vector<Camera>& cameras) -> std::string {
+    RecordedEpisode episode = OneArmEpisode();
+    episode.cameras = cameras;
+    try {
+      WriteRecording({folder.path(), "task", "1"}, episode, {});
+    } catch (const Error& error) {
+      EXPECT_EQ(error.exit_code(), ExitCode::kInvalidInput);
+      return error.what();
+    }
+    return "it was written";
+  };
+  const Camera head = MakeCamera("head", Mount::kBase);
+  EXPECT_THAT(error_of({head, MakeCamera("wrist", Mount::kRightGripper)}),
+              testing::AllOf(testing::HasSubstr("camera 'wrist' is mounted on right_gripper"),
+                             testing::HasSubstr("is read as on base")));
+  EXPECT_THAT(error_of({head, MakeCamera("hand_right", Mount::kBase)}),
+              testing::HasSubstr("'hand_right' is mounted on base"));
+  EXPECT_THAT(error_of({head, MakeCamera("hand_left", Mount::kLeftGripper)}),
+              testing::HasSubstr("'hand_left' is mounted on left_gripper"));
+  EXPECT_THAT(error_of({MakeCamera("side", Mount::kBase), MakeCamera("hand_right", Mount::kRightGripper)}),
+              testing::HasSubstr("found no camera 'head'"));
+  EXPECT_FALSE(std::filesystem::exists(folder / "observations")) << "nothing was begun";
+
+  RecordedEpisode fixed = OneArmEpisode();
+  fixed.cameras[1] = MakeCamera("hand_left", Mount::kBase);
+  EXPECT_NO_THROW(WriteRecording({folder.path(), "task", "1"}, fixed, {}));
+  const Recording read = ReadRecording(folder.path() / "observations/task/1");
+  ASSERT_EQ(read.cameras.size(), 2u);
+  EXPECT_EQ(read.cameras[1].mount, Mount::kBase) << "of a robot without a left arm";
+}
+
 }  // namespace
 }  // namespace evac

@@ -3,6 +3,7 @@
 
 #include "core/error.h"
 #include "core/file.h"
+#include "core/store_calls.h"
 #include "core/store_lock.h"
 #include "tests/core/store_samples.h"
 #include "tests/support/temp_folder.h"
@@ -40,6 +41,18 @@ class OthersFiles : public testing::Test {
 
   const TempFolder folder_;
 };
+
+/// They ended with 4, "internal error: filesystem error", as if the machine had refused.
+TEST_F(OthersFiles, APathThatNobodyCanLookAtIsRefusedByNameWhateverIsAskedOfIt) {
+  fs::create_symlink("loop", folder_ / "loop");
+  const fs::path long_name = folder_ / std::string(300, 'n'), below = folder_ / "loop/run";
+  for (const fs::path& path : {below, long_name}) {
+    ExpectRefused([&] { Store::CreateOrContinue(path, SomeRun()); }, path);
+    ExpectRefused([&] { Store::Open(path, Store::Mode::kReadOnly); }, path / "evac.sqlite");
+    ExpectRefused([&] { Store::Open(path, Store::Mode::kReadWrite); }, path / "evac.sqlite");
+    ExpectRefused([&] { TotalsOfCalls(path); }, path / CallCache::kFile);
+  }
+}
 
 /// All that was below them went without a word.
 TEST_F(OthersFiles, InVideosOrThumbsRefuseANewRunAndStay) {

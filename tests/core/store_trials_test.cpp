@@ -78,5 +78,18 @@ TEST(StoreTrials, LooksAreKeptOldestFirst) {
   EXPECT_THAT(store.Looks(), ElementsAre(one, two, one));
 }
 
+TEST(StoreTrials, AGateDecisionThatIsAskedForAgainIsTheLastAndTheSame) {
+  const TempFolder folder;
+  Store store = Store::InMemory(folder.path(), SomeRun());
+  const GateRecord fail{"k1", "nightly", "fail", "{\"a\": 1}"}, pass{"k2", "nightly", "pass", "{}"};
+  store.AddGateRecord(fail, {});
+  store.AddGateRecord(pass, {});
+  store.RepeatGateRecord("k1");
+  EXPECT_THAT(store.GateRecords(), ElementsAre(pass, fail));
+  store.RepeatGateRecord("k3");
+  EXPECT_THAT(store.GateRecords(), ElementsAre(pass, fail)) << "nobody decided that";
+  EXPECT_THROW(store.AddGateRecord(fail, {}), Error) << "it is still there once";
+}
+
 }  // namespace
 }  // namespace evac

@@ -3,8 +3,11 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <functional>
+
 #include "core/error.h"
 #include "core/file.h"
+#include "core/store_calls.h"
 #include "tests/core/store_samples.h"
 #include "tests/support/temp_folder.h"
 
@@ -117,6 +120,64 @@ TEST_F(MergedRuns, GoOnWithTheLongerOfTwoListsOfOneJudge) {
   b_.AddVerdict(Says("oracle", "it stands"));
   Merge();
   EXPECT_EQ(Said(), (std::vector<std::string>{"oracle: it stands", "oracle: it fell", "oracle: it stands"}));
+}
+
+/// Contacts were not compared, and of what was, no test would have missed any.
+TEST_F(MergedRuns, RefuseTwoUnfilmedEpisodesThatDifferInOneThingAlone) {
+  const std::vector<std::pair<std::string, std::function<void(EpisodeRecord&)>>> changes = {
+      {"nothing", [](EpisodeRecord&) {}},
+      {"command", [](EpisodeRecord& r) { r.episode.commands[1][0].base_from_gripper.translation().x() += .001; }},
+      {"observed arm", [](EpisodeRecord& r) { r.episode.observations[2].arms[0].base_from_gripper.translation().y() += .001; }},
+      {"closure", [](EpisodeRecord& r) { r.episode.observations[2].arms[0].closure /= 2; }},
+      {"body's pose", [](EpisodeRecord& r) { r.privileged[1].bodies[0].base_from_body.translation().z() += .001; }},
+      {"contact's force", [](EpisodeRecord& r) { r.privileged[1].contacts[0].force_n += 1; }},
+      {"contact's body", [](EpisodeRecord& r) { r.privileged[1].contacts[0].b = "table"; }}};
+  for (const auto& entry : changes) {
+    const std::string& what = entry.first;
+    const std::filesystem::path shards[] = {folder_ / what / "a", folder_ / what / "b"};
+    for (const std::filesystem::path& shard : shards) {
+      Store store = Store::CreateOrContinue(shard, samples::SomeRun());
+      samples::Declare(store);
+      EpisodeRecord record = samples::SomeEpisode(store, key_);
+      record.video.reset();
+      if (shard == shards[1]) entry.second(record);
+      store.Add(record);
+    }
+    const auto merge = [&] { return MergeRuns({shards[0], shards[1]}, folder_ / what / "merged").duplicates; };
+    if (what == "nothing") {
+      EXPECT_EQ(merge(), 1);
+    } else {
+      EXPECT_THAT(merge, testing::ThrowsMessage<Error>(testing::HasSubstr(key_.Id()))) << what;
+    }
+  }
+}
+
+/// The first shard's version was said for all: whoever takes episodes over from its own version alone took another's.
+TEST_F(MergedRuns, SayEveryVersionThatBeganAShardOnce) {
+  RunInfo run = samples::SomeRun();
+  const std::string ours = run.evac_version;
+  run.evac_version = "0.0.9";
+  Store older = Store::CreateOrContinue(folder_ / "older", run);
+  samples::Declare(older);
+  const auto version = [&](const std::string& out) {
+    return Store::Open(folder_ / out, Store::Mode::kReadOnly).run().evac_version;
+  };
+  EXPECT_TRUE(Merge("alike").notes.empty());
+  EXPECT_EQ(version("alike"), ours);
+  const MergeSummary mixed = MergeRuns({a_.folder(), older.folder(), b_.folder()}, folder_ / "mixed");
+  EXPECT_EQ(version("mixed"), ours + ", 0.0.9");
+  ASSERT_EQ(mixed.notes.size(), 1u);
+  EXPECT_THAT(mixed.notes[0], testing::HasSubstr(ours + " and 0.0.9"));
+  MergeRuns({older.folder(), folder_ / "mixed"}, folder_ / "again");
+  EXPECT_EQ(version("again"), "0.0.9, " + ours);
+}
+
+/// What was asked of a model server, and paid for, was left behind without a word.
+TEST_F(MergedRuns, SayWhichShardsCallsOfModelServersStayBehind) {
+  CallCache(b_.folder() / CallCache::kFile).Add({.key = "k", .judge = "vlm:x", .response = "yes", .status = "ok"});
+  const MergeSummary summary = Merge();
+  ASSERT_EQ(summary.notes.size(), 1u);
+  EXPECT_THAT(summary.notes[0], testing::HasSubstr((b_.folder() / CallCache::kFile).string()));
 }
 
 /// Two labs' lists that both count from one: the second's were dropped without a word.

@@ -95,12 +95,23 @@ TEST_F(PolicyProcessTest, OneThatHangsIsRestartedOnDemand) {
   PolicyProcess process(Shell("trap '' TERM; echo $$ > $FOLDER/self; while :; do sleep 1000; done"));
   const pid_t first = PidIn("self");
   fs::remove(folder_ / "self");
-  process.Restart();
+  process.Restart(std::chrono::steady_clock::now());
   const pid_t second = PidIn("self");
   EXPECT_NE(second, first);
   EXPECT_FALSE(IsAlive(first));
   EXPECT_EQ(process.restarts(), 1);
   EXPECT_FALSE(process.WhyGone());
+}
+
+/// One that had died, and was loading again, was ended for what its predecessor did not answer.
+TEST_F(PolicyProcessTest, OneThatWasStartedSinceItWasAskedIsNotTakenToHang) {
+  const auto asked = std::chrono::steady_clock::now();
+  PolicyProcess process(Shell("echo $$ > $FOLDER/self; exec sleep 1000"));
+  const pid_t self = PidIn("self");
+  process.Restart(asked);
+  for (int look = 0; look < 100 && IsAlive(self); ++look) std::this_thread::sleep_for(milliseconds(10));
+  EXPECT_TRUE(IsAlive(self));
+  EXPECT_EQ(process.restarts(), 0);
 }
 
 TEST_F(PolicyProcessTest, OneThatDiesAgainAndAgainIsGivenUpWithItsLastWords) {

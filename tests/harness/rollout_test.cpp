@@ -83,13 +83,14 @@ class CountedWorld : public World {
   explicit CountedWorld(World& world) : world_(world) {}
   std::string Name() const override { return world_.Name(); }
   WorldStep Reset(SceneId scene, const Task& task, const InitialState& initial, std::uint64_t seed) override {
+    ++resets;
     return world_.Reset(scene, task, initial, seed);
   }
   std::vector<Advanced> Advance(std::span<const SceneChunk> batch) override {
     ++advances;
     return world_.Advance(batch);
   }
-  int advances = 0;
+  int resets = 0, advances = 0;
 
  private:
   World& world_;
@@ -356,12 +357,47 @@ TEST_F(Rollout, WhoeverWasSentAwayByAnInterruptIsNotStoredAsFailed) {
   EXPECT_TRUE(store.Episodes().empty());
 }
 
+/// All lanes were filled first: of a large world model, minutes.
+TEST_F(Rollout, AnInterruptWhileLanesAreFilledBeginsNoFurtherEpisode) {
+  WalkingPolicy policy;
+  Store store = NewDeclaredStore("filling");
+  CountedWorld world(world_);
+  options_.lanes = 8;
+  options_.interrupted = [&] { return world.resets > 0; };
+  JobQueue queue(Jobs(8));
+  EXPECT_TRUE(RunEpisodes(policy, world, queue, store, options_).interrupted);
+  EXPECT_EQ(world.resets, 1);
+  EXPECT_EQ(world.advances, 0);
+  EXPECT_TRUE(store.Episodes().empty());
+}
+
 TEST_F(Rollout, WhileASlowPolicyThinksTheWorldMovesOn) {
   options_.lane.latency = {.kind = PolicyLatency::Kind::kFixed, .fixed_s = .2};
   const Episode episode = OnlyEpisode([](Acted plain, std::uint64_t) { return plain; });
   EXPECT_EQ(episode.chunks, 5);
   EXPECT_EQ(episode.commands.size(), 5u * (2 + kChunk));
   EXPECT_EQ(episode.observations.size(), episode.commands.size() + 1);
+}
+
+/// Its physics blows up as it settles, before there is a frame.
+class RestlessWorld : public CountedWorld {
+ public:
+  using CountedWorld::CountedWorld;
+  WorldStep Reset(SceneId, const Task&, const InitialState&, std::uint64_t) override {
+    throw InternalError("physics diverged before 0.10 s").Called("diverged");
+  }
+};
+
+/// It was counted among the worlds' errors.
+TEST_F(Rollout, AnEpisodeWhosePhysicsDivergesAsItBeginsHasDiverged) {
+  WalkingPolicy policy;
+  RestlessWorld world(world_);
+  Store store = NewDeclaredStore("restless");
+  JobQueue queue(Jobs(1));
+  EXPECT_EQ(RunEpisodes(policy, world, queue, store, options_).failed, 1);
+  const Episode episode = store.Episodes().at(0);
+  EXPECT_EQ(episode.stop, StopReason::kDiverged);
+  EXPECT_EQ(episode.failure, "physics diverged before 0.10 s");
 }
 
 TEST_F(Rollout, AnEpisodeThatCannotBeginIsARowToo) {

@@ -252,6 +252,12 @@ TEST_F(SuiteTest, FilesOfAPolicyInAMappingThatIsSetAreRelativeToTheWorkingDirect
   EXPECT_THAT(Complaint(path, {"policies.0={name: mine, command: [x], files: [\"\"]}"}), HasSubstr("files"));
 }
 
+/// It was taken, and refused where the worlds were made.
+TEST_F(SuiteTest, MoreThreadsThanAWorldTakesAreRefused) {
+  EXPECT_EQ(Complaint(std::string(kSuite), {"threads=256"}), "no complaint");
+  EXPECT_THAT(Complaint(std::string(kSuite), {"threads=257"}), AllOf(HasSubstr("field threads"), HasSubstr("256")));
+}
+
 /// The clock's count overflowed: a policy was given up at once, or never.
 TEST_F(SuiteTest, AWaitOfMoreThanADayIsRefused) {
   for (const char* field : {"deadline_s", "repeat_after_s", "start_s"}) {

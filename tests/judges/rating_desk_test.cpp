@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <set>
 
 #include "core/error.h"
@@ -292,6 +293,23 @@ TEST_F(RatingDeskTest, AWaveThatComesLaterLeavesOrdersAsTheyWere) {
   for (std::size_t i = 0; i < before.size(); ++i) EXPECT_EQ(after[i].id, before[i].id);
   EXPECT_EQ(store.Waves(), 2);
   EXPECT_EQ(store.Clip(after.back().clip).wave, 2);
+}
+
+/// "Download my data" told which clips came with a later wave, of another checkpoint, say.
+TEST_F(RatingDeskTest, WhatARaterDownloadsDoesNotTellWaves) {
+  AtTheDesk ann(store, desk);
+  study.run().Add("41-0100", 's', 'f');
+  MakeStudy(study.folder(), {.runs = {study.run().folder()}, .height_px = 64}, [](std::size_t, std::size_t) {});
+  desk.Me(ann.Me(), 3);
+  ann.RateAll([](const StudyClip&) { return "success"; });
+  std::set<std::string> told, kept;
+  const auto mine = desk.Mine(ann.Me()).body;
+  for (const auto& row : mine.at("verdicts")) told.insert(row.value("wave", ""));
+  EXPECT_THAT(told, testing::ElementsAre(""));
+  const StudyTable table = store.VerdictTable();
+  const auto wave = std::ranges::find(table.columns, "wave") - table.columns.begin();
+  for (const auto& row : table.rows) kept.insert(row.at(static_cast<std::size_t>(wave)));
+  EXPECT_THAT(kept, testing::ElementsAre("1", "2")) << "the lead's export has them";
 }
 
 TEST_F(RatingDeskTest, AdjudicatorsSayWhatTheySeeBeforeTheySeeTheOthers) {

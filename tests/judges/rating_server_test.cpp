@@ -5,6 +5,7 @@
 #include <pthread.h>
 
 #include <atomic>
+#include <chrono>
 #include <nlohmann/json.hpp>
 #include <system_error>
 #include <thread>
@@ -262,9 +263,9 @@ TEST_F(RatingServerTest, SlowClientsHinderNobody) {
     slow.push_back(socket);
   }
   EXPECT_EQ(Get("/api/me", Join()).status, 200);
-  for (const int socket : slow) {  // every one of them is cut off
+  for (const int socket : slow) {
     char byte = 0;
-    EXPECT_LE(::recv(socket, &byte, 1, 0), 0);
+    EXPECT_EQ(::recv(socket, &byte, 1, 0), 0) << "every one of them is closed, without an answer";
     close(socket);
   }
 }
@@ -344,6 +345,44 @@ TEST(RatingHttp, AThreadThatCannotBeStartedLeavesAServerWithFewer) {
   }
   asking.join();
   EXPECT_EQ(answer.status, 200);
+}
+
+/// A clip that took longer than answer_s was cut, and asked for again from its first byte, for ever.
+TEST(RatingHttp, AnAnswerThatIsTakenPieceByPieceIsSentToItsEndAndOneThatNobodyTakesIsCut) {
+  constexpr std::size_t kBytes = 48 << 20;  // more than all that systems keep for a socket
+  constexpr int kPieces = 90;
+  RatingHttp http("127.0.0.1", 0, {.answer_s = 2}, [](const HttpAsked&, const RatingHttp::Reply& reply) {
+    reply({.body = std::string(kBytes, 'x')});
+  });
+  std::thread at_work([&] { http.Serve(); });
+  const auto ask = [&] {
+    const int socket = ConnectTo(http.port()), room = 1 << 20;
+    ::setsockopt(socket, SOL_SOCKET, SO_RCVBUF, &room, sizeof room);
+    const std::string asked = "GET / HTTP/1.1\r\nHost: 127.0.0.1\r\nConnection: close\r\n\r\n";
+    ::send(socket, asked.data(), asked.size(), MSG_NOSIGNAL);
+    return socket;
+  };
+  std::string place(65536, ' ');
+  const auto take = [&](int socket, std::size_t most) {  // @returns how much came; less than `most` at the end alone
+    std::size_t taken = 0;
+    for (ssize_t count; taken < most && (count = ::recv(socket, place.data(), place.size(), 0)) > 0;)
+      taken += static_cast<std::size_t>(count);
+    return taken;
+  };
+  const int idle = ask(), steady = ask();
+  std::size_t taken = 0;
+  for (int piece = 1; piece <= kPieces; ++piece) {  // 4.5 s and more: longer than answer_s, with no pause as long
+    taken += take(steady, kBytes / kPieces);
+    std::this_thread::sleep_for(std::chrono::milliseconds(50));
+  }
+  taken += take(steady, 2 * kBytes);
+  EXPECT_GT(taken, kBytes) << "body and head";
+  const std::size_t left = take(idle, 2 * kBytes);
+  EXPECT_LT(left, kBytes) << "of one who took nothing for longer than answer_s";
+  close(steady);
+  close(idle);
+  http.Stop();
+  at_work.join();
 }
 
 TEST_F(RatingServerTest, AStudyHasOneServer) {

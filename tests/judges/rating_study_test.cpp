@@ -221,6 +221,27 @@ TEST(RatingStudy, ARunWithoutTheRowOfATaskOrAWorldIsRefusedAsDamaged) {
   }
 }
 
+/// Those of a later wave were as long as that wave's longest: who looked at lengths knew which came later.
+TEST(RatingStudy, AWavesClipsAreAsLongInBytesAsThoseThatAreThereOrItIsSaid) {
+  StoredRun run("begun", "s", "f");
+  const fs::path folder = run.folder().parent_path() / "study";
+  const StudyOptions options{.runs = {run.folder()}, .height_px = 64};
+  const auto make_all_so_long = [&](std::uintmax_t bytes) {  // as if of other pictures
+    for (const StudyClip& clip : ClipsIn(folder)) fs::resize_file(folder / clip.file, bytes);
+  };
+  EXPECT_THAT(Make(folder, options).warnings, testing::IsEmpty());
+  const std::uintmax_t bytes = 3 * fs::file_size(folder / ClipsIn(folder).front().file);
+  make_all_so_long(bytes);
+  run.Add("41-0007", 's', 's');
+  EXPECT_THAT(Make(folder, options).warnings, testing::IsEmpty());
+  ASSERT_EQ(ClipsIn(folder).back().wave, 2);
+  for (const StudyClip& clip : ClipsIn(folder))
+    EXPECT_EQ(fs::file_size(folder / clip.file), bytes) << "wave " << clip.wave;
+  make_all_so_long(100);
+  run.Add("41-0008", 's', 's');
+  EXPECT_THAT(Make(folder, options).warnings, testing::ElementsAre(HasSubstr("those before 100: who looks")));
+}
+
 TEST(RatingStudy, ATaskThatFitsIntoNoClipOfTheStudyIsRefusedByName) {
   StoredRun run("begun", "s", "f");
   const fs::path folder = run.folder().parent_path() / "study";

@@ -112,6 +112,20 @@ TEST(Sizes, APublishedPagesCodecOfNoLevelsOrTooManyIsRefusedByField) {
   }
 }
 
+/// Noise would have been taken for velocity, and every picture been noise.
+TEST(Sizes, APublishedPageOfANetworkThatPredictsNoiseIsRefused) {
+  const TempFolder folder;
+  const auto page = [&](const std::string& parameterization) {
+    WriteText(folder / "page.yaml", "model: {params: {" + parameterization + "timesteps: 1000}}\n");
+    return ReadEvacConfig(folder / "page.yaml");
+  };
+  EXPECT_THAT([&] { page("parameterization: eps, "); },
+              ThrowsMessage<Error>(testing::AllOf(HasSubstr("page.yaml"), HasSubstr("parameterization"),
+                                                  HasSubstr("eps"), HasSubstr("v: "))));
+  EXPECT_EQ(page("parameterization: v, ").schedule.steps, 1000);
+  EXPECT_EQ(page("").schedule.steps, 1000) << "the published network is meant";
+}
+
 /// What jobs, sizes, settings and shards were each reading by code of their own.
 TEST(NumberText, IsReadWholeOrLeavesWhatWasThere) {
   double number = 7;

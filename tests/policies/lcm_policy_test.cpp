@@ -396,7 +396,7 @@ TEST_F(LcmPolicyTest, OneThatIsSilentForAWholeDeadlineIsRestartedAndOneThatAnswe
   });
   int restarts = 0;
   LcmPolicyOptions options = Firm(address);
-  options.restart = [&] { ++restarts; };
+  options.restart = [&](auto) { ++restarts; };
   LcmPolicy policy(options);
   policy.Reset(0, wire::TwoCameraTask(), 1);
   policy.Reset(1, wire::TwoCameraTask(), 1);
@@ -410,7 +410,7 @@ TEST_F(LcmPolicyTest, OneThatIsSilentForAWholeDeadlineIsRestartedAndOneThatAnswe
 TEST_F(LcmPolicyTest, OneThatLeavesSeveralWaitingIsRestartedOnceAndAgainIfItGoesOn) {
   int restarts = 0;
   LcmPolicyOptions options = Hasty(wire::OwnAddress());
-  options.restart = [&] { ++restarts; };
+  options.restart = [&](auto) { ++restarts; };
   LcmPolicy policy(options);
   for (int round = 1; round <= 2; ++round) {
     for (const SceneId scene : {0, 1, 2}) policy.Reset(scene, wire::TwoCameraTask(), 1);

@@ -52,5 +52,18 @@ TEST(Marker, ShapesDifferSoThatColourIsNotNeeded) {
   EXPECT_EQ(shapes.size(), 8u);
 }
 
+TEST(Columns, OfManySomeAreNamedInFullInsteadOfAllByNothing) {
+  CheckpointCurve curve{"take", "pick", true, {"real"}, {}, {}};
+  for (int step = 0; step < 50; ++step)
+    curve.points.push_back({"step_" + std::to_string(1000 + step), 1000.0 + step, {WilsonInterval(1, 2)}});
+  const std::string svg = CheckpointDrawing(curve).body;
+  EXPECT_THAT(svg, Not(HasSubstr("…")));
+  EXPECT_THAT(svg, HasSubstr(">step_1000</text>"));
+  EXPECT_GE(Times(svg, ">step_"), 7u);
+  EXPECT_LE(Times(svg, ">step_"), 9u);
+  curve.points.resize(3);
+  EXPECT_EQ(Times(CheckpointDrawing(curve).body, ">step_"), 3u) << "of few all are named";
+}
+
 }  // namespace
 }  // namespace evac

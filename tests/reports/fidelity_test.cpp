@@ -296,5 +296,14 @@ TEST(Fidelity, ThePageEscapesWhatASuiteCalledItsPolicies) {
   EXPECT_THAT(page, HasSubstr("&lt;script&gt;"));
 }
 
+TEST(Fidelity, ARateOverOtherPairsThanTheRestOfItsRowSaysOverHowMany) {
+  FidelityInput input = Sample();
+  Add(input.rows, "closed_loop", "few", "ssff", "ssff", "ss--");
+  const Fidelity fidelity = FidelityOf(std::move(input));
+  EXPECT_THAT(FidelityPage(fidelity), HasSubstr("<td class=\"num\">50 % of 4</td>"));
+  EXPECT_THAT(FidelityText(fidelity), HasSubstr("0.500 of 4"));
+  EXPECT_THAT(FidelityText(fidelity), Not(HasSubstr(" of 10"))) << "the same pairs as the rest";
+}
+
 }  // namespace
 }  // namespace evac

@@ -7,6 +7,8 @@
 #include "core/file.h"
 #include "reports/badge.h"
 #include "reports/csv.h"
+#include "reports/gate_output.h"
+#include "reports/junit.h"
 #include "reports/report_files.h"
 #include "reports/summary_md.h"
 #include "reports/xml.h"
@@ -280,6 +282,20 @@ TEST(ReportFiles, ReportJsonFitsItsPublishedSchema) {
   Json broken = Json::parse(FilesOf(HostileRun()).at("report.json"));
   broken["rates"][0]["success_rate"].erase("n");
   EXPECT_NE(validate(broken.dump()).exit_code, 0) << "an estimate without n";
+}
+
+TEST(CounterExamples, OfABetAreCountedByThePairsThatAreListed) {
+  RuleDecision rule;
+  rule.name = "bet";
+  rule.outcome = GateOutcome::kFail;
+  rule.flips_worse = 12;  // one seed of each state
+  for (std::uint64_t seed = 0; seed < 30; ++seed) rule.counter_examples.push_back({"a", "41-0000", seed, "c", "b"});
+  GateDecision decision;
+  decision.name = "main";
+  decision.rules = {rule};
+  EXPECT_THAT(GateText(decision), HasSubstr("and 20 more"));
+  EXPECT_THAT(JunitXml(HostileRun(), {{decision, true}}),
+              AllOf(HasSubstr("30 pairs in all"), Not(HasSubstr("initial states in all"))));
 }
 
 }  // namespace

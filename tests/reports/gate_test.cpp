@@ -412,8 +412,7 @@ TEST(Gate, TheJudgeIsHeldAgainstAnother) {
         .decision;
   };
   const GateDecision decision = decide("at_least: 0.8");
-  EXPECT_THAT(decision.rules[0].statement, HasSubstr("kappa of oracle with human in sim: 1.00"))
-      << "and it may be undecided: it has no spread";
+  EXPECT_THAT(decision.rules[0].statement, HasSubstr("kappa of oracle with human in sim: 1.00 [0.86, 1.00]"));
   EXPECT_THAT(decision.rules[0].statement, HasSubstr("over 40 episodes of 40 initial states that both judged"));
   EXPECT_THAT(MessageOf([&] { decide("at_least: 0.8, against: vlm"); }), HasSubstr("against: found 'vlm'"));
 }
@@ -476,6 +475,10 @@ TEST(Gate, ASizeThatNobodyCanCountIsNotZero) {
   const std::vector<std::string> sizes = SizesOf(Rules(tiny), nullptr);
   ASSERT_EQ(sizes.size(), 1u);
   EXPECT_THAT(sizes[0], HasSubstr("takes more than can be counted pairs")) << sizes[0];
+}
+
+TEST(Gate, WithoutAPairNoNumberOfThemIsPromised) {
+  EXPECT_EQ(Decided(Rules(kMcnemar), "uuuu", "ssss").rules.at(0).more, "");
 }
 
 TEST(Gate, AnInvertedIntervalTouchesItsThreshold) {

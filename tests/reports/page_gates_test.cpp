@@ -4,7 +4,9 @@
 #include <nlohmann/json.hpp>
 
 #include "reports/gate.h"
+#include "reports/gate_output.h"
 #include "reports/page.h"
+#include "reports/report_json.h"
 #include "reports/summary_md.h"
 #include "tests/reports/repeated_run.h"
 #include "tests/reports/sample_run.h"
@@ -54,6 +56,42 @@ TEST(GatesOnThePage, CounterExamplesLinkTheClipsOfTheRunWhereverItWasNamed) {
   }
   EXPECT_THAT(PageOfAFailedGate("out/candidate", ""),
               HasSubstr("<a href=\"videos/sim/take_bottle/pick@good/41-0000-s1.mp4\">candidate failed"));
+}
+
+TEST(GatesOnThePage, ADecisionByAnotherJudgeThanThePagesNamesIts) {
+  SampleRun now({{"take_bottle", "pick", "good", "-", "ffffff"}});
+  for (const Episode& episode : now.store().Episodes()) {
+    Verdict verdict;
+    verdict.episode_id = episode.key.Id();
+    verdict.judge = "human";
+    verdict.label = Label::kSuccess;
+    now.store().AddVerdict(verdict);
+  }
+  const GateRules rules =
+      ReadGateRules(Config::FromText("gates: [{name: r, test: ci_lower, world: sim, at_least: 0.9}]\n", "gate.yaml"));
+  const GateDecision decision =
+      Decide(rules, {now.Summary({.bootstrap_replicates = 1}), "out/now", {}}, nullptr).decision;
+  EXPECT_EQ(decision.judge, "oracle");
+  EXPECT_THAT(GateText(decision), HasSubstr("Gate gate: fail. Judge oracle. Data "));
+  now.store().AddGateRecord({decision.Key(), decision.name, Name(decision.outcome), JsonOf(decision).dump()}, {});
+  const ReportData report = ReportDataOf(now.Summary({.judge = "human", .bootstrap_replicates = 1}));
+  const std::string page = ReportPage(report, {"", "evac test"});
+  EXPECT_THAT(page, HasSubstr("gate gate (judge oracle): "));
+  EXPECT_THAT(page, HasSubstr("<p class=\"quiet\">Judge oracle. Rules"));
+  EXPECT_THAT(SummaryMarkdown(report.summary, report.gates), HasSubstr("## Gate gate: fail\n\nJudge oracle.\n"));
+  const auto json = nlohmann::json::parse(ReportJson(report.summary, "evac test"));
+  EXPECT_EQ(json.at("gates").at(0).at("judge"), "oracle");
+  EXPECT_THAT(ReportPage(ReportDataOf(now.Summary({.bootstrap_replicates = 1})), {"", "evac test"}),
+              Not(HasSubstr("(judge oracle)")))
+      << "the page's own";
+}
+
+TEST(GatesOnThePage, ADecisionThatWasKeptWithoutItsJudgeIsReadAllTheSame) {
+  GateDecision decision;
+  decision.judge = "oracle";
+  nlohmann::ordered_json json = JsonOf(decision);
+  json.erase("judge");
+  EXPECT_EQ(GateDecisionFromJson(json.dump()).judge, "");
 }
 
 }  // namespace

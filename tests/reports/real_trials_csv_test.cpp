@@ -88,5 +88,19 @@ TEST(NewTrials, TheSameFileAgainAddsNothingAndAContradictionIsRefused) {
   EXPECT_THROW(NewTrials(trials, stored), Error);
 }
 
+TEST(NewTrials, ARepeatFromAnotherFileIsNotTakenForWhatIsThere) {
+  const std::string rows = "task,initial_state,policy,checkpoint,outcome\ntake,41-0001,p,good,1\n";
+  const RealTrialsCsv first = ReadRealTrialsCsv(rows, "monday.csv", kKnown);
+  const RealTrialsCsv second = ReadRealTrialsCsv(rows, "tuesday.csv", kKnown);
+  EXPECT_THAT(NewTrials(first.trials, first.trials, first.counted), IsEmpty()) << "the same file again";
+  EXPECT_THAT([&] { NewTrials(second.trials, first.trials, second.counted); },
+              testing::ThrowsMessage<Error>(AllOf(HasSubstr("tuesday.csv:2: found no number of the trial"),
+                                                  HasSubstr("imported from monday.csv:2"), HasSubstr("'trial'"))));
+  const RealTrialsCsv numbered = ReadRealTrialsCsv(
+      "task,initial_state,policy,checkpoint,outcome,trial\ntake,41-0001,p,good,1,1\ntake,41-0001,p,good,1,2\n",
+      "tuesday.csv", kKnown);
+  EXPECT_THAT(NewTrials(numbered.trials, first.trials, numbered.counted), SizeIs(1)) << "1 is there, 2 is new";
+}
+
 }  // namespace
 }  // namespace evac

@@ -8,6 +8,7 @@
 #include "core/statistics/planning.h"
 #include "reports/headlines.h"
 #include "reports/methods.h"
+#include "reports/page.h"
 #include "tests/reports/sample_run.h"
 
 namespace evac {
@@ -257,6 +258,50 @@ TEST(Methods, NameTheTestsThatWereUsedAndNoOthers) {
   EXPECT_THAT(unpaired, HasSubstr("Boschloo"));
   EXPECT_THAT(unpaired, Not(HasSubstr("paired by initial state")));
   EXPECT_THAT(unpaired, HasSubstr("Excluded from all rates: 1 error."));
+}
+
+TEST(Checkpoints, OnlyNeighboursThatBothHaveARateAreSteps) {
+  const SampleRun gaps(
+      {{"a", "pick", "s1", "-", "ss"}, {"a", "pick", "s2", "-", "uu"}, {"a", "pick", "s3", "-", "ff"}});
+  const CheckpointCurve apart = CheckpointsOf(gaps.Summary()).at(0);
+  EXPECT_THAT(TrendInWords(apart, 1), HasSubstr("; no two neighbours are judged."));
+  const SampleRun run({{"a", "pick", "s1", "-", "ff"},
+                       {"a", "pick", "s2", "-", "uu"},
+                       {"a", "pick", "s3", "-", "ff"},
+                       {"a", "pick", "s4", "-", "ss"}});
+  EXPECT_THAT(TrendInWords(CheckpointsOf(run.Summary()).at(0), 1), HasSubstr("; 1 of 1 step rise."));
+}
+
+TEST(Headlines, ARunWithoutAPolicyHasNotOne) {
+  RunData data = ReadRun(SampleRun({{"a", "pick", "1", "s", "s"}}).store());
+  data.policies.clear();
+  data.episodes.clear();
+  data.verdicts.clear();
+  const std::string text = AllText(HeadlinesOf(ReportDataOf(Summarise(std::move(data), {}))));
+  EXPECT_THAT(text, HasSubstr("The run has no policy yet"));
+  EXPECT_THAT(text, Not(HasSubstr("one policy")));
+}
+
+TEST(Headlines, ClipsThatTheJudgeWasShownSmallAreCountedByNamingBoth) {
+  RunData data = ReadRun(SampleRun({{"a", "pick", "1", "-", "uu"}}).store());
+  ASSERT_EQ(data.episodes.size(), 2u);
+  const auto judge = [&](std::size_t episode, const std::string& name) {
+    Verdict& verdict = data.verdicts[data.episodes[episode].key.Id()][name];
+    verdict.episode_id = data.episodes[episode].key.Id();
+    verdict.judge = name;
+    verdict.label = Label::kSuccess;
+  };
+  judge(0, "vlm:x");
+  RunData without = data;
+  judge(1, "vlm:x:small");
+  const std::string wanted = "evac report RUN --judge vlm:x,vlm:x:small";
+  const ReportData report = ReportDataOf(Summarise(data, {.judge = "vlm"}));
+  EXPECT_THAT(AllText(HeadlinesOf(report)), HasSubstr("1 episode is not judged yet: " + wanted));
+  EXPECT_THAT(ReportPage(report, {"", "evac test"}), HasSubstr("<code>" + wanted + "</code> counts these"));
+  EXPECT_THAT(ReportPage(ReportDataOf(Summarise(data, {.judge = "vlm:x,vlm:x:small"})), {"", "evac test"}),
+              Not(HasSubstr("no verdict by")));
+  EXPECT_THAT(AllText(HeadlinesOf(ReportDataOf(Summarise(without, {.judge = "vlm"})))),
+              HasSubstr("evac judge RUN --judge vlm --config PAGE"));
 }
 
 }  // namespace

@@ -75,6 +75,16 @@ TEST(Recipe, ItsNumberOfEpisodesMayBeAnothersByAnAlias) {
   EXPECT_EQ(alias.hash, ReadRecipe(folder / "plain.yaml", {}).hash);
 }
 
+/// A thousand episodes were collected of a camera on the gripper that no reader takes to be there.
+TEST(Recipe, ACameraThatItsRecordingsCannotSayIsRefused) {
+  const TempFolder folder;
+  const fs::path sim = EVAC_SOURCE_DIR "/worldmodel/sim", page = folder / "bottle.yaml";
+  for (const char* file : {"take_bottle.xml", "robot.xml"}) fs::copy(sim / "scenes" / file, folder / file);
+  WriteFileAtomically(page, With(ReadFile(sim / "scenes/take_bottle.yaml"), "name: hand_right", "name: wrist"));
+  EXPECT_THAT(ErrorWith("tasks.0.page=" + page.string()),
+              AllOf(HasSubstr("bottle.yaml"), HasSubstr("camera 'wrist' is mounted on right_gripper")));
+}
+
 /// It was known in the first episode, when the folder was that recipe's: once the page was mended, another --out had to
 /// be taken.
 TEST(CollectCommand, AMistakeInTheProfileOrATaskIsSaidBeforeTheFolderIsClaimed) {

@@ -137,6 +137,44 @@ TEST_F(ImaginedRun, WeightsThatWereWrittenToBeforeTheWorldsTurnAreRefused) {
   }
 }
 
+/// A tenth of a second is what the published network's motion was divided by, however far apart its frames were; of
+/// frames 1/30 s apart it was told motion three times too large, and by `evac imagine` was not.
+TEST_F(ImaginedRun, WeightsThatSayNoPeriodAreToldTheSameMotionWhateverThePeriod) {
+  const auto pictures = [&](double period_s, const TensorMetadata& says) {
+    nn::RandomWeights random(5);
+    nn::SaveWeights(weights_, random, ReadEvacConfig(kSmallNetwork), {.metadata = says});
+    const Suite suite = ReadSuite(kImagined, Settings({"worlds.1.period_s=" + std::to_string(period_s)}));
+    Task task = suite.tasks.front();
+    task.period_s = period_s;
+    InitialScene scene{.images = {}, .arms = Arms(1), .cameras = task.cameras};
+    for (const Camera& camera : task.cameras)
+      scene.images.emplace_back(camera.height_px, camera.width_px, CV_8UC3, cv::Scalar(90, 120, 60));
+    Store store = Store::InMemory(
+        folder_ / "memory", {.suite_text = "", .suite_hash = "hash", .suite_path = "", .evac_version = ""});
+    store.AddTask(task);
+    store.AddInitialScene({task.id, "first", "nobody", "none"}, scene);
+    const std::unique_ptr<World> world = MakeWorld(suite.worlds[1], suite, &store);
+    world->Reset(0, task, {"first", 1}, 1);
+    ActionChunk chunk;
+    for (int step = 1; step <= 8; ++step) {
+      ArmState arm;
+      arm.base_from_gripper.translation().x() = 0.01 * step;
+      chunk.targets.push_back({arm});
+    }
+    const SceneChunk batch[] = {{0, &chunk}};
+    const std::vector<Advanced> answers = world->Advance(batch);
+    std::string seen;
+    for (const WorldStep& step : std::get<std::vector<WorldStep>>(answers.at(0))) {
+      for (const cv::Mat& picture : step.observation.images)
+        seen.append(reinterpret_cast<const char*>(picture.data), picture.total() * picture.elemSize());
+    }
+    return seen;
+  };
+  EXPECT_EQ(pictures(1.0 / 30, {}), pictures(0.1, {}));
+  EXPECT_NE(pictures(1.0 / 30, {{"period_s", "0.0333333"}}), pictures(1.0 / 30, {})) << "theirs is of 30 Hz";
+  EXPECT_EQ(pictures(0.1, {{"period_s", "0.1"}}), pictures(0.1, {})) << "as the desk's are told";
+}
+
 TEST_F(ImaginedRun, WeightsOfAnotherNetworkAreRefusedBeforeTheFirstEpisodeOfAnyWorld) {
   const CommandResult result = RunCommand(RunWords(
       kImagined, folder_ / "run", Settings({"worlds.1.config=" EVAC_SOURCE_DIR "/apps/configs/evac_published.yaml"})));
@@ -188,6 +226,30 @@ TEST_F(ImaginedRun, WeightsThatWereTrainedForSomethingElseAreRefusedBeforeTheFir
     EXPECT_EQ(validated.exit_code, 2) << validated.out << "what a run refuses is not valid";
     EXPECT_THAT(validated.err, HasSubstr(refusal));
   }
+}
+
+/// Their frames differ by a grey level, and a run went on with another number of threads as if they did not.
+TEST_F(ImaginedRun, OfAllThreadsPerSceneGoesOnWithThatNumberAlone) {
+  const auto declare = [&](Store& store, const std::string& per_scene, const std::string& threads) {
+    const Suite suite =
+        ReadSuite(kImagined, Settings({"worlds.1.threads_per_scene=" + per_scene, "threads=" + threads}));
+    Declare(suite, store);
+    return suite.worlds[1].evac->hash;
+  };
+  const RunInfo run{.suite_text = "", .suite_hash = "hash", .suite_path = "", .evac_version = ""};
+  Store all = Store::InMemory(folder_ / "all", run), one = Store::InMemory(folder_ / "one", run);
+  declare(all, "all", "2");
+  EXPECT_NO_THROW(declare(all, "all", "2"));
+  try {
+    declare(all, "all", "3");
+    ADD_FAILURE() << "the run would go on with other frames";
+  } catch (const Error& error) {
+    EXPECT_EQ(error.exit_code(), ExitCode::kInvalidInput);
+    EXPECT_THAT(error.what(), testing::AllOf(HasSubstr("evac"), HasSubstr(" threads 2'"), HasSubstr(" threads 3'")));
+  }
+  const std::string hash = declare(one, "1", "2");
+  EXPECT_NO_THROW(declare(one, "1", "3")) << "the same bits for any number of threads";
+  EXPECT_EQ(one.Worlds().at(1).profile_hash, hash);
 }
 
 TEST_F(ImaginedRun, IsAnotherOneWithOtherWeights) {

@@ -148,7 +148,11 @@ class FaultyPolicy {
       std::fflush(stdout);
       for (;;) ::pause();
     }
-    if (fault == "late") ::usleep(static_cast<useconds_t>(options_.late_s * 1e6));
+    if (fault == "late") {
+      fmt::print("is late\n");
+      std::fflush(stdout);
+      ::usleep(static_cast<useconds_t>(options_.late_s * 1e6));
+    }
     if (fault == "previous") --reply.request;
     if (fault == "error") reply.error = "CUDA out of memory";
     if (fault == "short") reply.targets.resize(reply.num_targets = 5);

@@ -214,5 +214,37 @@ TEST_F(GateCommand, GatesARealRun) {
   EXPECT_THAT(second.err, HasSubstr("--seed: this was decided before"));
 }
 
+TEST_F(GateCommand, ADecisionTakenAgainIsTheLastOneOfItsGate) {
+  WriteRun("worse", 60, 15);
+  EXPECT_EQ(Gate("worse").exit_code, 1);
+  WriteFileAtomically(folder_ / "gate.yaml",
+                      "name: nightly\ngates: [{name: r, test: noninferiority, world: sim, margin: 0.6}]\n");
+  const CommandResult lenient = Gate("worse");
+  EXPECT_EQ(lenient.exit_code, 0) << lenient.out << lenient.err;
+  WriteFileAtomically(folder_ / "gate.yaml", kRules);
+  EXPECT_EQ(Gate("worse").exit_code, 1);
+  EXPECT_EQ(Store::Open(folder_ / "worse", Store::Mode::kReadOnly).GateRecords().size(), 2u);
+  EXPECT_EQ(Evac({"report", Path("worse")}).exit_code, 0);
+  const Json report = Json::parse(ReadFile(folder_ / "worse/report/report.json"));
+  ASSERT_EQ(report.at("gates").size(), 1u);
+  EXPECT_EQ(report.at("gates").at(0).at("outcome"), "fail");
+  EXPECT_EQ(report.at("gates").at(0).at("current"), true);
+  EXPECT_THAT(ReadFile(folder_ / "worse/report/badge.svg"), testing::Not(HasSubstr("#1a7f37")));
+}
+
+TEST_F(GateCommand, AFolderThatTheJudgeHasNotJudgedIsNoBaselineEither) {
+  WriteRun("other", 60, 0);
+  WriteFileAtomically(folder_ / "gate.yaml", "judge: human\ngates: [{name: r, test: paired_mcnemar, world: sim}]");
+  Store other = Store::Open(folder_ / "other", Store::Mode::kReadWrite);
+  Verdict verdict;
+  verdict.episode_id = other.Episodes().at(0).key.Id();
+  verdict.judge = "human";
+  verdict.label = Label::kSuccess;
+  other.AddVerdict(verdict);
+  const CommandResult result = Evac({"gate", Path("gate.yaml"), Path("other"), "--baseline", Path("main")});
+  EXPECT_EQ(result.exit_code, 2) << result.out;
+  EXPECT_THAT(result.err, HasSubstr(Path("main") + ": judge human: found no episode that succeeded or failed"));
+}
+
 }  // namespace
 }  // namespace evac::system_test

@@ -143,5 +143,28 @@ INSTANTIATE_TEST_SUITE_P(
                     Interruption{"CtrlCWhileThePolicyHangs", SIGINT, "faulty-policy, --fault, hang, --while, {}"}),
     [](const testing::TestParamInfo<Interruption>& info) { return info.param.name; });
 
+/// On waking, all that waited had timed out, and the policy was ended as one that hangs.
+TEST(Interrupts, ARunThatIsSuspendedForLongerThanADeadlineGoesOnWhereItWas) {
+  const TempFolder folder;
+  const Mark mark(folder.path().string());
+  const std::filesystem::path run = folder / "run", log = run / "logs/faulty@default.log";
+  const pid_t pid = StartCommand(RunWords(kFaults, run,
+                                          {"policies.0.command=[faulty-policy, --fault, late, --late-s, \"6\"]",
+                                           "transport={deadline_s: 15, repeat_after_s: 60}", "initial_states.count=1"}),
+                                 folder / "run.log");
+  const bool is_waiting = WaitUntil(
+      [&] { return std::filesystem::exists(log) && ReadFile(log).find("is late") != std::string::npos; });
+  EXPECT_TRUE(is_waiting) << "it never came to the request that it answers late";
+  const std::vector<pid_t> all = mark.Processes();
+  for (const pid_t process : all) ::kill(process, SIGSTOP);
+  std::this_thread::sleep_for(std::chrono::seconds(17));
+  for (const pid_t process : all) ::kill(process, SIGCONT);
+  int status = 0;
+  ::waitpid(pid, &status, 0);
+  EXPECT_TRUE(WIFEXITED(status) && WEXITSTATUS(status) == 0) << status;
+  const std::string episodes = List(run);
+  EXPECT_EQ(episodes.find("policy_timeout"), std::string::npos) << episodes;
+}
+
 }  // namespace
 }  // namespace evac

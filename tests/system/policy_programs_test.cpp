@@ -77,6 +77,33 @@ TEST_F(PolicyProgramsTest, APolicyThatIsKilledFailsItsEpisodeAndIsThereForTheNex
   EXPECT_EQ(process.restarts(), 1);
 }
 
+/// It was ended at the deadline of what the one before it had been asked, and began to load once more.
+TEST_F(PolicyProgramsTest, APolicyThatDiedAndIsLoadingAgainIsLeftToLoad) {
+  PolicyProcessOptions process_options = Options(
+      {"sh", "-c",
+       fmt::format("cd '{}'; if test -e again; then sleep 8; fi; touch again; echo $$ > pid; exec '{}' hold",
+                   folder_.path().string(), Binary("evac-policy"))});
+  process_options.first_restart_after_s = 1;
+  PolicyProcess process(process_options);
+  LcmPolicyOptions options{.address = address_, .deadline_s = 4, .start_s = 60};
+  options.restart = [&process](auto asked) { process.Restart(asked); };
+  LcmPolicy policy(options);
+  policy.Handshake(HarnessSpec(task_, 16), 60);
+  policy.Reset(0, task_, 1);
+  ASSERT_TRUE(std::holds_alternative<ActionChunk>(Ask(policy)[0]));
+
+  pid_t pid = 0;
+  std::ifstream(folder_ / "pid") >> pid;
+  ASSERT_GT(pid, 0);
+  ::kill(pid, SIGKILL);
+  const auto failed = Ask(policy);
+  ASSERT_TRUE(std::holds_alternative<Failure>(failed[0]));
+  EXPECT_EQ(std::get<Failure>(failed[0]).stop, StopReason::kPolicyTimeout);
+  policy.Reset(0, task_, 1);
+  EXPECT_TRUE(std::holds_alternative<ActionChunk>(Ask(policy)[0]));
+  EXPECT_EQ(process.restarts(), 1);
+}
+
 TEST_F(PolicyProgramsTest, AWrongOptionIsToldInsteadOfWaitingForAnAnswer) {
   PolicyProcess process(Options({Binary("evac-policy"), "replay", "--recording", "/no/such/folder"}));
   LcmPolicyOptions options{.address = address_};

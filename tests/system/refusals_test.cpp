@@ -125,6 +125,26 @@ TEST_F(Refusals, AProgramThatIsNoPolicyIsRefusedAfterItsTimeToStart) {
   const CommandResult result = Run({"policies.0.command=[sleep, \"60\"]", "transport={start_s: 1}"});
   EXPECT_EQ(result.exit_code, 2);
   EXPECT_THAT(result.err, HasSubstr("no policy answered within 1 s on "));
+  EXPECT_THAT(result.err, HasSubstr("evac: policy visual_pick@good: "));
+  EXPECT_THAT(result.err, HasSubstr("its output: " + (folder_ / "run/logs/visual_pick@good.log").string() +
+                                    "; `transport.start_s` gives it longer"));
+  EXPECT_THAT(result.err, ::testing::Not(HasSubstr("EVAC_TOKEN"))) << "nobody is to join";
+}
+
+TEST_F(Refusals, APolicyThatIsJoinedAndNotThereIsNamedWithHowItJoins) {
+  const CommandResult result = Run({"policies.0={name: far, join: {url: \"udpm://239.255.76.67:29998?ttl=0\", token: nobody}}",
+                                    "transport={start_s: 1}"});
+  EXPECT_EQ(result.exit_code, 2);
+  EXPECT_THAT(result.err, AllOf(HasSubstr("evac: policy far@default: no policy answered within 1 s on "),
+                                HasSubstr("EVAC_TOKEN")));
+  EXPECT_THAT(result.err, ::testing::Not(HasSubstr("its output")));
+}
+
+TEST_F(Refusals, AProgramThatIsNotInTheSuitesFolderIsToldWhereItWasLookedFor) {
+  const CommandResult result = Run({"policies.0.command=[./mine]"});
+  EXPECT_EQ(result.exit_code, 2);
+  EXPECT_THAT(result.err, AllOf(HasSubstr("names ./mine: found no program at " EVAC_SOURCE_DIR "/tests/system/mine"),
+                                HasSubstr("in the suite's folder, also with --set")));
 }
 
 TEST_F(Refusals, APolicyThatHangsFailsItsEpisodesAndTheBudgetEndsTheRunSayingSo) {

@@ -3,7 +3,10 @@
 
 #include <filesystem>
 
+#include "apps/factory.h"
+#include "core/error.h"
 #include "core/file.h"
+#include "harness/suite_hash.h"
 #include "tests/support/temp_folder.h"
 #include "tests/system/run_support.h"
 
@@ -40,6 +43,41 @@ TEST(ScenePages, ARubricThatNamesABodyTheSceneHasNotIsRefusedBeforeTheFirstEpiso
       RunWords(kSmall, folder / "run", {"tasks=[" + (folder / "scenes" / "take_ham.yaml").string() + "]"}));
   EXPECT_EQ(run.exit_code, 2);
   EXPECT_THAT(run.err, AllOf(HasSubstr("take_ham.yaml"), HasSubstr("rubric"), HasSubstr("jam")));
+}
+
+/// Hours after the suite was read its profile and scenes were read again, and episodes of others stored under its hash.
+TEST(ScenePages, WhatWasWrittenToBetweenTheReadingOfTheSuiteAndTheWorldsTurnIsRefused) {
+  const TempFolder folder;
+  for (const char* file : {"take_bottle.yaml", "take_bottle.xml", "robot.xml"})
+    std::filesystem::copy(kScenes / file, folder / file);
+  std::filesystem::copy(kScenes / "../profiles/real.yaml", folder / "real.yaml");
+  const Suite suite = ReadSuite(kSmall, {"tasks=[" + (folder / "take_bottle.yaml").string() + "]",
+                                         "worlds.0.profile=" + (folder / "real.yaml").string()});
+  const SuiteWorld& world = suite.worlds.front();
+  EXPECT_NE(MakeWorld(world, suite, nullptr), nullptr);
+  const auto is_refused = [&](const std::string& file, const std::string& page, const auto& change) {
+    const std::string before = ReadFile(folder / file);
+    WriteFileAtomically(folder / file, change(before));
+    try {
+      MakeWorld(world, suite, nullptr);
+      ADD_FAILURE() << file << " was taken";
+    } catch (const Error& error) {
+      EXPECT_EQ(error.exit_code(), ExitCode::kInvalidInput);
+      EXPECT_THAT(error.what(), AllOf(HasSubstr((folder / page).string() + ": it, or a file that it names, is another"),
+                                      HasSubstr("wanted " + suite.page_hashes.at(folder / page)),
+                                      HasSubstr("found SHA-256 " + PageHash(folder / page))));
+    }
+    WriteFileAtomically(folder / file, before);
+    EXPECT_NO_THROW(MakeWorld(world, suite, nullptr)) << "as it was";
+  };
+  const auto with_a_comment = [](const std::string& text) { return text + "<!-- later -->\n"; };
+  is_refused("take_bottle.xml", "take_bottle.yaml", with_a_comment);
+  is_refused("robot.xml", "take_bottle.yaml", with_a_comment);
+  const auto with_a_field = [](const char* found, const char* put) {
+    return [=](std::string text) { return text.replace(text.find(found), std::string(found).size(), put); };
+  };
+  is_refused("take_bottle.yaml", "take_bottle.yaml", with_a_field("chance: 0.75", "chance: 0.5"));
+  is_refused("real.yaml", "real.yaml", with_a_field("mass: 1.2", "mass: 1.3"));
 }
 
 }  // namespace

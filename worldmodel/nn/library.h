@@ -7,6 +7,9 @@ namespace evac::nn {
 
 /// "1.13.0".
 std::string LibtorchVersion();
+/// What numbers are computed by here, its rounding with it: libtorch, the kernels that OpenBLAS picked (where libtorch
+/// multiplies with it), those of ours that were picked. "libtorch 1.13.0 blas SkylakeX kernels x86-64-v4".
+std::string Arithmetic();
 /// Whether it can use a GPU here.
 bool HasCuda();
 

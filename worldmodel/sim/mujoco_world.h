@@ -39,9 +39,13 @@ class MujocoWorld : public World {
 
   std::string Name() const override { return options_.name; }
   /// @throws InvalidInput if the task has no `mujoco:` section, other arms than its scene, or a camera MuJoCo cannot
-  /// draw.
+  /// draw; Error called `diverged` if the physics does while the state settles.
   WorldStep Reset(SceneId scene, const Task& task, const InitialState& initial, std::uint64_t seed) override;
   std::vector<Advanced> Advance(std::span<const SceneChunk> batch) override;
+
+  /// Reads the task's page and its scene now, and not where its first episode begins: hours later they may be others.
+  /// @throws InvalidInput as Reset, for what can be known without a state.
+  void Read(const Task& task) { StageFor(task); }
 
   const Profile& profile() const { return profile_; }  ///< its hash is stored with the run
 

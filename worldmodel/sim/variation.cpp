@@ -100,7 +100,9 @@ void Scatter(mjModel& model, const Clutter& clutter, SplitMix64 random) {
       throw InvalidInput("scene {}: clutter '{}' is free to move, wanted a fixed body (free ones are `objects`)",
                          model.names, name);
     const std::size_t chosen = random.Below(places_m.size());
-    const Eigen::Vector2d jitter_m(random.Uniform(-1, 1), random.Uniform(-1, 1));
+    const double y = random.Uniform(-1, 1);  // before x: states are what they were drawn as first
+    const double x = random.Uniform(-1, 1);
+    const Eigen::Vector2d jitter_m(x, y);
     const double half_yaw = random.Uniform(-std::numbers::pi, std::numbers::pi) / 2;
     const bool there = random.Uniform() < clutter.chance;
     const Eigen::Vector2d place_m = places_m[chosen] + clutter.spread_m * jitter_m;

@@ -170,10 +170,13 @@ def first_rater(server, ann):
     undo(ann)
     reload_in_a_clip(ann)
     keys(ann)
+    space_after_a_click(ann)
+    brackets_of_other_keyboards(ann)
     pause_in_a_clip(ann)
     a_box_opened_at_the_last_moment(ann)
     menu_after_a_verdict(ann)
     change(ann)
+    server_in_trouble(ann)
     second_tab(ann)
     line_goes_away(ann, server)
     ann.rate_all(lambda k: "failure" if k % 4 == 3 else "success")
@@ -287,6 +290,33 @@ def keys(ann):
     browser.js("document.querySelector('#dialog button.primary').click()")
 
 
+def space_after_a_click(ann):
+    browser = ann.browser
+    browser.js("rating.player.replay()")  # the dialogs before have stopped it
+    ann.ready()
+    browser.js("""window.toggled = 0;
+        const toggle = rating.player.toggle;
+        rating.player.toggle = () => { toggled++; toggle.call(rating.player); };""")
+    browser.click(*browser.js("(at => [at.x + at.width / 2, at.y + at.height / 2])(document.querySelector('.stage').getBoundingClientRect())"))
+    check(browser.js("rating.stages === 1"), "a click marks a stage", browser.js("rating.stages"))
+    browser.press(" ")
+    check(browser.js("rating.stages === 1 && toggled === 1"), "Space plays after it, and un-marks nothing", browser.js("[rating.stages, toggled]"))
+    browser.js("document.querySelector('.stage').focus()")
+    browser.press(" ")
+    check(browser.js("rating.stages === 0 && toggled === 1"), "on a stage that was come to by keys it un-marks", browser.js("[rating.stages, toggled]"))
+    browser.js("document.activeElement.blur()")
+
+
+def brackets_of_other_keyboards(ann):
+    """AltGr is Ctrl and Alt to Windows and a state of its own elsewhere, Option is Alt; the key is often a digit's."""
+    browser = ann.browser
+    before = browser.js("sticky.speed")
+    for held in ("ctrlKey: true, altKey: true", "modifierAltGraph: true", "altKey: true"):
+        speeds = [browser.js(f"""document.body.dispatchEvent(new KeyboardEvent('keydown', {{key: '{key}', code: 'Digit1', bubbles: true, {held}}}));
+            sticky.speed""") for key in "[]"]
+        check(speeds[0] < speeds[1] == before and browser.js("rating.stages === 0"), f"[ and ] are slower and faster with {held}", (before, speeds))
+
+
 def pause_in_a_clip(ann):
     browser = ann.browser
     browser.js("rating.player.replay()")  # the dialogs before have stopped it
@@ -360,6 +390,24 @@ def change(ann):
     check((row["label"], row["stages"], row["flags"], row["confidence"], row["note"]) == ("cannot_tell", 1, "blur_hides", 2, "sfu"),
           "and changes nothing else", row)
     check(browser.js("!rating.isOpen && !rating.supersedes"), "the clip after it is rated as any other")
+
+
+def server_in_trouble(ann):
+    """500, and what a proxy makes of a server that is away: no word on the verdict."""
+    browser = ann.browser
+    ann.ready()
+    clip = ann.clip()
+    browser.js("""window.fetched = fetch;
+        window.troubles = [500, 520];
+        window.fetch = (path, options) => path === '/api/verdict' && troubles.length
+          ? Promise.resolve(new Response('', {status: troubles.shift()})) : fetched(path, options);""")
+    ann.say("s", "success")
+    browser.wait("troubles.length === 0 || outbox.waiting.length === 0")
+    left = browser.js("troubles.length")
+    check(left == 0, "a verdict that meets a server in trouble is sent again", left)
+    ann.sent()
+    browser.js("window.fetch = fetched")
+    check(current().get(clip, {}).get("label") == "success", "and arrives")
 
 
 def second_tab(ann):
@@ -466,7 +514,17 @@ def interrupted(judge, clip):
     reload(browser)
     wait_here(browser, "document.querySelector('.others')")
     check(judge.clip() == clip, "an adjudicator who was interrupted finds the others' verdicts of the same clip")
-    check(browser.js("document.activeElement.matches('.decision.success')"), "and what was said first")
+    check(browser.js("document.activeElement.matches('.others') && document.querySelector('.kept').matches('.decision.success')"), "and what was said first")
+
+
+def decided_at_once(browser):
+    """Whatever is struck before anybody can have read the others' verdicts."""
+    is_open = "Boolean(document.querySelector('.decision:not(:disabled)'))"
+    browser.press("Enter")
+    browser.press(" ")
+    check(browser.js(is_open), "Enter and Space decide nothing where nobody went to a decision")
+    browser.js("rating.unfoldedAt = Date.now(); document.querySelector('.decision.success').click()")
+    check(browser.js(is_open), "nor does a decision that is clicked at once")
 
 
 def adjudicate(judge):
@@ -484,13 +542,15 @@ def adjudicate(judge):
         browser.press("s")
         browser.wait("document.querySelector('.others')")
         if decided == 0:
+            decided_at_once(browser)
             look(browser, "adjudicate")
             interrupted(judge, clip)
         if decided == 1:
             browser.press("s")
             check(browser.js("Boolean(document.querySelector('.decision:not(:disabled)'))"), "a key struck twice is no decision")
-            time.sleep(1)
-        browser.press("s" if decided == 1 else "Enter")
+        browser.wait("Date.now() - rating.unfoldedAt > 1000")
+        for key in "s" if decided == 1 else ("Tab", "Enter"):  # the first of the decisions is Success
+            browser.press(key)
         browser.wait(f"document.querySelector('.done') || (rating.clip?.presentation !== {clip!r} && document.querySelector('.rate') && !document.querySelector('.others'))")
         decided += 1
     check(decided > 0, "there was something to decide", decided)

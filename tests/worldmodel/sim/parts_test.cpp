@@ -6,6 +6,7 @@
 
 #include "core/error.h"
 #include "core/file.h"
+#include "core/seed.h"
 #include "tests/support/temp_folder.h"
 #include "tests/worldmodel/sim/scripted_pick.h"
 #include "tests/worldmodel/sim/sim_test_support.h"
@@ -13,7 +14,9 @@
 #include "worldmodel/sim/box_contacts.h"
 #include "worldmodel/sim/mujoco_handles.h"
 #include "worldmodel/sim/profile.h"
+#include "worldmodel/sim/scene_page.h"
 #include "worldmodel/sim/sensors.h"
+#include "worldmodel/sim/variation.h"
 #include "worldmodel/sim/workers.h"
 
 namespace evac::test {
@@ -118,6 +121,30 @@ TEST(HiddenErrors, OfASecondArmAreItsOwnAndChangeNothingOfTheFirst) {
   ASSERT_EQ(of_two.joint_offset.size(), 2U);
   EXPECT_EQ(of_two.joint_offset[1], of_one.joint_offset[0]);
   EXPECT_NE(of_two.joint_offset[0], of_two.joint_offset[1]);
+}
+
+/// Both draws of a place were arguments of one call, and which came first was the compiler's choice: with another one,
+/// other states.
+TEST(Clutter, LiesWhereTheOrderOfItsDrawsSays) {
+  const ModelPtr model = BottleModel();
+  const ScenePage page = ReadScenePage(ReadTask("take_bottle"));
+  ApplyInitialState(*model, page, 41);
+  SplitMix64 random(SeedFor(41, "clutter"));
+  std::vector<Eigen::Vector2d> places_m = page.clutter.places_m;
+  ASSERT_FALSE(page.clutter.bodies.empty());
+  for (const std::string& name : page.clutter.bodies) {
+    const auto chosen = static_cast<std::ptrdiff_t>(random.Below(places_m.size()));
+    const double y = random.Uniform(-1, 1);
+    const double x = random.Uniform(-1, 1);
+    random.Uniform();  // how it is turned
+    random.Uniform();  // whether it is there
+    const Eigen::Vector2d place_m =
+        places_m[static_cast<std::size_t>(chosen)] + page.clutter.spread_m * Eigen::Vector2d(x, y);
+    places_m.erase(places_m.begin() + chosen);
+    const mjtNum* found = model->body_pos + 3 * IdOf(*model, mjOBJ_BODY, name);
+    EXPECT_NEAR(found[0], place_m.x(), 1e-12) << name;
+    EXPECT_NEAR(found[1], place_m.y(), 1e-12) << name;
+  }
 }
 
 TEST(Sensors, ImageNoiseHasItsDeviationAndNoMean) {
