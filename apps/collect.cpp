@@ -13,6 +13,7 @@
 #include "apps/work_share.h"
 #include "core/error.h"
 #include "core/file.h"
+#include "core/parse_json.h"
 #include "core/store_lock.h"
 #include "core/version.h"
 #include "judges/attempt.h"
@@ -26,6 +27,14 @@ using Json = nlohmann::ordered_json;
 /// For a message. What lies deep is not shown: what writes it, or copies it, calls itself at every bracket.
 std::string Shown(const Json& value) { return value.is_structured() ? value.type_name() : value.dump(); }
 
+Json ClaimIn(const fs::path& path) try {
+  return ParseJson<Json>(ReadFile(path));
+} catch (const Json::parse_error&) {
+  return Json();  // of another version, another seed …
+} catch (const Json::exception& error) {
+  throw InvalidInput("{}: holds another collection: {}; choose another --out", path.string(), error.what());
+}
+
 /// OUT/collection.json: which collection this is, and which evac began it. @throws InvalidInput if there is another.
 void Claim(const CollectArguments& arguments, const Recipe& recipe) {
   const Json page = {{"format", "evac-collection"},
@@ -36,7 +45,7 @@ void Claim(const CollectArguments& arguments, const Recipe& recipe) {
                      {"recipe", recipe.text}};
   const fs::path path = arguments.out / "collection.json";
   if (!fs::exists(path)) return WriteFileAtomically(path, page.dump(2) + "\n");
-  const Json before = Json::parse(ReadFile(path), nullptr, /*allow_exceptions=*/false);
+  const Json before = ClaimIn(path);
   for (const char* field : {"version", "seed", "recipe_sha256"}) {
     const auto found = before.find(field);
     if (found != before.end() && *found == page[field]) continue;

@@ -11,6 +11,7 @@
 #include "core/error.h"
 #include "core/file.h"
 #include "core/names.h"
+#include "core/parse_json.h"
 #include "core/tensor_file.h"
 
 namespace evac {
@@ -137,7 +138,7 @@ std::string CollectedJson(const CollectedEpisode& episode) {
 }
 
 CollectedEpisode ParseCollected(const std::string& json, const std::string& where) try {
-  const Json page = Json::parse(json);
+  const Json page = ParseJson<Json>(json);
   CollectedEpisode episode;
   episode.index = WholeIn<std::int64_t>(page, "index", where);
   episode.task = page.at("task");

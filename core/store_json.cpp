@@ -4,6 +4,7 @@
 #include <nlohmann/json.hpp>
 
 #include "core/error.h"
+#include "core/parse_json.h"
 #include "core/store_codec.h"
 
 namespace evac::codec {
@@ -157,7 +158,7 @@ Eigen::Vector3d PointFromJson(const Json& json) {
 template <typename Read>
 auto Decoded(const std::string& text, const Read& read) {
   try {
-    return read(Json::parse(text));
+    return read(ParseJson<Json>(text));
   } catch (const nlohmann::json::exception& error) {
     throw InternalError("the store is damaged: {}", error.what());
   }

@@ -1,3 +1,4 @@
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <signal.h>
@@ -137,15 +138,27 @@ TEST_F(ImaginedRun, WeightsThatWereWrittenToBeforeTheWorldsTurnAreRefused) {
   }
 }
 
+/// The bottle's page with another period, from anywhere.
+std::string BottleEvery(double period_s) {
+  const std::string scenes = EVAC_SOURCE_DIR "/worldmodel/sim/scenes/";
+  std::string page = ReadFile(scenes + "take_bottle.yaml");
+  const std::pair<std::string, std::string> changes[] = {{"period_s: 0.1", fmt::format("period_s: {}", period_s)},
+                                                         {"scene: ", "scene: " + scenes},
+                                                         {"includes: [", "includes: [" + scenes}};
+  for (const auto& [was, is] : changes) page.replace(page.find(was), was.size(), is);  // throws where there is none
+  return page;
+}
+
 /// A tenth of a second is what the published network's motion was divided by, however far apart its frames were; of
 /// frames 1/30 s apart it was told motion three times too large, and by `evac imagine` was not.
 TEST_F(ImaginedRun, WeightsThatSayNoPeriodAreToldTheSameMotionWhateverThePeriod) {
   const auto pictures = [&](double period_s, const TensorMetadata& says) {
     nn::RandomWeights random(5);
     nn::SaveWeights(weights_, random, ReadEvacConfig(kSmallNetwork), {.metadata = says});
-    const Suite suite = ReadSuite(kImagined, Settings({"worlds.1.period_s=" + std::to_string(period_s)}));
-    Task task = suite.tasks.front();
-    task.period_s = period_s;
+    WriteFileAtomically(folder_ / "page.yaml", BottleEvery(period_s));
+    const Suite suite = ReadSuite(kImagined, Settings({fmt::format("worlds.1.period_s={}", period_s),
+                                                       "tasks=[" + (folder_ / "page.yaml").string() + "]"}));
+    const Task& task = suite.tasks.front();
     InitialScene scene{.images = {}, .arms = Arms(1), .cameras = task.cameras};
     for (const Camera& camera : task.cameras)
       scene.images.emplace_back(camera.height_px, camera.width_px, CV_8UC3, cv::Scalar(90, 120, 60));
@@ -249,7 +262,10 @@ TEST_F(ImaginedRun, OfAllThreadsPerSceneGoesOnWithThatNumberAlone) {
   }
   const std::string hash = declare(one, "1", "2");
   EXPECT_NO_THROW(declare(one, "1", "3")) << "the same bits for any number of threads";
-  EXPECT_EQ(one.Worlds().at(1).profile_hash, hash);
+  const std::vector<WorldInfo> worlds = one.Worlds();
+  const auto evac = std::ranges::find(worlds, "evac", &WorldInfo::name);
+  ASSERT_NE(evac, worlds.end());
+  EXPECT_EQ(evac->profile_hash, hash);
 }
 
 TEST_F(ImaginedRun, IsAnotherOneWithOtherWeights) {
