@@ -562,11 +562,16 @@ def goes_on(browser):
     browser.js("document.querySelector('.scroll[aria-label=Raters]').focus(); window.scrollTo(0, 60); window.before = scrollY")
     browser.js("refreshBoard()")
     check(browser.js("document.activeElement.getAttribute('aria-label') === 'Raters' && scrollY === before"), "a board that is refreshed stays where it was")
-    browser.js("window.fetched = fetch; window.fetch = () => Promise.resolve(new Response('{}', {status: 500})); window.before = board.timer; refreshBoard()")
+    browser.js("window.fetched = fetch; window.fetch = () => Promise.resolve(new Response('{}', {status: 403})); window.before = board.timer; refreshBoard()")
     browser.wait("!document.querySelector('#banner').hidden")
     check(browser.js("board.timer !== before"), "a refused refresh is tried again")
     browser.js("window.fetch = fetched; refreshBoard()")
     browser.wait("document.querySelector('#banner').hidden")
+    browser.js("window.fetch = () => Promise.resolve(new Response('', {status: 500})); void refreshBoard()")
+    browser.wait("!document.querySelector('#banner').hidden")
+    browser.js("window.fetch = fetched")
+    browser.wait("document.querySelector('#banner').hidden")
+    check(True, "a server in trouble is asked again until it answers")
 
 
 def main():
