@@ -63,6 +63,20 @@ TEST_F(RunRate, TheDemosStudyIsOutStudyHoweverItIsNamed) {
   }
 }
 
+/// After an update with other weights it said "choose another folder", which `./run demo` cannot.
+TEST_F(RunRate, ADemoThatIsAnotherSuitesSaysHowItGoes) {
+  Program("build/release/bin/evac", "exit 2\n");
+  const std::vector<std::string> words = {"/usr/bin/env", "PATH=" + (folder_ / "bin").string() + ":/usr/bin:/bin",
+                                          "/bin/bash", (folder_ / "run").string(), "demo"};
+  const CommandResult refused = RunCommand(words);
+  EXPECT_EQ(refused.exit_code, 2);
+  EXPECT_THAT(refused.out + refused.err, Not(HasSubstr("rm -r"))) << "there is none: an option was wrong";
+  Program("out/demo/evac.sqlite", "");
+  const CommandResult older = RunCommand(words);
+  EXPECT_EQ(older.exit_code, 2);
+  EXPECT_THAT(older.out + older.err, HasSubstr("an earlier demo goes with: rm -r out/demo"));
+}
+
 TEST_F(RunRate, AnotherRunHasAStudyOfItsOwn) {
   Rate();
   const std::string study = At("out/other run-study"), told = Rate("out/other run");
