@@ -24,9 +24,6 @@ namespace {
 namespace fs = std::filesystem;
 using Json = nlohmann::ordered_json;
 
-/// For a message. What lies deep is not shown: what writes it, or copies it, calls itself at every bracket.
-std::string Shown(const Json& value) { return value.is_structured() ? value.type_name() : value.dump(); }
-
 Json ClaimIn(const fs::path& path) try {
   return ParseJson<Json>(ReadFile(path));
 } catch (const Json::parse_error&) {
@@ -47,10 +44,10 @@ void Claim(const CollectArguments& arguments, const Recipe& recipe) {
   if (!fs::exists(path)) return WriteFileAtomically(path, page.dump(2) + "\n");
   const Json before = ClaimIn(path);
   for (const char* field : {"version", "seed", "recipe_sha256"}) {
-    const auto found = before.find(field);
-    if (found != before.end() && *found == page[field]) continue;
+    const Json found = before.is_object() && before.contains(field) ? before[field] : Json();
+    if (found == page[field]) continue;
     throw InvalidInput("{}: holds another collection: {} is {}, wanted {}; choose another --out", path.string(), field,
-                       found != before.end() ? Shown(*found) : "null", page[field].dump());
+                       found.dump(), page[field].dump());
   }
   const auto began = before.find("evac_version");
   SayIfAnotherVersionBegan(arguments.out, began != before.end() && began->is_string() ? began->get<std::string>() : "");

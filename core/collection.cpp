@@ -31,9 +31,6 @@ std::uint64_t Number(const std::string& digits) {
   return number;
 }
 
-/// For a message. What lies deep is not shown: what writes it calls itself at every bracket.
-std::string Shown(const Json& value) { return value.is_structured() ? value.type_name() : value.dump(); }
-
 /// A field that is a whole number of type T: the library would make one of any number, whatever it is.
 template <typename T>
 T WholeIn(const Json& page, const char* field, const std::string& where) {
@@ -42,7 +39,7 @@ T WholeIn(const Json& page, const char* field, const std::string& where) {
   const bool fits = value.is_number_unsigned()
                         ? value.get<std::uint64_t>() <= kMost
                         : value.is_number_integer() && value.get<std::int64_t>() >= std::numeric_limits<T>::min();
-  if (!fits) throw InvalidInput("{}: {} is {}, wanted a whole number", where, field, Shown(value));
+  if (!fits) throw InvalidInput("{}: {} is {}, wanted a whole number", where, field, value.dump());
   return value.get<T>();
 }
 

@@ -7,7 +7,7 @@ namespace evac {
 
 /// JSON of somebody's, of nlohmann::json or ordered_json. What copies it, compares it or writes it calls itself at every
 /// bracket (of ordered_json reading does): none of a million reaches that.
-/// @throws the library's exception for what is no JSON, or lies more than 32 deep
+/// @throws the library's parse_error for what is no JSON, its other_error for what lies more than 32 deep
 template <typename Json>
 Json ParseJson(const std::string& text) {
   return Json::parse(text, [](int depth, typename Json::parse_event_t, const Json&) {

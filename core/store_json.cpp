@@ -33,8 +33,7 @@ Mount MountFromName(const std::string& name) {
 int IntOf(const Json& json) {
   const auto number = json.is_number_integer() ? json.get<std::int64_t>() : std::numeric_limits<std::int64_t>::max();
   if (number < std::numeric_limits<int>::min() || number > std::numeric_limits<int>::max())
-    throw InternalError("the store is damaged: {} is no count",
-                        json.is_structured() ? json.type_name() : json.dump());  // what writes it calls itself
+    throw InternalError("the store is damaged: {} is no count", json.dump());
   return static_cast<int>(number);
 }
 

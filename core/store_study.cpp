@@ -9,6 +9,7 @@
 #include "core/error.h"
 #include "core/file.h"
 #include "core/hash.h"
+#include "core/parse_json.h"
 #include "core/store_study_database.h"
 
 namespace evac {
@@ -55,21 +56,26 @@ bool HasTexts(const Json& object, std::initializer_list<const char*> names) {
          });
 }
 
+/// Null for what is no JSON, or no such as we write.
+Json ParsedOrNull(const std::string& text) try {
+  return ParseJson<Json>(text);
+} catch (const Json::exception&) {
+  return Json();
+}
+
 /// As raters, board and labels read it.
 void CheckRubric(const StudyRubric& rubric, const fs::path& folder) {
-  const Json document = Json::parse(rubric.document, nullptr, /*allow_exceptions=*/false);
+  const Json document = ParsedOrNull(rubric.document);
   const bool has_texts = HasTexts(document, {"instruction", "success", "version"});
+  const Json stages = has_texts ? document.value("stages", Json::array()) : Json();
   const auto is_stage = [](const Json& stage) { return HasTexts(stage, {"name", "description"}); };
-  const auto are_stages = [&](const Json& stages) {  // not copied: what copies calls itself at every bracket
-    return stages.is_array() && std::ranges::all_of(stages, is_stage);
-  };
-  if (!has_texts || (document.contains("stages") && !are_stages(document.at("stages"))))
+  if (!stages.is_array() || !std::ranges::all_of(stages, is_stage))
     throw DamagedStudy(folder, fmt::format("the rubric {} of task {} is none", rubric.hash, rubric.task),
                        "JSON: instruction, success, version, stages [{name, description}]");
 }
 
 void CheckViews(const StudyClip& clip, const fs::path& folder) {
-  if (!Json::parse(clip.views, nullptr, /*allow_exceptions=*/false).is_array())
+  if (!ParsedOrNull(clip.views).is_array())
     throw DamagedStudy(folder, fmt::format("the views of clip {} are none", clip.id),
                        "JSON: [{name, x, y, width, height}]");
 }

@@ -7,6 +7,7 @@
 
 #include "core/config.h"
 #include "core/hash.h"
+#include "core/parse_json.h"
 #include "reports/gate_data.h"
 
 namespace evac {
@@ -121,15 +122,11 @@ PinnedCell CellOf(const Field& field) {
   return cell;
 }
 
-/// What writes JSON, for a message or a hash, calls itself at every bracket: none of a million reaches it.
 Json Parsed(const std::string& text, const std::string& file) {
-  constexpr int kMostDeep = 32;
-  const auto is_kept = [&](int depth, Json::parse_event_t, const Json&) {
-    if (depth > kMostDeep) throw InvalidInput("{}: lists and objects lie more than {} deep", file, kMostDeep);
-    return true;
-  };
   try {
-    return Json::parse(text, is_kept);
+    return ParseJson<Json>(text);
+  } catch (const Json::other_error&) {
+    throw InvalidInput("{}: lists and objects lie more than 32 deep", file);
   } catch (const Json::exception& error) {
     throw InvalidInput("{}: found no JSON, wanted a result that `evac gate pin` wrote: {}", file, error.what());
   }

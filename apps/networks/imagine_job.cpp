@@ -1,11 +1,10 @@
 #include "apps/networks/imagine_job.h"
 
-#include <utility>
-
 #include "apps/networks/imagine_output.h"
 #include "core/config.h"
 #include "core/file.h"
 #include "core/hash.h"
+#include "core/parse_json.h"
 #include "core/version.h"
 #include "worldmodel/action_statistics.h"
 #include "worldmodel/nn/library.h"
@@ -94,12 +93,11 @@ void RequireOthersFilesStay(const ImagineArguments& arguments, const ImagineStar
 }
 
 /// The job that a sidecar tells of. @throws InvalidInput if it tells of none
-Json JobIn(const fs::path& path) {
-  Json page = Json::parse(ReadFile(path), nullptr, /*allow_exceptions=*/false);
-  if (!page.is_object() || !page.contains("job") || !page.at("job").is_object())
-    throw InvalidInput("{}: is there, and says of no job of evac imagine; wanted that name free, or another --out",
-                       path.string());
-  return std::move(page.at("job"));
+Json JobIn(const fs::path& path) try {
+  return ParseJson<Json>(ReadFile(path)).at("job").get<Json::object_t>();
+} catch (const Json::exception&) {
+  throw InvalidInput("{}: is there, and says of no job of evac imagine; wanted that name free, or another --out",
+                     path.string());
 }
 
 /// chunk_00000.safetensors, and .partial-4711 of a process that was killed
@@ -165,11 +163,10 @@ Sidecar::Sidecar(const ImagineArguments& arguments, const ImagineStart& start, J
 void Sidecar::Refuse(const Json& job) const {
   std::string differences;
   for (const auto& [name, value] : page_.at("job").items()) {
-    const auto at = job.find(name);
-    if (at != job.end() && *at == value) continue;
-    const bool is_long = value.is_structured() || (at != job.end() && at->is_structured());
-    const std::string there = at == job.end() || is_long ? "null" : at->dump(), here = is_long ? "" : value.dump();
-    differences += is_long || there.size() + here.size() > 60 ? fmt::format("; {} is another", name)
+    const Json found = job.value(name, Json());
+    if (found == value) continue;
+    const std::string there = found.dump(), here = value.dump();
+    differences += there.size() + here.size() > 60 ? fmt::format("; {} is another", name)
                                                    : fmt::format("; {} is {} there, {} here", name, there, here);
   }
   if (differences.empty()) return;

@@ -445,13 +445,16 @@ TEST(StudyTruth, WhatAKillBeforeTheFirstCommitLeftMakesRoomForAStudy) {
 TEST(StudyTruth, ADamagedStudyIsRefusedWithItsFile) {
   const SmallStudy study(1);
   const std::string file = (study.folder() / "study.sqlite").string();
-  const std::pair<const char*, const char*> damages[] = {
+  const std::string deep = "UPDATE rubrics SET document='{\"stages\": " + std::string(100'000, '[') +
+                           std::string(100'000, ']') + "}'";
+  const std::pair<std::string, const char*> damages[] = {
       {"UPDATE study SET seed='many'", "its seed is 'many'"},
       {"UPDATE study SET seed='7 '", "its seed is '7 '"},
       {"UPDATE study SET seed='1'; UPDATE rubrics SET document='{'", "of task take is none"},
       {"UPDATE rubrics SET document='[]'", "of task take is none"},
       {"UPDATE rubrics SET document='{\"version\": 1}'", "of task take is none"},
       {"UPDATE rubrics SET document='{\"stages\": [7]}'", "of task take is none"},
+      {deep, "of task take is none"},
       {"UPDATE rubrics SET document='{}'; DROP TRIGGER clips_hold; UPDATE clips SET views='[{'",
        "the views of clip 1 are none"}};
   for (const auto& [sql, what] : damages) {
@@ -459,10 +462,10 @@ TEST(StudyTruth, ADamagedStudyIsRefusedWithItsFile) {
     try {
       const StudyStore store = StudyStore::Open(study.folder(), StudyStore::Mode::kReadOnly);
       store.info(), store.Rubrics(), store.Clips();
-      ADD_FAILURE() << sql;
+      ADD_FAILURE() << sql.substr(0, 100);
     } catch (const Error& error) {
       EXPECT_EQ(error.exit_code(), ExitCode::kInvalidInput);
-      EXPECT_THAT(error.what(), testing::AllOf(HasSubstr(file + ": the study is damaged"), HasSubstr(what))) << sql;
+      EXPECT_THAT(error.what(), testing::AllOf(HasSubstr(file + ": the study is damaged"), HasSubstr(what))) << sql.substr(0, 100);
     }
   }
 }

@@ -37,6 +37,14 @@ class PolicyProgramsTest : public testing::Test {
     return policy.Act({&asked, 1});
   }
 
+  /// The process that wrote its number into the folder's `pid`.
+  void Kill() const {
+    pid_t pid = 0;
+    std::ifstream(folder_ / "pid") >> pid;
+    ASSERT_GT(pid, 0);
+    ::kill(pid, SIGKILL);
+  }
+
   const TempFolder folder_;
   const LcmAddress address_ =
       LcmAddress::For(fmt::format("{} {}", ::getpid(), testing::UnitTest::GetInstance()->current_test_info()->name()));
@@ -64,10 +72,7 @@ TEST_F(PolicyProgramsTest, APolicyThatIsKilledFailsItsEpisodeAndIsThereForTheNex
   policy.Reset(0, task_, 1);
   ASSERT_TRUE(std::holds_alternative<ActionChunk>(Ask(policy)[0]));
 
-  pid_t pid = 0;
-  std::ifstream(folder_ / "pid") >> pid;
-  ASSERT_GT(pid, 0);
-  ::kill(pid, SIGKILL);
+  ASSERT_NO_FATAL_FAILURE(Kill());
   const auto failed = Ask(policy);
   ASSERT_TRUE(std::holds_alternative<Failure>(failed[0]));
   EXPECT_EQ(std::get<Failure>(failed[0]).stop, StopReason::kPolicyError);
@@ -92,10 +97,7 @@ TEST_F(PolicyProgramsTest, APolicyThatDiedAndIsLoadingAgainIsLeftToLoad) {
   policy.Reset(0, task_, 1);
   ASSERT_TRUE(std::holds_alternative<ActionChunk>(Ask(policy)[0]));
 
-  pid_t pid = 0;
-  std::ifstream(folder_ / "pid") >> pid;
-  ASSERT_GT(pid, 0);
-  ::kill(pid, SIGKILL);
+  ASSERT_NO_FATAL_FAILURE(Kill());
   const auto failed = Ask(policy);
   ASSERT_TRUE(std::holds_alternative<Failure>(failed[0]));
   EXPECT_EQ(std::get<Failure>(failed[0]).stop, StopReason::kPolicyTimeout);
