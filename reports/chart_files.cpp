@@ -24,15 +24,18 @@ std::string Slug(const std::string& text) {
 /// Names that would be the same get a number: "a/b" and "a b" are both "a_b".
 class Files {
  public:
+  /// @param note  the last line above every chart; may be empty
+  explicit Files(const std::string& note = "") : note_(note.empty() ? "" : "\n" + note) {}
   void Add(const std::string& name, const Drawing& drawing, const std::string& title) {
     const std::string slug = Slug(name);
     std::string unique = slug;
     for (int number = 2; !taken_.insert(unique).second; ++number) unique = fmt::format("{}-{}", slug, number);
-    files_.push_back({unique, AsSvgFile(drawing, title)});
+    files_.push_back({unique, AsSvgFile(drawing, title + note_)});
   }
   std::vector<ChartFile> Take() { return std::move(files_); }
 
  private:
+  std::string note_;
   std::set<std::string> taken_;
   std::vector<ChartFile> files_;
 };
@@ -55,7 +58,7 @@ std::string Key(const std::vector<std::string>& worlds) {
   return key;
 }
 
-void AddRates(const RunSummary& summary, const std::string& judge, Files& files) {
+void AddRates(const RunSummary& summary, Files& files) {
   for (const Task& task : summary.data.tasks) {
     RowChart chart;
     chart.words = fmt::format("Success rates on {}, percent.", task.id);
@@ -69,12 +72,11 @@ void AddRates(const RunSummary& summary, const std::string& judge, Files& files)
                               cell.rate, WorldIndex(summary, cell.world), false});
       }
     }
-    if (!chart.rows.empty())
-      files.Add("rates-" + task.id, RowsDrawing(chart), "Success rate at " + task.id + ", %\n" + judge);
+    if (!chart.rows.empty()) files.Add("rates-" + task.id, RowsDrawing(chart), "Success rate at " + task.id + ", %");
   }
 }
 
-void AddTrust(const ReportData& report, const std::string& judge, Files& files) {
+void AddTrust(const ReportData& report, Files& files) {
   for (const TrustReport& trust : report.trust) {
     RowChart chart;
     chart.words = fmt::format("Success rate in {} minus the real one, in points.", trust.world);
@@ -87,19 +89,19 @@ void AddTrust(const ReportData& report, const std::string& judge, Files& files) 
                             fmt::format("{}, n = {}", PointsWithInterval(task.bias), task.pairs.n()), task.bias,
                             WorldIndex(report.summary, trust.world), false});
     }
-    files.Add("trust-" + trust.world, RowsDrawing(chart), fmt::format("Bias of {}, points\n{}", trust.world, judge));
+    files.Add("trust-" + trust.world, RowsDrawing(chart), fmt::format("Bias of {}, points", trust.world));
   }
 }
 
-void AddComparisons(const RunSummary& summary, const std::string& judge, Files& files) {
+void AddComparisons(const RunSummary& summary, Files& files) {
   for (const WorldComparison& comparison : summary.comparisons) {
     if (comparison.points.empty()) continue;
     files.Add("worlds-" + comparison.other, ScatterDrawing(comparison, StylesOf(summary, comparison)),
-              fmt::format("{} against {}\n{}", comparison.other, comparison.real, judge));
+              fmt::format("{} against {}", comparison.other, comparison.real));
   }
 }
 
-void AddStates(const RunSummary& summary, const std::string& judge, Files& files) {
+void AddStates(const RunSummary& summary, Files& files) {
   for (const WorldComparison& comparison : summary.comparisons) {
     for (const PairTable& table : comparison.tables) {
       std::vector<StateOutcomes> states;
@@ -113,25 +115,25 @@ void AddStates(const RunSummary& summary, const std::string& judge, Files& files
           comparison.real, table.other_only, comparison.other, table.both_fail);
       files.Add(fmt::format("states-{}-{}-{}", comparison.other, table.task, table.policy),
                 StatesDrawing(states, words),
-                fmt::format("{}, {}, {}\nupper half {}, lower half {}; filled: success; a bar below marks a flip",
-                            table.policy, table.task, judge, comparison.real, comparison.other));
+                fmt::format("{}, {}\nupper half {}, lower half {}; filled: success; a bar below marks a flip",
+                            table.policy, table.task, comparison.real, comparison.other));
     }
   }
 }
 
-void AddStages(const StageReport& stages, const std::string& judge, Files& files) {
+void AddStages(const StageReport& stages, Files& files) {
   for (const StageFunnel& funnel : stages.funnels) {
     std::vector<std::string> worlds;
     for (const StageRow& row : funnel.worlds) worlds.push_back(row.world);
     files.Add(fmt::format("stages-{}-{}", funnel.task, funnel.policy), StageDrawing(funnel),
-              fmt::format("{}, {}\nreached, %: {}; {}", funnel.policy, funnel.task, Key(worlds), judge));
+              fmt::format("{}, {}\nreached, %: {}", funnel.policy, funnel.task, Key(worlds)));
   }
 }
 
-void AddCheckpoints(const std::vector<CheckpointCurve>& curves, const std::string& judge, Files& files) {
+void AddCheckpoints(const std::vector<CheckpointCurve>& curves, Files& files) {
   for (const CheckpointCurve& curve : curves) {
     files.Add(fmt::format("checkpoints-{}-{}", curve.policy, curve.task), CheckpointDrawing(curve),
-              fmt::format("{}, {}\nsuccess, %: {}; {}", curve.policy, curve.task, Key(curve.worlds), judge));
+              fmt::format("{}, {}\nsuccess, %: {}", curve.policy, curve.task, Key(curve.worlds)));
   }
 }
 
@@ -150,14 +152,13 @@ bool IsChartFile(const std::string& name, const std::string& svg) {
 }
 
 std::vector<ChartFile> ChartFilesOf(const ReportData& report) {
-  Files files;
-  const std::string judge = "judge " + JudgeWords(report.summary.options.judge);
-  AddRates(report.summary, judge, files);
-  AddTrust(report, judge, files);
-  AddComparisons(report.summary, judge, files);
-  AddStates(report.summary, judge, files);
-  AddStages(report.stages, judge, files);
-  AddCheckpoints(report.checkpoints, judge, files);
+  Files files("judge " + JudgeWords(report.summary.options.judge));
+  AddRates(report.summary, files);
+  AddTrust(report, files);
+  AddComparisons(report.summary, files);
+  AddStates(report.summary, files);
+  AddStages(report.stages, files);
+  AddCheckpoints(report.checkpoints, files);
   return files.Take();
 }
 

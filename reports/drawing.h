@@ -15,8 +15,8 @@ struct Drawing {
 /// `<svg class="chart …" viewBox=…>`, for a page that has page/charts.css: as wide as its place.
 std::string InPage(const Drawing& drawing, std::string_view classes = "");
 
-/// A file of its own: white ground, title above (a second line, after '\n', smaller below it), the light colours
-/// written out, no variables, so that every program that reads SVG draws it alike.
+/// A file of its own: white ground, title above (further lines, after '\n', smaller below it; the picture is wide enough
+/// for them), the light colours written out, no variables, so that every program that reads SVG draws it alike.
 std::string AsSvgFile(const Drawing& drawing, const std::string& title);
 
 /// Whether AsSvgFile wrote it.

@@ -37,6 +37,24 @@ TEST(ChartFiles, NeedNothingFromOutside) {
   }
 }
 
+/// The judge's name ran out of the picture in three kinds of charts.
+TEST(ChartFiles, WhatStandsAboveAChartEndsBeforeItsRightMargin) {
+  ReportData report = ReportDataOf(LargeRun().Summary());
+  for (const char* judge : {"oracle", "classifier:0123456789ab",
+                            "vlm:some-model-of-a-server-whose-name-is-long-72b-0123456789ab:small"}) {
+    report.summary.options.judge = judge;
+    for (const ChartFile& chart : ChartFilesOf(report)) {
+      EXPECT_THAT(chart.svg, HasSubstr(">judge " + std::string(judge) + "</text>")) << chart.name << ": on a line of its own";
+      const std::string png = PngOf(chart.svg, 1);
+      const cv::Mat grey = cv::imdecode(cv::Mat(1, static_cast<int>(png.size()), CV_8U, const_cast<char*>(png.data())),
+                                        cv::IMREAD_GRAYSCALE);
+      double darkest = 0;
+      cv::minMaxLoc(grey.colRange(grey.cols - 4, grey.cols), &darkest, nullptr);
+      EXPECT_EQ(darkest, 255) << chart.name << ", " << judge;
+    }
+  }
+}
+
 TEST(ChartFiles, HostileNamesAreLettersAndStayApart) {
   const SampleRun run({{"a b", "<pick>", "1", "s", "s"}, {"a_b", "<pick>", "1", "s", "f"}});
   std::set<std::string> names;
