@@ -89,7 +89,7 @@ void AddCorrelate(CLI::App& app, ExitCode& exit_code) {
   command->add_option("--world", options.world, "compare only this world with the real one")->type_name("NAME");
   command->add_option("--seed", options.correlation.bootstrap.seed, "of the bootstrap")->capture_default_str();
   command->add_flag("--json", arguments->json, "for programs: docs/formats/correlation_json.md");
-  pairs->excludes("--judge", "--world");  // a table has no verdicts, and two columns are its worlds
+  pairs->excludes("--judge", "--world", "--seed");  // a table has neither verdicts nor states, and its worlds are columns
   command->footer(
       "Examples:\n"
       "  evac correlate out/demo\n"

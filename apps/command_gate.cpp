@@ -44,19 +44,23 @@ PinnedResult PinRun(const std::string& run, const std::string& judge) {
 }
 
 /// A baseline in which nothing succeeded or failed would be found out by the first candidate, long after.
-void DemandOutcomes(const PinnedResult& pinned, const std::string& run, const std::string& judge) {
+/// @param field  where the judge is said
+void DemandOutcomes(const PinnedResult& pinned, const std::string& run, const std::string& judge,
+                    const std::string& field) {
   for (const PinnedCell& cell : pinned.cells) {
     if (std::ranges::any_of(cell.outcomes, &PinnedOutcome::Counts)) return;
   }
-  throw InvalidInput("{}: judge {}: found no episode that succeeded or failed, wanted a judge of this run (evac ls)",
-                     run, judge);
+  throw InvalidInput(
+      "{}: judge {}: found no episode that succeeded or failed, wanted a judge of this run (evac ls) as {}", run, judge,
+      field);
 }
 
 std::optional<PinnedResult> BaselineOf(const GateArguments& arguments, const GateRules& rules) {
   if (arguments.baseline.empty()) return std::nullopt;
   if (!fs::is_directory(arguments.baseline)) return ReadPinned(ReadFile(arguments.baseline), arguments.baseline);
   PinnedResult pinned = PinRun(arguments.baseline, rules.judge);
-  if (std::ranges::any_of(rules.rules, &GateRule::Compares)) DemandOutcomes(pinned, arguments.baseline, rules.judge);
+  if (std::ranges::any_of(rules.rules, &GateRule::Compares))
+    DemandOutcomes(pinned, arguments.baseline, rules.judge, "the field judge of " + arguments.rules);
   return pinned;
 }
 
@@ -165,7 +169,7 @@ void AddPin(CLI::App& gate, ExitCode& exit_code) {
   command->callback([arguments, &exit_code] {
     RefuseFolder(arguments->out);
     const PinnedResult pinned = PinRun(arguments->run, arguments->judge);
-    DemandOutcomes(pinned, arguments->run, arguments->judge);
+    DemandOutcomes(pinned, arguments->run, arguments->judge, "--judge");
     MakeFolders(fs::path(arguments->out).parent_path());
     WriteFileAtomically(arguments->out, PinnedJson(pinned));
     fmt::print("{}\n", pinned.sha256);

@@ -35,6 +35,12 @@ KnownNames NamesOf(const Store& store, bool new_states_too) {
   return known;
 }
 
+/// Two days' trials.csv are two files: each trial is kept with the path of its own, wherever its reader stood.
+void KeepPath(const fs::path& file, std::vector<RealTrial>& trials) {
+  const std::string path = fs::weakly_canonical(file).string();
+  for (RealTrial& trial : trials) trial.source = path + trial.source.substr(trial.source.rfind(':'));
+}
+
 /// The trials with their videos where the CSV says they are; complains of the first that is not there.
 std::vector<fs::path> VideosOf(const std::vector<RealTrial>& trials, const fs::path& beside) {
   std::vector<fs::path> videos;
@@ -61,9 +67,10 @@ std::string KeepVideo(const fs::path& video, const fs::path& run) {
 void Import(const ImportArguments& arguments) {
   Store store = Store::Open(arguments.run, Store::Mode::kReadWrite);
   const fs::path file = arguments.file;
-  const RealTrialsCsv csv =
+  RealTrialsCsv csv =
       ReadRealTrialsCsv(ReadFile(file), file.filename().string(), NamesOf(store, arguments.new_states));
   for (const std::string& warning : csv.warnings) fmt::print(stderr, "evac: warning: {}\n", warning);
+  KeepPath(file, csv.trials);
   std::vector<RealTrial> added = NewTrials(csv.trials, store.RealTrials(), csv.counted);
   const std::vector<fs::path> videos = VideosOf(added, file.parent_path());
   std::set<std::tuple<std::string, std::string>> states;

@@ -100,8 +100,7 @@ void New(RateArguments& arguments) {
 void Invite(const RateArguments& arguments) {
   StudyStore store = StudyStore::Open(arguments.study, StudyStore::Mode::kReadWrite);
   const RaterRole role = RaterRoleFromName(arguments.role);
-  std::string url = arguments.url.empty() ? fmt::format("http://127.0.0.1:{}", kPort) : arguments.url;
-  if (!url.ends_with('/')) url += '/';
+  const std::string url = arguments.url.empty() ? fmt::format("http://127.0.0.1:{}", kPort) : PublicUrl(arguments.url);
   store.Begin();
   std::vector<std::string> secrets;
   for (int i = 0; i < arguments.count; ++i) {
@@ -109,7 +108,7 @@ void Invite(const RateArguments& arguments) {
     store.AddInvite(secrets.back(), role, Now_ms());
   }
   store.Commit();
-  for (const std::string& secret : secrets) fmt::print("{}r/{}\n", url, secret);
+  for (const std::string& secret : secrets) fmt::print("{}/r/{}\n", url, secret);
 }
 
 /// Until somebody interrupts.
@@ -144,9 +143,12 @@ void Export(const RateArguments& arguments) {
 
 void Import(const RateArguments& arguments) {
   StudyStore store = StudyStore::Open(arguments.study, StudyStore::Mode::kReadWrite);
-  const auto verdicts = ReadRatingCsv(ReadFile(arguments.file), arguments.file, store.Clips());
+  const std::vector<StudyClip> clips = store.Clips();
+  const auto verdicts = ReadRatingCsv(ReadFile(arguments.file), arguments.file, clips);
   const int added = ImportVerdicts(store, verdicts, arguments.file, Now_ms(), kProgram);
   fmt::print("{}: {} verdicts, {} new\n", arguments.file, verdicts.size(), added);
+  const std::int64_t uncounted = UncountedIn(verdicts, clips);
+  if (uncounted > 0) fmt::print("note: {} of them are of examples and practice clips: no rate counts them\n", uncounted);
 }
 
 void Resolve(const RateArguments& arguments) {
@@ -172,7 +174,9 @@ void AddNew(CLI::App& rate, const std::shared_ptr<RateArguments>& shared, ExitCo
   RateArguments& a = *shared;
   CLI::App* command =
       Sub(rate, shared, exit_code, "new", "Freeze the clips of runs into a study, or add a wave to one", New);
-  command->add_option("--run", a.make.runs, "folders of runs; real and other worlds side by side")->required();
+  command->add_option("--run", a.make.runs, "folder of a run, repeatable; real and other worlds side by side")
+      ->required()
+      ->allow_extra_args(false);
   command->add_option("--raters", a.raters, "votes per clip; of a study that is there, as many as it began with")
       ->default_str(std::to_string(a.make.raters_per_clip));
   command->add_option("--seed", a.make.seed, "of every rater's order")->capture_default_str();

@@ -63,9 +63,11 @@ std::string ForShell(const std::string& word) {
 std::string ResumeCommand(const std::string& run) { return "evac resume " + ForShell(run); }
 
 /// What goes on with the run as it goes now. `evac resume` goes by the suite as the run began with it: a deadline that was
-/// changed since, which the hash leaves out, would be the old one again.
+/// changed since, which the hash leaves out, would be the old one again, and what the suite names would be looked for
+/// where it lay.
 std::string CommandAgain(const RunArguments& arguments, const Suite& suite, const Store& store) {
-  if (store.run().suite_text == suite.text) return ResumeCommand(arguments.out);
+  const RunInfo began = store.run(), now = InfoOf(suite);
+  if (began.suite_text == now.suite_text && began.suite_path == now.suite_path) return ResumeCommand(arguments.out);
   std::string command = fmt::format("evac run {} --out {}", ForShell(arguments.suite), ForShell(arguments.out));
   for (const std::string& assignment : arguments.assignments) command += " --set " + ForShell(assignment);
   return command;
@@ -112,7 +114,7 @@ void AddRun(CLI::App& app, ExitCode& exit_code) {
   CLI::App* command = app.add_subcommand("run", "Evaluate the policies of a suite in its worlds");
   command->add_option("suite", arguments->suite, "the suite's YAML file (docs/suite.md)")->required();
   command->add_option("-o,--out", arguments->out, "the run's folder; one that is there is continued")->required();
-  command->add_option("--set", arguments->assignments, "override a field: path.to.field=VALUE (repeatable)")->expected(1)->take_all();
+  command->add_option("--set", arguments->assignments, "override a field: path.to.field=VALUE (repeatable)")->expected(1)->take_all()->allow_extra_args(false);
   command->add_flag("--retry-failed", arguments->retry_failed, "run the failed episodes of a run that is there again");
   command->add_option("--shard", arguments->shard, "run only part I of N of the episodes: I/N (join the parts with evac merge)");
   command->footer("Examples:\n"

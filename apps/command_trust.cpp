@@ -1,5 +1,7 @@
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
+#include <algorithm>
 #include <cstdio>
 #include <memory>
 #include <string>
@@ -7,6 +9,7 @@
 
 #include "apps/commands.h"
 #include "core/store.h"
+#include "reports/counted_judges.h"
 #include "reports/trust_worlds.h"
 
 namespace evac {
@@ -28,12 +31,21 @@ std::vector<std::string> ModelWorlds(const RunSummary& summary, const std::strin
   return worlds;
 }
 
+/// More episodes would not help whoever asks for a judge that the run has not. Of one that nobody judged yet they might.
+void DemandVerdicts(const RunSummary& summary, const TrustArguments& arguments) {
+  const auto counts = [&](const std::string& judge) { return IsCounted(judge, summary.options.judge); };
+  if (summary.judges.empty() || std::ranges::any_of(summary.judges, counts)) return;
+  throw InvalidInput("--judge: found '{}', wanted one who has judged {}: {}", arguments.judge, arguments.run,
+                     fmt::join(summary.judges, ", "));
+}
+
 void PrintTrust(const TrustArguments& arguments) {
   const Store store = Store::Open(arguments.run, Store::Mode::kReadOnly);
   SummaryOptions options;
   options.judge = arguments.judge;
   options.bootstrap_replicates = 1;  // its correlations are not shown
   const RunSummary summary = Summarise(ReadRun(store), options);
+  DemandVerdicts(summary, arguments);
   const WorldsTrust trust = TrustOfWorlds(summary, ModelWorlds(summary, arguments.world), arguments.options);
   if (trust.worlds.empty()) throw InvalidInput("trust: {}", WhyNothingIsSaid(trust.unsaid));
   if (arguments.json)

@@ -56,7 +56,7 @@ void AddValidate(CLI::App& app, ExitCode& exit_code) {
   auto arguments = std::make_shared<ValidateArguments>();
   CLI::App* command = app.add_subcommand("validate", "Check a suite and everything it names, without running it");
   command->add_option("suite", arguments->suite, "the suite's YAML file (docs/suite.md)")->required();
-  command->add_option("--set", arguments->assignments, "override a field: path.to.field=VALUE (repeatable)")->expected(1)->take_all();
+  command->add_option("--set", arguments->assignments, "override a field: path.to.field=VALUE (repeatable)")->expected(1)->take_all()->allow_extra_args(false);
   command->footer("Example:\n  evac validate apps/configs/demo.yaml --set initial_states.count=5");
   command->callback([arguments, &exit_code] { exit_code = Validate(*arguments); });
 }

@@ -131,6 +131,7 @@ class Evaluation {
       RunningPolicy policy(suite_policy, suite_, store_.folder(), IsInterrupted);
       store_.AddPolicy({suite_policy.name, suite_policy.checkpoint, policy.declaration()});
       Probe(policy, *world, suite_world, suite_policy);
+      EndIfInterrupted();  // a probe that was broken off says nothing, and failed rows go for what runs again
       MakeRoom(to_run);
       JobQueue jobs(to_run);
       const Summary summary = RunEpisodes(policy.policy(), *world, jobs, store_, Options(suite_world, policy));
@@ -232,7 +233,7 @@ class Evaluation {
     }
   }
 
-  RolloutOptions Options(const SuiteWorld& world, const RunningPolicy& policy) {
+  RolloutOptions Options(const SuiteWorld& world, RunningPolicy& policy) {
     RolloutOptions options;
     options.lanes = suite_.lanes;
     options.lane = {.chunk_size = suite_.chunk_size,
@@ -244,6 +245,7 @@ class Evaluation {
     options.failures_left = plan_.allowed - plan_.failed;
     options.on_progress = [this](const Progress& progress) { display_.Show(progress, ProgressDisplay::Clock::now()); };
     options.interrupted = IsInterrupted;
+    options.check_policy = [&policy] { policy.CheckFiles(); };
     return options;
   }
 

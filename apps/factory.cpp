@@ -161,7 +161,8 @@ std::vector<std::string> CommandLine(const SuitePolicy& policy, const Suite& sui
   return words;
 }
 
-RunningPolicy::RunningPolicy(const SuitePolicy& policy, const Suite& suite, const fs::path& run_folder, std::function<bool()> interrupted) {
+RunningPolicy::RunningPolicy(const SuitePolicy& policy, const Suite& suite, const fs::path& run_folder, std::function<bool()> interrupted)
+    : entry_(policy), suite_(suite) {
   LcmPolicyOptions options;
   options.interrupted = std::move(interrupted);
   options.deadline_s = suite.transport.deadline_s;
@@ -184,6 +185,13 @@ RunningPolicy::RunningPolicy(const SuitePolicy& policy, const Suite& suite, cons
   spec_ = link_->Handshake(HarnessSpec(suite.tasks.front(), suite.chunk_size), suite.transport.start_s);
   CheckAllTasks(suite, spec_);
   CheckInstruction(suite, spec_);
+  CheckFiles();
+}
+
+void RunningPolicy::CheckFiles() {
+  if (checked_ == link_->declared()) return;
+  checked_ = link_->declared();
+  DemandUnchanged(suite_, entry_);  // what is stored bears the suite's hash
 }
 
 Counters RunningPolicy::counters() const {

@@ -40,13 +40,13 @@ std::unique_ptr<World> MakeWorld(const SuiteWorld& world, const Suite& suite, co
 /// @throws InvalidInput if the program is not there; for `${recording}` where there are several.
 std::vector<std::string> CommandLine(const SuitePolicy& policy, const Suite& suite);
 
-/// A policy's process, if it is ours to start, and the link to it; both gone with this.
+/// A policy's process, if it is ours to start, and the link to it; both gone with this, and before `policy` and `suite`.
 class RunningPolicy {
  public:
   /// Starts and greets it. @param interrupted  asked while waiting for it.
   /// @throws InvalidInput with both declarations if it does not fit the suite's tasks; naming the suite's field if it
   /// needs an instruction and the suite says none of its recordings; naming it, and the log of one that was started, if
-  /// it does not answer.
+  /// it does not answer; naming a file of its that is another than when the suite was read (DemandUnchanged).
   RunningPolicy(const SuitePolicy& policy, const Suite& suite, const std::filesystem::path& run_folder,
                 std::function<bool()> interrupted);
 
@@ -55,10 +55,16 @@ class RunningPolicy {
   std::string declaration() const { return ToJson(spec_); }
   Counters counters() const;
 
+  /// After its answers: one that was started again has read its files again. @throws InvalidInput as DemandUnchanged
+  void CheckFiles();
+
  private:
+  const SuitePolicy& entry_;
+  const Suite& suite_;
   std::optional<PolicyProcess> process_;
   std::optional<LcmPolicy> link_;  ///< gone before the process
   PolicySpec spec_;
+  int checked_ = 0;  ///< how many processes had declared themselves when its files were last looked at
 };
 
 }  // namespace evac

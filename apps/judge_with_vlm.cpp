@@ -104,6 +104,18 @@ std::string Greet(const VlmConfig& config, VlmClient& client, CallCache& cache, 
   throw;
 }
 
+/// What this judge's questions about the run cost before, its probes' among them.
+VlmSpent SpentBefore(const std::vector<CallTotals>& totals, const std::string& judge) {
+  VlmSpent spent;
+  for (const CallTotals& of : totals) {
+    if (of.judge != judge && !of.judge.starts_with(judge + ":")) continue;
+    spent.requests += of.attempts;
+    spent.prompt_tokens += of.prompt_tokens;
+    spent.completion_tokens += of.completion_tokens;
+  }
+  return spent;
+}
+
 /// Beside the counting, for who looks on; a log would be full of it.
 void ShowVerdict(const Verdict& verdict) {
   if (::isatty(STDERR_FILENO))
@@ -122,10 +134,12 @@ ExitCode JudgeWithVlm(const VlmJudgeArguments& arguments) {
   }
   if (arguments.dry_run) return SayWhatItWouldCost(config, store, arguments);
   const CatchInterrupts catch_interrupts;
+  const VlmSpent before = SpentBefore(TotalsOfCalls(store.folder()), config.JudgeName());
   CallCache cache(store.folder() / CallCache::kFile);
   VlmClient client(ClientOptions(config, arguments.offline));
   VlmJudgeOptions options{.run_folder = store.folder(), .offline = arguments.offline, .now = Now};
   options.fingerprint = Greet(config, client, cache, arguments.offline);
+  client.CountEarlier(before);  // where all is judged, a spent budget is none of anybody's concern
   for (const VlmProbe probe : {VlmProbe::kNone, VlmProbe::kFlip, VlmProbe::kRetest}) {
     if (probe == VlmProbe::kRetest && !arguments.retest) continue;
     options.probe = probe;
@@ -141,11 +155,15 @@ ExitCode JudgeWithVlm(const VlmJudgeArguments& arguments) {
     const JudgeSummary summary = JudgeEpisodes(judge, store, how);
     fmt::print("{}: {}\n", judge.Name(), Sentence(summary));
     if (!summary.why_over.empty())
-      throw InternalError("{}\n      what was judged is stored; the same command goes on from there", summary.why_over);
+      throw InternalError("{}\n      what was judged is stored; the same command{} goes on from there", summary.why_over,
+                          summary.why_over.starts_with(kBudgetIsSpent) ? " with a larger budget" : "");
   }
   const VlmSpent spent = client.spent();
-  fmt::print("{} requests, {} prompt and {} completion tokens\n", spent.requests, spent.prompt_tokens,
+  fmt::print("{} requests, {} prompt and {} completion tokens", spent.requests, spent.prompt_tokens,
              spent.completion_tokens);
+  if (before.requests > 0)
+    fmt::print("; before {}, {} and {}", before.requests, before.prompt_tokens, before.completion_tokens);
+  fmt::print("\n");
   return ExitCode::kOk;
 }
 

@@ -15,8 +15,10 @@ struct VlmJudgeArguments {
 };
 
 /// `evac judge RUN --judge vlm --config PAGE`. The first Ctrl-C ends it in order: nothing more is sent.
-/// @throws InternalError if it was interrupted or the server gave out before the last episode: what was judged is
-/// stored, the same command goes on from there. InvalidInput for what is found before the first episode.
+/// The page's budget is for all calls about this run by a judge of that name, as judge_calls.sqlite has them.
+/// @throws InternalError if it was interrupted, the budget is spent, or the server gave out before the last episode:
+/// what was judged is stored, the same command goes on from there. InvalidInput for what is found before the first
+/// episode.
 ExitCode JudgeWithVlm(const VlmJudgeArguments& arguments);
 
 }  // namespace evac

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <nlohmann/json.hpp>
+#include <set>
 
 #include "judges/rating_board.h"
 #include "reports/text_table.h"
@@ -29,6 +30,13 @@ std::string Decimal(const Json& number) {
 std::string Dropped(const Json& agreement) {
   const auto dropped = agreement.at("dropped_replicates").get<std::int64_t>();
   return dropped > 0 ? fmt::format(" ({} without any spread dropped)", Counted(dropped, "replicate")) : "";
+}
+
+/// Each once, however many raters could not play it.
+std::size_t UnplayableClips(const Json& board) {
+  std::set<std::int64_t> clips;
+  for (const Json& one : board.at("unplayable")) clips.insert(one.at("clip").get<std::int64_t>());
+  return clips.size();
 }
 
 void PrintRaters(const Json& board) {
@@ -60,7 +68,7 @@ void PrintRatingStatus(const StudyStore& store, std::int64_t now_ms, bool as_jso
   fmt::print("{}: {} of {} clips have {} votes; {} votes, {} missing; {} disputes, {} unplayable\n",
              board.at("study").get<std::string>(), progress.at("complete").get<int>(), progress.at("clips").get<int>(),
              board.at("raters_per_clip").get<int>(), progress.at("votes").get<int>(), progress.at("missing").get<int>(),
-             board.at("disputes").size(), board.at("unplayable").size());
+             board.at("disputes").size(), UnplayableClips(board));
   const Json& all = board.at("all");
   fmt::print("success: majority {} of {} decided clips; soft {}, unanimous {}, Dawid-Skene {}; undecided {}: {} … {}\n",
              Percent(all.at("majority")), all.at("decided").get<int>(), Percent(all.at("soft")),

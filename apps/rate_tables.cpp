@@ -76,13 +76,23 @@ class Sheet {
     return found == column_.end() || found->second >= row.cells.size() ? "" : Trimmed(row.cells[found->second]);
   }
 
+  /// Whether the cell names the clip's run, as somebody wrote it who need not know how the study calls it.
+  bool IsOf(const StudyClip& clip, const std::string& run) {
+    return clip.run == run || Form(clip.run) == Form(run);
+  }
+  const std::string& Form(const std::string& run) {
+    const auto [form, is_new] = forms_.try_emplace(run);
+    if (is_new) form->second = OneFormOf(run).string();
+    return form->second;
+  }
+
   /// @returns what is wrong, or "".
   std::string Fill(const CsvRow& row, ImportedVerdict& verdict) {
     const std::string episode(Cell(row, "episode")), run(Cell(row, "run"));
     const auto found = by_episode_.find(episode);
     if (found == by_episode_.end()) return fmt::format("episode: {} is not in the study", Quoted(episode));
     std::vector<const StudyClip*> clips = found->second;
-    if (!run.empty()) std::erase_if(clips, [&run](const StudyClip* clip) { return clip->run != run; });
+    if (!run.empty()) std::erase_if(clips, [&](const StudyClip* clip) { return !IsOf(*clip, run); });
     if (clips.empty()) return fmt::format("run: {} has no clip {}", Quoted(run), Quoted(episode));
     if (clips.size() > 1)
       return fmt::format("episode: {} is in {} runs of the study, wanted a column run", Quoted(episode), clips.size());
@@ -101,6 +111,7 @@ class Sheet {
   const std::string& file_;
   std::map<std::string, std::vector<const StudyClip*>> by_episode_;
   std::map<std::string, std::size_t> column_;
+  std::map<std::string, std::string> forms_;  ///< OneFormOf runs
   std::map<std::pair<std::string, std::int64_t>, int> first_line_;
   std::vector<ImportedVerdict> verdicts_;
   std::vector<std::string> problems_;
@@ -183,6 +194,14 @@ std::vector<ImportedVerdict> ReadRatingCsv(std::string_view text, const std::str
   sheet.ReadHeader(*header);
   while (const std::optional<CsvRow> row = reader.Next()) sheet.ReadRow(*row);
   return sheet.Done();
+}
+
+std::int64_t UncountedIn(const std::vector<ImportedVerdict>& verdicts, const std::vector<StudyClip>& clips) {
+  std::set<std::int64_t> uncounted;
+  for (const StudyClip& clip : clips) {
+    if (clip.use == Showing::kExample || clip.use == Showing::kPractice) uncounted.insert(clip.id);
+  }
+  return std::ranges::count_if(verdicts, [&](const ImportedVerdict& one) { return uncounted.contains(one.clip); });
 }
 
 int ImportVerdicts(StudyStore& store, const std::vector<ImportedVerdict>& verdicts, const std::string& file,

@@ -32,6 +32,9 @@ struct ImportedVerdict {
 std::vector<ImportedVerdict> ReadRatingCsv(std::string_view text, const std::string& file,
                                            const std::vector<StudyClip>& clips);
 
+/// How many of them are of examples and practice clips: they are kept, and no rate counts them.
+std::int64_t UncountedIn(const std::vector<ImportedVerdict>& verdicts, const std::vector<StudyClip>& clips);
+
 /// Adds them, all or none, as verdicts of raters of those names. A verdict that is there already is left alone.
 /// @returns how many are new. @throws InvalidInput if one is there with another label.
 int ImportVerdicts(StudyStore& store, const std::vector<ImportedVerdict>& verdicts, const std::string& file,

@@ -6,12 +6,15 @@
 #include <cmath>
 #include <cstdio>
 #include <filesystem>
+#include <string_view>
 
 #include "apps/network_parts.h"
 #include "core/collection.h"
 #include "core/error.h"
+#include "core/geometry.h"
 #include "core/recording_folders.h"
 #include "core/seed.h"
+#include "harness/suite_hash.h"
 
 namespace evac {
 namespace {
@@ -21,7 +24,9 @@ namespace fs = std::filesystem;
 constexpr std::size_t kMostSaid = 5;
 
 Recording ReadAt(const Suite& suite, const fs::path& folder) {
-  return HasNetwork(suite) ? ReadAsTrained(suite, folder) : ReadRecording(folder);
+  Recording recording = HasNetwork(suite) ? ReadAsTrained(suite, folder) : ReadRecording(folder);
+  DemandRecordingUnchanged(suite, folder);  // what is stored bears the suite's hash
+  return recording;
 }
 
 Task TaskOf(const Suite& suite, const Recording& recording) {
@@ -46,15 +51,31 @@ void FillInOne(Suite& suite) {
   suite.recordings = {{"recording", *suite.recording}};
 }
 
-/// Why the recording cannot begin episodes of the task; empty: it can.
-std::string WhatDiffers(const Recording& recording, const Task& task) {
-  if (recording.arm_names != task.arms) return "other arms";
+/// Why a camera of the recording is not the one that policies are told of, which is the first's; empty: it is. A camera
+/// on a gripper is compared as it sits there: where the hand begins does not matter.
+std::string WhatDiffers(const Camera& camera, const Camera& told, const std::string& first) {
+  const double right = (camera.cx_px - told.cx_px) / told.width_px, down = (camera.cy_px - told.cy_px) / told.height_px;
+  if (std::max(std::abs(right), std::abs(down)) > kSameFocal)
+    return fmt::format("has its principal point {:.3f} picture widths and {:.3f} heights from where it was in {}",
+                       std::abs(right), std::abs(down), first);
+  return CalibrationDifference(told, camera, "in " + first);
+}
+
+/// Why the recording cannot begin episodes of the task, which is of the recording `first`; empty: it can.
+std::string WhatDiffers(const Recording& recording, const Task& task, const std::string& first) {
+  if (recording.arm_names != task.arms) return "other arms than those of " + first;
   if (std::abs(recording.period_s - task.period_s) > 1e-9)
-    return fmt::format("steps of {:.4g} s, not {:.4g} s", recording.period_s, task.period_s);
+    return fmt::format("steps of {:.4g} s, not {:.4g} s as those of {}", recording.period_s, task.period_s, first);
   const auto same = [](const Camera& a, const Camera& b) {
     return a.name == b.name && a.width_px == b.width_px && a.height_px == b.height_px;
   };
-  return std::ranges::equal(recording.cameras, task.cameras, same) ? "" : "other cameras, or of another size";
+  if (!std::ranges::equal(recording.cameras, task.cameras, same))
+    return "other cameras than those of " + first + ", or of another size";
+  for (std::size_t i = 0; i < task.cameras.size(); ++i) {
+    if (const std::string why = WhatDiffers(recording.cameras[i], task.cameras[i], first); !why.empty())
+      return fmt::format("camera {} {}, whose calibration policies are told", task.cameras[i].name, why);
+  }
+  return "";
 }
 
 /// Takes recording after recording into the suite.
@@ -70,7 +91,7 @@ class RecordedStates {
     try {
       Add(folder, row, ReadAt(suite_, folder));
     } catch (const Error& error) {
-      if (error.exit_code() != ExitCode::kInvalidInput) throw;
+      if (error.exit_code() != ExitCode::kInvalidInput || std::string_view(error.kind()) == kChangedError) throw;
       left_out_.push_back(error.what());
     }
   }
@@ -102,8 +123,9 @@ class RecordedStates {
         suite_.tasks.front().instruction = fmt::format("Do what was recorded in {}.", task_);
     }
     Task& task = suite_.tasks.front();
-    if (const std::string why = WhatDiffers(recording, task); !why.empty())
-      throw InvalidInput("{}: {} than those of {}", recording.source, why, suite_.initial_states.front().id);
+    const std::string first = suite_.initial_states.empty() ? recording.id : suite_.initial_states.front().id;
+    if (const std::string why = WhatDiffers(recording, task, first); !why.empty())
+      throw InvalidInput("{}: {}", recording.source, why);
     const std::string state = row ? row->initial_state : recording.id;
     if (!suite_.recordings.emplace(state, folder).second)
       throw InvalidInput("{}: another recording is called {} too", recording.source, state);

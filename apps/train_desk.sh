@@ -5,8 +5,8 @@
 # EVAC: the program. LAST: the step to end after (default: balance). CONFIGS: a folder of other pages. The desk's own
 # fidelity page is asked about four development states a cell; its forty reported ones would take as long as the training.
 # Its policy is kept after some steps too; other pages may have fewer.
-# OUT/time.csv gets a line for each start of a step: step, seconds, peak memory of its largest process in KiB, how it
-# ended. A step that was killed together with this script has none.
+# OUT/time.csv gets a line for each start of a step: step, seconds, peak memory of its largest process in KiB, its exit
+# code (128 and the signal's number where it was killed). A step that was killed together with this script has none.
 set -euo pipefail
 evac=$1 out=$2 last=${3:-balance} configs=${4:-$(dirname "${BASH_SOURCE[0]}")/configs}
 model=$configs/desk_model.yaml training=$configs/desk_training.yaml codec=$out/codec/codec.safetensors
@@ -27,7 +27,9 @@ finish() {
 }
 step() {  # NAME evac's words …
   local code=0
-  /usr/bin/time -a -o "$out/time.csv" -q -f "$1,%e,%M,%x" "$evac" "${@:2}" || code=$?
+  /usr/bin/time -o "$out/time.step" -q -f "%e,%M" "$evac" "${@:2}" || code=$?  # its own %x is 0 after a signal
+  echo "$1,$(cat "$out/time.step"),$code" >> "$out/time.csv"
+  rm "$out/time.step"
   if [ "$code" != 0 ] && [ "$1,$code" != balance,3 ]; then exit "$code"; fi  # 3: too few pairs to choose a threshold by
   if [ "$1" = "$last" ]; then finish; fi
 }

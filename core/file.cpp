@@ -27,6 +27,20 @@ void Sync(const fs::path& path, int flags) {
 
 void SyncFolder(const fs::path& folder) { Sync(folder.empty() ? fs::path(".") : folder, O_RDONLY | O_DIRECTORY); }
 
+void RefuseAllButFiles(const fs::path& path) {
+  const fs::file_status there = StatusOf(path);
+  if (fs::is_directory(there)) throw InvalidInput("{}: is a folder, wanted a file", path.string());
+  if (fs::exists(there) && !fs::is_regular_file(there))
+    throw InvalidInput("{}: is no regular file, wanted one, or a name that is free", path.string());
+}
+
+/// Where the bytes go: what would be renamed to a link's own name would take its place.
+fs::path Followed(fs::path path) {
+  RefuseAllButFiles(path);  // and links in a circle
+  while (fs::is_symlink(fs::symlink_status(path))) path = path.parent_path() / fs::read_symlink(path);
+  return path;
+}
+
 /// What a file is called until it is whole.
 fs::path PartOf(const fs::path& path) { return path.string() + ".tmp"; }
 
@@ -115,12 +129,12 @@ void MakeFolders(const fs::path& folder) {
 }
 
 void RefuseFolder(const fs::path& file) {
-  std::error_code ignored;
-  if (!file.has_filename() || fs::is_directory(file, ignored))
-    throw InvalidInput("{}: is a folder, wanted a file", file.string());
+  if (!file.has_filename()) throw InvalidInput("{}: is a folder, wanted a file", file.string());
+  RefuseAllButFiles(file);
 }
 
-void WriteFileAtomically(const fs::path& path, std::string_view bytes) {
+void WriteFileAtomically(const fs::path& wanted, std::string_view bytes) {
+  const fs::path path = Followed(wanted);
   const OwnPart part(path);
   try {
     part.Fill(bytes);

@@ -10,8 +10,9 @@ namespace evac {
 std::string ReadFile(const std::filesystem::path& path);
 
 /// Writes beside it, syncs, renames, syncs the folder: the file is there whole or not at all, also after a power cut, and
-/// whoever else writes the same file meanwhile.
-/// @throws Error naming the file and the system's reason.
+/// whoever else writes the same file meanwhile. A link stays one: written is the file that it leads to.
+/// @throws InvalidInput naming it if what is there is no regular file (a folder, a device, a pipe), or as StatusOf; Error
+///   naming the file and the system's reason.
 void WriteFileAtomically(const std::filesystem::path& path, std::string_view bytes);
 
 /// The same file under another name, at which nothing is: a hard link, or where the disk has none a copy that is there
@@ -32,7 +33,7 @@ std::filesystem::file_status StatusOf(const std::filesystem::path& path);
 void MakeFolders(const std::filesystem::path& folder);
 
 /// For a file that is written at the end of long work: whether one can be there is known before.
-/// @throws InvalidInput naming it if it is a folder, or ends like one.
+/// @throws InvalidInput naming it if it is a folder, or ends like one, or is anything else that is no regular file.
 void RefuseFolder(const std::filesystem::path& file);
 
 }  // namespace evac

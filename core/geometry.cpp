@@ -1,5 +1,10 @@
 #include "core/geometry.h"
 
+#include <fmt/format.h>
+
+#include <cmath>
+#include <numbers>
+
 #include "core/error.h"
 
 namespace evac {
@@ -46,6 +51,22 @@ Eigen::Isometry3d FromXyzQuat(const Eigen::Vector3d& xyz_m, const Eigen::Vector4
 
 double RotationBetween(const Eigen::Isometry3d& a, const Eigen::Isometry3d& b) {
   return Eigen::Quaterniond(a.linear()).angularDistance(Eigen::Quaterniond(b.linear()));
+}
+
+std::string CalibrationDifference(const Camera& known, const Camera& asked, const std::string& where) {
+  const double wide = asked.fx_px / asked.width_px, high = asked.fy_px / asked.height_px,
+               known_wide = known.fx_px / known.width_px, known_high = known.fy_px / known.height_px;
+  const double moved_m = (known.mount_from_camera.inverse() * asked.mount_from_camera).translation().norm(),
+               turned_rad = RotationBetween(known.mount_from_camera, asked.mount_from_camera);
+  if (known.mount != asked.mount) return "is mounted elsewhere";
+  if (std::abs(wide / known_wide - 1) > kSameFocal)
+    return fmt::format("has a focal length of {:.3f} picture widths, {} {:.3f}", wide, where, known_wide);
+  if (std::abs(high / known_high - 1) > kSameFocal)
+    return fmt::format("has a focal length of {:.3f} picture heights, {} {:.3f}", high, where, known_high);
+  if (moved_m > kSameMount_m || turned_rad > kSameMount_rad)
+    return fmt::format("stands {:.3f} m and {:.1f} degrees from where it stood {}", moved_m,
+                       turned_rad * 180 / std::numbers::pi, where);
+  return "";
 }
 
 }  // namespace evac

@@ -2,6 +2,7 @@
 
 #include <Eigen/Geometry>
 #include <optional>
+#include <string>
 
 #include "core/types.h"
 
@@ -27,5 +28,13 @@ Eigen::Isometry3d FromXyzQuat(const Eigen::Vector3d& xyz_m, const Eigen::Vector4
 
 /// Angle of the rotation between the two orientations, radians in [0, pi].
 double RotationBetween(const Eigen::Isometry3d& a, const Eigen::Isometry3d& b);
+
+/// How far a camera may be from what a policy was trained with, or is told, and still be the same: a share of its focal
+/// length (and of a side of the picture), metres and radians of where it stands on its mount.
+inline constexpr double kSameFocal = 0.05, kSameMount_m = 0.03, kSameMount_rad = 0.09;
+
+/// What differs in mount, focal lengths (in picture sides: sizes may differ) and place on the mount by more than these,
+/// as the end of "camera head …"; empty: nothing. @param where  the known one is so: "in training"
+std::string CalibrationDifference(const Camera& known, const Camera& asked, const std::string& where);
 
 }  // namespace evac

@@ -52,7 +52,7 @@ struct RealTrial {
   std::int64_t trial = 0;  ///< counts repeats of the same (task, initial state, policy, checkpoint)
   Label outcome = Label::kCannotTell;
   std::string video;   ///< relative to the run's folder; empty: none
-  std::string source;  ///< where it came from: "trials.csv:12"
+  std::string source;  ///< where it came from: "/lab/monday/trials.csv:12"; of an earlier evac "trials.csv:12"
   bool operator==(const RealTrial&) const = default;
 };
 
@@ -143,7 +143,9 @@ class Store {
   /// For the oracle judge alone; empty if the world had none.
   PrivilegedTrack LoadPrivileged(const std::string& episode_id) const;
 
-  /// Kept for the lowest seed per (task, initial state), so that the order of finishing does not matter. Lossless.
+  /// Kept for the lowest seed per (task, initial state), so that the order of finishing does not matter. Lossless. Once an
+  /// episode of a world of type evac is there that did not fail, the scene that it began from stays: what is imagined
+  /// later begins there too, though a failed real episode that ran again would give one of a lower seed.
   void AddInitialScene(const PairKey& pair, const InitialScene& scene);
   std::optional<InitialScene> LoadInitialScene(const std::string& task, const std::string& initial_state) const;
 

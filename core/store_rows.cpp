@@ -8,13 +8,25 @@
 namespace evac::rows {
 namespace {
 
+/// Whether something was imagined from what is kept: that is what it began from, whatever the real world shows later.
+bool IsBegunFrom(sqlite::Connection& connection, const PairKey& pair) {
+  return connection
+      .Query(
+          "SELECT 1 FROM episodes JOIN worlds ON worlds.name = episodes.world WHERE episodes.task = ? AND "
+          "episodes.initial_state = ? AND worlds.type = 'evac' AND NOT episodes.failed LIMIT 1",
+          pair.task, pair.initial_state)
+      .Step();
+}
+
+/// Scenes of one seed are alike: which of them is kept matters to nobody.
 bool IsStoredAlready(sqlite::Connection& connection, const PairKey& pair) {
   auto row =
       connection.Query("SELECT seed, policy, checkpoint FROM initial_scenes WHERE task = ? AND initial_state = ?",
                        pair.task, pair.initial_state);
   if (!row.Step()) return false;
   const auto stored = std::tuple(static_cast<std::uint64_t>(row.Integer(0)), row.Text(1), row.Text(2));
-  return stored <= std::tie(pair.seed, pair.policy, pair.checkpoint);
+  if (stored <= std::tie(pair.seed, pair.policy, pair.checkpoint)) return true;
+  return std::get<0>(stored) != pair.seed && IsBegunFrom(connection, pair);
 }
 
 }  // namespace

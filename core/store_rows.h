@@ -41,7 +41,8 @@ void SelectSteps(sqlite::Connection& connection, Episode& episode);
 PrivilegedTrack SelectPrivileged(sqlite::Connection& connection, const std::string& episode_id);
 void DeleteFailedEpisode(sqlite::Connection& connection, const std::string& episode_id);
 
-/// Stored unless a scene of a lower (seed, policy, checkpoint) is there.
+/// Stored unless a scene of a lower (seed, policy, checkpoint) is there, or one of another seed that an imagined episode
+/// began from.
 void UpsertInitialScene(sqlite::Connection& connection, const PairKey& pair, const InitialScene& scene);
 std::optional<InitialScene> SelectInitialScene(sqlite::Connection& connection, const std::string& task,
                                                const std::string& initial_state);

@@ -126,6 +126,12 @@ Error DamagedStudy(const fs::path& folder, const std::string& field, const char*
   return InvalidInput("{}: the study is damaged: {}, wanted {}", (folder / kFile).string(), field, wanted);
 }
 
+fs::path OneFormOf(const fs::path& run) {
+  std::error_code is_not_there;
+  fs::path form = fs::canonical(run, is_not_there);
+  return is_not_there ? fs::absolute(run).lexically_normal() : form;
+}
+
 const char* Name(RaterRole role) {
   for (const auto& [known, name] : kRoles) {
     if (known == role) return name;

@@ -43,11 +43,15 @@ struct StudyRubric {
   std::string document;  ///< JSON: instruction, success, version, stages [{name, description}]
 };
 
+/// How a study calls a run: the same of all that names one folder. A separator at its end or a link makes no other run
+/// of it.
+std::filesystem::path OneFormOf(const std::filesystem::path& run);
+
 /// One frozen clip. What a rater may not know is here; what a rater sees is the file and the rubric.
 struct StudyClip {
   std::int64_t id = 0;  ///< given by the store
   int wave = 1;
-  std::string run;      ///< folder of the run, as it was given
+  std::string run;      ///< folder of the run, OneFormOf it; earlier versions wrote it as it was given
   std::string episode;  ///< its id there
   std::string task, initial_state, policy, checkpoint, world;
   bool is_real = false;

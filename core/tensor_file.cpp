@@ -76,6 +76,17 @@ void SyncFolderOf(const fs::path& path) {
   if (file.get() < 0 || ::fsync(file.get()) != 0) throw WriteError(folder, "sync");
 }
 
+/// Where the bytes go: what would be renamed to a link's own name would take its place, as it would a device's.
+fs::path Followed(fs::path path) {
+  std::error_code error;
+  const fs::file_status there = fs::status(path, error);
+  if (fs::exists(there) && !fs::is_regular_file(there))
+    throw TensorError(path.string() + ": is no regular file, wanted one, or a name that is free");
+  for (int links = 0; links < 40 && fs::is_symlink(fs::symlink_status(path, error)); ++links)  // in a circle: as it is
+    path = FolderOf(path) / fs::read_symlink(path, error);
+  return path;
+}
+
 /// What a file is called until it is whole; the number of the process follows.
 std::string PartialName(const fs::path& path) { return path.filename().string() + ".partial-"; }
 
@@ -206,8 +217,8 @@ void TensorFile::LetGo(const TensorView& tensor) const {
 
 TensorFileWriter::TensorFileWriter(const fs::path& path, std::span<const TensorDeclaration> tensors,
                                    const TensorMetadata& metadata)
-    : path_(path), partial_(path.parent_path() / (PartialName(path) + std::to_string(::getpid()))) {
-  RemovePartsOfTheDead(path);
+    : path_(Followed(path)), partial_(path_.parent_path() / (PartialName(path_) + std::to_string(::getpid()))) {
+  RemovePartsOfTheDead(path_);
   const std::string header = TensorHeaderText(tensors, metadata);
   if (header.size() > kMaxHeaderBytes) throw TensorError(path.string() + ": a header beyond 100 MB");
   file_ = ::open(partial_.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0644);

@@ -106,11 +106,12 @@ class TensorFile {
 ///   TensorFileWriter writer(path, declarations, metadata);
 ///   for (…) writer.Append(bytes of the next tensor, in the order of the declarations);
 ///   writer.Finish();   // until then there is no file at `path`
+/// A link stays one: written is the file that it leads to.
 /// What processes of this machine left of the same path when they were killed is removed.
 class TensorFileWriter {
  public:
-  /// @throws TensorError if there can be no such file (a folder that is missing or is none, no right to write there);
-  ///   TensorWriteError with the system's reason (disk full).
+  /// @throws TensorError if there can be no such file (a folder that is missing or is none, no right to write there, what
+  ///   is there is no regular file); TensorWriteError with the system's reason (disk full).
   TensorFileWriter(const std::filesystem::path& path, std::span<const TensorDeclaration> tensors,
                    const TensorMetadata& metadata);
   TensorFileWriter(const TensorFileWriter&) = delete;

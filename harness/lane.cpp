@@ -8,6 +8,7 @@
 
 #include "core/check.h"
 #include "core/error.h"
+#include "harness/suite_hash.h"
 
 namespace evac {
 namespace {
@@ -55,8 +56,9 @@ std::optional<WorldStep> Lane::ResetWorld(World& world) try {
   if (const auto wrong = WhatIsWrong(first.observation, *job_.task)) throw InternalError("{}", *wrong);
   return first;
 } catch (const std::exception& error) {
-  // A world that imagines reads there where the episode begins: what the disk refuses then is no failure of its.
-  if (IsCalled(kStoreError, error)) throw;
+  // A world reads where the episode begins: what the disk refuses then, or what was written to since the suite was
+  // read, is no failure of the episode's.
+  if (IsCalled(kStoreError, error) || IsCalled(kChangedError, error)) throw;
   const bool diverged = IsCalled(Name(StopReason::kDiverged), error);
   Fail({diverged ? StopReason::kDiverged : StopReason::kWorldError, error.what()});
   return std::nullopt;

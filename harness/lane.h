@@ -29,7 +29,8 @@ class Lane {
  public:
   Lane(SceneId scene, Job job, const LaneOptions& options, Store& store);
 
-  /// Resets both sides. What either throws is the episode's failure; what the disk refuses is thrown.
+  /// Resets both sides. What either throws is the episode's failure; what the disk refuses is thrown, and so is that
+  /// what the world reads is another than when the suite was read (kChangedError).
   void Begin(Policy& policy, World& world);
   /// Takes the policy's answer: checks it, and asks the stop rule whether the episode has come to rest.
   void Command(const Acted& acted);

@@ -234,8 +234,29 @@ fs::path WithoutSlash(const fs::path& folder) {
   return normal.has_filename() ? normal : normal.parent_path();
 }
 
-/// A folder, made first where a merged run is made and removed last: what holds it is a merge's that was broken off.
+/// A folder, made first where a merged run is made and removed last, when the run has its own name already: of that of a
+/// run that is being made, what holds it is a merge's that was broken off; a run that holds it is whole.
 constexpr const char* kMark = "merging";
+
+void RequireFree(const fs::path& out) {
+  if (fs::exists(out)) throw InvalidInput("{}: is there already, wanted a new folder for the merged run", out.string());
+}
+
+/// OUT.lock, beside the run that is being made; gone with this, however the merge ends.
+class OutLock {
+ public:
+  explicit OutLock(const fs::path& out) : file_(out.string() + ".lock"), lock_(file_) {}
+  ~OutLock() {
+    std::error_code ignored;
+    fs::remove(file_, ignored);
+  }
+  OutLock(const OutLock&) = delete;
+  OutLock& operator=(const OutLock&) = delete;
+
+ private:
+  fs::path file_;
+  RunLock lock_;
+};
 
 bool LiesIn(const fs::path& path, const fs::path& folder) {
   const fs::path from_folder = fs::weakly_canonical(path).lexically_relative(fs::weakly_canonical(folder));
@@ -297,8 +318,8 @@ void Fill(const fs::path& part, const std::vector<Store>& stores, const Choice& 
   RunInfo run = stores.front().run();
   run.evac_version = fmt::format("{}", fmt::join(VersionsOf(stores), ", "));
   Store merged = Store::CreateOrContinue(part, run);
+  for (const Store& store : stores) CopyDeclarations(store, merged);  // of all scenes the lowest seed's, before any episode
   for (std::size_t s = 0; s < stores.size(); ++s) {
-    CopyDeclarations(stores[s], merged);
     CopyEpisodes(choice.episodes[s], stores[s], merged);
     CopyRealTrials(stores[s], merged);
   }
@@ -311,21 +332,20 @@ MergeSummary MergeRuns(const std::vector<fs::path>& shards, const fs::path& want
   const fs::path out = WithoutSlash(wanted_out);
   if (shards.empty()) throw InvalidInput("merge: found no shard, wanted at least one run's folder");
   if (out.empty()) throw InvalidInput("merge: found no name, wanted a new folder for the merged run");
-  if (fs::exists(out)) throw InvalidInput("{}: is there already, wanted a new folder for the merged run", out.string());
+  RequireFree(out);
   const std::vector<Store> stores = OpenAll(shards);
   const Choice choice = Choose(stores, shards);
   RequireSameTrials(stores, shards);
   const fs::path part = out.string() + ".tmp";
-  const fs::path lock_file = out.string() + ".lock";
-  RequireRoom(part, out, shards);
   MakeFolders(out.parent_path());
-  const RunLock lock(lock_file);
+  const OutLock lock(out);
+  RequireFree(out);  // another merge to it may have ended since
+  RequireRoom(part, out, shards);
   MakeFolders(part / kMark);
   Empty(part);
   Fill(part, stores, choice);
-  fs::remove(part / kMark);
-  fs::rename(part, out);
-  fs::remove(lock_file);
+  SyncAndRename(part, out);
+  fs::remove(out / kMark);
   std::size_t count = 0;
   for (const std::vector<Episode>& taken : choice.episodes) count += taken.size();
   return {.episodes = static_cast<int>(count), .duplicates = choice.duplicates, .notes = NotesOn(stores)};

@@ -25,8 +25,8 @@ struct MergeSummary {
 /// that did not fail, with what was said of it. Verdicts on every other copy are kept, those of a later shard after those
 /// of an earlier, and what two say alike once. `out` is there whole or not at all; it is made in `out`.tmp, its parents
 /// first where they are missing.
-/// @throws InvalidInput if `out` exists, a shard lies in `out`.tmp or that is no merge's that was broken off, a shard is
-/// of another suite, or duplicates disagree (all are named).
+/// @throws InvalidInput if `out` exists or another merge makes it just now, a shard lies in `out`.tmp or that is no
+/// merge's that was broken off, a shard is of another suite, or duplicates disagree (all are named).
 MergeSummary MergeRuns(const std::vector<std::filesystem::path>& shards, const std::filesystem::path& out);
 
 /// Copies from one run into another the episodes that `wanted` names, that did not fail, and that are not there yet:

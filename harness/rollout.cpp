@@ -27,6 +27,7 @@ Summary RunEpisodes(Policy& policy, World& world, JobQueue& jobs, Store& store, 
   while (!MustEnd(options, summary) && lanes.Refill(jobs, policy, world) > 0) {  // new episodes take the free lanes: Reset on both sides
     lanes.Command(policy);  // one chunk of actions per live lane, or why not; the stop rule reads it
     if (MustEnd(options, summary)) break;  // whoever waited was sent away: no failure of the policy's
+    if (options.check_policy) options.check_policy();  // whoever answered may be another than was greeted
     lanes.Observe(world);  // one call answers all lanes that have not come to rest
     if (MustEnd(options, summary)) break;  // Ctrl-C reaches a world's helpers too: no failure of the world's
     for (const EpisodeRecord& record : lanes.TakeFinished()) Keep(record, store, summary);

@@ -30,6 +30,7 @@ struct RolloutOptions {
   int failures_left = 1;   ///< stop when more episodes than this have failed
   std::function<void(const Progress&)> on_progress;  ///< after every chunk; may be empty
   std::function<bool()> interrupted;                 ///< asked after every answer and every chunk; may be empty
+  std::function<void()> check_policy = {};  ///< called after every answer of the policy's; what it throws ends the run
 };
 
 struct Summary {
@@ -44,7 +45,8 @@ struct Summary {
 ///
 /// An episode's result is the same, bit for bit, for any number of lanes, any company, order or resume, as long as the
 /// policy and the world keep their contracts. A failed episode is a row with a reason; it ends no other.
-/// @throws Error if nothing can be kept any more: the disk is full or gone. No episode is blamed for that.
+/// @throws Error if nothing can be kept any more: the disk is full or gone; if a file of the suite's was written to since
+///   it was read; what `check_policy` throws. No episode is blamed for that, and none that was running is kept.
 Summary RunEpisodes(Policy& policy, World& world, JobQueue& jobs, Store& store, const RolloutOptions& options);
 
 }  // namespace evac

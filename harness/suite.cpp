@@ -312,6 +312,7 @@ Suite Build(const Config& page) {
   for (const SuiteWorld& world : suite.worlds) {
     if (!world.profile.empty()) suite.page_hashes[world.profile] = PageHash(world.profile);
   }
+  suite.hashed_files = HashFiles(suite);
   suite.hash = SuiteHash(page, suite);
   suite.reality_hash = RealityHash(page, suite);
   return suite;

@@ -52,6 +52,13 @@ struct RecordedTask {
   int max_chunks = 0;                              ///< 0: as many as hold the longest recording
 };
 
+/// What a file was when it was hashed. One of the same size and time since then is not read again.
+struct HashedFile {
+  std::string sha256;
+  std::uintmax_t bytes = 0;
+  std::filesystem::file_time_type written = {};
+};
+
 /// One YAML file holds a whole evaluation (docs/suite.md). Paths in it are relative to the file.
 struct Suite {
   std::string name;
@@ -60,6 +67,8 @@ struct Suite {
   std::string hash;  ///< of everything that can change a result: the effective suite and every page and scene it names
   std::string reality_hash;  ///< the same without the worlds of type evac, the policies and the number of initial states
   std::map<std::filesystem::path, std::string> page_hashes = {};  ///< PageHash of task pages and profiles, when read
+  /// Of the policies' `files` and of the recording, by absolute path.
+  std::map<std::filesystem::path, HashedFile> hashed_files = {};
   std::vector<SuiteWorld> worlds;
   std::vector<Task> tasks;  ///< cameras resized to `image`; those of a recording are filled in by apps/recorded_suite
   std::vector<SuitePolicy> policies;

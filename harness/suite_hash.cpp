@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <set>
 #include <sstream>
+#include <utility>
 #include <vector>
 
 #include "core/collection.h"
@@ -16,29 +17,58 @@ namespace {
 
 namespace fs = std::filesystem;
 
+using HashedFiles = std::map<fs::path, HashedFile>;
+
+/// A file of a folder, by its name in it.
+struct NamedFile {
+  std::string name;
+  fs::path path;
+};
+
 bool StartsWithAny(const std::string& line, std::initializer_list<const char*> prefixes) {
   return std::any_of(prefixes.begin(), prefixes.end(), [&](const char* prefix) { return line.starts_with(prefix); });
 }
 
-/// A line for each file below a folder, through links too. @param above  folders that this one lies in: a link back to one is not followed
-void AddFilesBelow(const fs::path& folder, const std::string& name, std::set<fs::path> above, std::vector<std::string>& lines) {
+/// Each file below a folder, through links too. @param above  folders that this one lies in: a link back to one is not followed
+void AddFilesBelow(const fs::path& folder, const std::string& name, std::set<fs::path> above, std::vector<NamedFile>& files) {
   if (!above.insert(fs::canonical(folder)).second) return;
   std::error_code error, ignored;
   for (fs::directory_iterator at(folder, error), end; !error && at != end; at.increment(error)) {
     const std::string own = name + at->path().filename().string();
-    if (at->is_directory(ignored)) AddFilesBelow(at->path(), own + "/", above, lines);
-    if (at->is_regular_file(ignored)) lines.push_back(own + " " + Sha256HexOfFile(at->path()));
+    if (at->is_directory(ignored)) AddFilesBelow(at->path(), own + "/", above, files);
+    if (at->is_regular_file(ignored)) files.push_back({own, at->path()});
   }
   if (error) throw InvalidInput("{}: cannot be read: {}", folder.string(), error.message());
 }
 
-/// The files below a folder by name and content, in name order; or the one file.
+bool IsFolder(const fs::path& path) {
+  std::error_code ignored;
+  return fs::is_directory(path, ignored);
+}
+
+/// The files below a folder; or the one file, which has no name in it.
 /// @param but  a file of the folder that is none of them
-std::string HashOfTree(const fs::path& path, const std::string& but = "") {
-  if (std::error_code ignored; !fs::is_directory(path, ignored)) return Sha256HexOfFile(path);
+std::vector<NamedFile> FilesOfTree(const fs::path& path, const std::string& but) {
+  if (!IsFolder(path)) return {{"", path}};
+  std::vector<NamedFile> files;
+  AddFilesBelow(path, "", {}, files);
+  std::erase_if(files, [&](const NamedFile& file) { return file.name == but; });
+  return files;
+}
+
+fs::path KeyOf(const fs::path& path) { return fs::absolute(path).lexically_normal(); }
+
+/// @param known  of what has been hashed
+std::string HashOfFile(const fs::path& file, const HashedFiles& known) {
+  const auto found = known.find(KeyOf(file));
+  return found == known.end() ? Sha256HexOfFile(file) : found->second.sha256;
+}
+
+/// The files below a folder by name and content, in name order; or the one file.
+std::string HashOfTree(const fs::path& path, const HashedFiles& known, const std::string& but = "") {
+  if (!IsFolder(path)) return HashOfFile(path, known);
   std::vector<std::string> lines;
-  AddFilesBelow(path, "", {}, lines);
-  std::erase_if(lines, [&](const std::string& line) { return line.substr(0, line.rfind(' ')) == but; });
+  for (const NamedFile& file : FilesOfTree(path, but)) lines.push_back(file.name + " " + HashOfFile(file.path, known));
   std::sort(lines.begin(), lines.end());
   std::string text;
   for (const std::string& line : lines) text += line + "\n";
@@ -75,11 +105,43 @@ std::vector<fs::path> PlacesOf(const fs::path& recording) {
   return places;
 }
 
-std::string FilesOf(const SuitePolicy& policy) {
+/// A collection's says which process wrote it last.
+constexpr const char* kLock = "lock";
+
+std::string FilesOf(const SuitePolicy& policy, const HashedFiles& known = {}) {
   std::ostringstream text;
   for (std::size_t i = 0; i < policy.files.size(); ++i)
-    text << "file " << i << " of " << policy.name << "@" << policy.checkpoint << " " << HashOfTree(policy.files[i]) << "\n";
+    text << "file " << i << " of " << policy.name << "@" << policy.checkpoint << " " << HashOfTree(policy.files[i], known) << "\n";
   return text.str();
+}
+
+/// The file as it is now, but for its hash; of one that is not there, nothing.
+HashedFile LookAt(const fs::path& file) {
+  std::error_code ignored;
+  HashedFile found;
+  found.bytes = fs::file_size(file, ignored);
+  found.written = fs::last_write_time(file, ignored);
+  return found;
+}
+
+bool LiesIn(const fs::path& file, const fs::path& place) {
+  const fs::path from_place = file.lexically_relative(place);
+  return !from_place.empty() && *from_place.begin() != "..";
+}
+
+/// @param place  a file, or a folder, below which the order of paths keeps all together
+void DemandAsHashed(const HashedFiles& hashed, const fs::path& place) {
+  const fs::path key = KeyOf(place);
+  for (auto at = hashed.lower_bound(key); at != hashed.end() && LiesIn(at->first, key); ++at) {
+    const auto& [file, known] = *at;
+    const HashedFile now = LookAt(file);
+    if (now.bytes == known.bytes && now.written == known.written) continue;
+    const std::string found = Sha256HexOfFile(file);
+    if (found == known.sha256) continue;
+    throw InvalidInput("{}: it is another file than when the suite was read: found SHA-256 {}, wanted {}", file.string(),
+                       found, known.sha256)
+        .Called(kChangedError);
+  }
 }
 
 std::string HashOf(const Config& page, const Suite& suite, bool whole) {
@@ -102,12 +164,12 @@ std::string HashOf(const Config& page, const Suite& suite, bool whole) {
     if (world.evac && whole) text << "evac " << world.name << " " << world.evac->hash << "\n";
   }
   for (const SuitePolicy& policy : suite.policies) {
-    if (whole) text << FilesOf(policy);
+    if (whole) text << FilesOf(policy, suite.hashed_files);
   }
   if (suite.recording) {
     text << "recorded task " << RecordedTaskName(*suite.recording) << "\n";  // it is filled in later
     for (const fs::path& place : PlacesOf(*suite.recording))
-      text << "recording " << HashOfTree(place, "lock") << "\n";  // a collection's says which process wrote it last
+      text << "recording " << HashOfTree(place, suite.hashed_files, kLock) << "\n";
   }
   return Sha256Hex(text.str());
 }
@@ -169,6 +231,34 @@ void DemandUnchanged(const Suite& suite, const SuiteWorld& world) {
   };
   if (!world.profile.empty()) demand(world.profile);
   for (const Task& task : suite.tasks) demand(task.page_path);
+}
+
+void DemandUnchanged(const Suite& suite, const SuitePolicy& policy) {
+  for (const std::string& file : policy.files) DemandAsHashed(suite.hashed_files, file);
+  const auto names_it = [](const std::string& word) { return word.find("${recording}") != std::string::npos; };
+  if (suite.recording && std::ranges::any_of(policy.command, names_it)) DemandRecordingUnchanged(suite, *suite.recording);
+}
+
+void DemandRecordingUnchanged(const Suite& suite, const fs::path& recording) {
+  for (const fs::path& place : FoldersOf(recording)) DemandAsHashed(suite.hashed_files, place);
+}
+
+std::map<fs::path, HashedFile> HashFiles(const Suite& suite) {
+  HashedFiles hashed;
+  const auto add = [&](const fs::path& place, const std::string& but) {
+    for (const NamedFile& file : FilesOfTree(place, but)) {
+      HashedFile now = LookAt(file.path);  // before it is read: what is written to it meanwhile is noticed
+      now.sha256 = Sha256HexOfFile(file.path);
+      hashed.insert_or_assign(KeyOf(file.path), std::move(now));
+    }
+  };
+  for (const SuitePolicy& policy : suite.policies) {
+    for (const std::string& file : policy.files) add(file, "");
+  }
+  if (suite.recording) {
+    for (const fs::path& place : PlacesOf(*suite.recording)) add(place, kLock);
+  }
+  return hashed;
 }
 
 std::string PolicyHash(const SuitePolicy& policy) {

@@ -19,6 +19,23 @@ std::string PageHash(const std::filesystem::path& page);
 ///   is another by now.
 void DemandUnchanged(const Suite& suite, const SuiteWorld& world);
 
+/// The kind of the errors of the two below: whoever catches what an episode's world throws lets it through, so that it
+/// ends the run and is no failure of the episode's.
+inline constexpr const char* kChangedError = "changed";
+
+/// The same of what a policy is made of. To be called whenever a process of it has declared itself, which has read its
+/// files by then.
+/// @throws InvalidInput naming the file and both hashes if one of its `files`, or of the recording that its command
+///   names, is another by now, or gone. A file that has come since is nobody's.
+void DemandUnchanged(const Suite& suite, const SuitePolicy& policy);
+
+/// The same of one of the suite's recordings, whenever it was read.
+void DemandRecordingUnchanged(const Suite& suite, const std::filesystem::path& recording);
+
+/// All files of the policies and of the recording, as they are now.
+/// @throws InvalidInput naming what cannot be read
+std::map<std::filesystem::path, HashedFile> HashFiles(const Suite& suite);
+
 /// SHA-256 of everything in a suite that can change a result, wherever its files lie: fields by value, files by
 /// content, a recording also by what its task is called, from which seeds are drawn. Left out: lanes, threads,
 /// error_budget and the transport's times, which change how fast and how patiently, not what; a collection's `lock`.

@@ -2,8 +2,10 @@
 
 #include <fmt/format.h>
 
+#include <cctype>
 #include <chrono>
 #include <mutex>
+#include <regex>
 #include <set>
 
 #include "core/error.h"
@@ -65,6 +67,20 @@ std::string IdOfWhole(const std::filesystem::path& folder) {
 HttpAnswer Page(const std::string& type, std::string text) { return {200, type, std::move(text)}; }
 
 }  // namespace
+
+std::string PublicUrl(const std::string& given) {
+  static const std::regex kForm("(https?)://([a-z0-9._-]+|\\[[0-9a-f:.]+\\])(:([0-9]{1,5}))?/?");
+  constexpr std::size_t kLongest = 300;  // of a name 253
+  std::string url = given.substr(0, kLongest + 1);
+  for (char& c : url) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+  std::smatch parts;
+  const bool is_url = url.size() <= kLongest && std::regex_match(url, parts, kForm);
+  const int own_port = is_url && parts[1] == "https" ? 443 : 80;
+  const int port = is_url && parts[4].matched ? std::stoi(parts[4]) : own_port;
+  if (!is_url || port < 1 || port > 65535)
+    throw InvalidInput("--url: found '{}', wanted http://HOST or https://HOST, or one with :PORT, and no path", given);
+  return parts[1].str() + "://" + parts[2].str() + (port == own_port ? "" : fmt::format(":{}", port));
+}
 
 std::string CsrfOf(const std::string& session) { return Sha256Hex("csrf " + session).substr(0, 32); }
 
@@ -130,9 +146,7 @@ struct RatingServer::Impl {
   }
 
   std::string PublicHost() const {
-    const std::size_t slashes = options.public_url.find("//");
-    const std::string rest = slashes == std::string::npos ? options.public_url : options.public_url.substr(slashes + 2);
-    return rest.substr(0, rest.find('/'));
+    return options.public_url.substr(options.public_url.find("//") + 2);
   }
 
   static std::optional<HttpAnswer> StaticPage(const HttpAsked& asked) {
@@ -291,6 +305,7 @@ struct RatingServer::Impl {
 RatingServer::RatingServer(RatingServerOptions options) {
   if (!std::filesystem::exists(options.study / "study.sqlite"))
     throw InvalidInput("{}: there is no study (study.sqlite is missing)", options.study.string());
+  if (!options.public_url.empty()) options.public_url = PublicUrl(options.public_url);
   impl_ = std::make_unique<Impl>(std::move(options));
 }
 
@@ -299,8 +314,7 @@ RatingServer::~RatingServer() { Stop(); }
 int RatingServer::port() const { return impl_->http.port(); }
 
 std::string RatingServer::url() const {
-  std::string url = impl_->options.public_url;
-  if (!url.empty()) return url.ends_with('/') ? url : url + "/";
+  if (!impl_->options.public_url.empty()) return impl_->options.public_url + "/";
   const std::string& host = impl_->options.host;
   return fmt::format("http://{}:{}/", host.find(':') == std::string::npos ? host : "[" + host + "]", port());
 }

@@ -25,7 +25,7 @@ struct RatingServerOptions {
 class RatingServer {
  public:
   /// Listens from here on. @throws InvalidInput if there is no study, it is damaged,
-  /// another server has it, or the address is taken.
+  /// another server has it, the address is taken, or the public one is none (PublicUrl).
   explicit RatingServer(RatingServerOptions options);
   ~RatingServer();
   RatingServer(const RatingServer&) = delete;
@@ -42,6 +42,10 @@ class RatingServer {
   struct Impl;
   std::unique_ptr<Impl> impl_;
 };
+
+/// What a study's address is in the open, as browsers name it: "HTTPS://Rate.Lab.org:443/" is "https://rate.lab.org".
+/// @throws InvalidInput unless it is http(s)://HOST or http(s)://HOST:PORT: pages and links stand at the root.
+std::string PublicUrl(const std::string& given);
 
 /// The token that requests of a session must carry in X-Evac-Csrf.
 std::string CsrfOf(const std::string& session);

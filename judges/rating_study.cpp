@@ -59,6 +59,16 @@ StudyClip ClipOf(const Episode& episode, const fs::path& run, bool is_real, cons
   return clip;
 }
 
+/// Each once, in their order.
+std::vector<fs::path> RunsOf(const StudyOptions& options) {
+  std::vector<fs::path> runs;
+  for (const fs::path& run : options.runs) {
+    fs::path form = OneFormOf(run);
+    if (std::ranges::find(runs, form) == runs.end()) runs.push_back(std::move(form));
+  }
+  return runs;
+}
+
 /// Without one every rater would decide by an idea of success of their own.
 void DemandRubrics(const std::vector<Candidate>& candidates) {
   for (const Candidate& candidate : candidates) {
@@ -155,17 +165,33 @@ class Collector {
   std::map<std::string, WorldInfo> worlds_;  // likewise
 };
 
-/// How many clips are taken for what, in this order: never more than a quarter of all for one use.
-std::vector<std::pair<Showing, int>> KnownUses(std::size_t count, const StudyOptions& options) {
-  const int quarter = static_cast<int>(count) / 4;
-  const int gold =
-      std::max(options.min_gold, static_cast<int>(std::lround(options.gold_share * static_cast<double>(count))));
-  return {{Showing::kExample, std::min(options.examples, quarter)},
-          {Showing::kPractice, std::min(options.practice, quarter)},
-          {Showing::kGold, std::min(gold, quarter)}};
+/// So many clips of which it is known how they end.
+struct Known {
+  int successes = 0, failures = 0;
+  int All() const { return successes + failures; }
+};
+
+/// `count` of them in their proportion, as well as whole numbers allow; of two or more both kinds, if both exist.
+Known ShareOf(const Known& all, int count) {
+  count = std::min(count, all.All());
+  if (count <= 0) return {};
+  int successes = static_cast<int>(std::lround(static_cast<double>(count) * all.successes / all.All()));
+  if (count > 1 && all.successes > 0 && all.failures > 0) successes = std::clamp(successes, 1, count - 1);
+  return {successes, count - successes};
 }
 
-/// Takes clips whose label is known for examples, practice and gold, by turns a success and a failure.
+Known KnownIn(const std::vector<Candidate>& candidates) {
+  Known known;
+  for (const Candidate& candidate : candidates) {
+    known.successes += candidate.clip.reference == Label::kSuccess;
+    known.failures += candidate.clip.reference == Label::kFailure;
+  }
+  return known;
+}
+
+/// Takes clips whose label is known for examples, practice and gold, never more than a quarter of all for one use.
+/// Examples and practice are in no rate: they are taken in the proportion of what is known, or the rate of what is left
+/// would be another. Gold is in it: by turns a success and a failure.
 void ChooseKnown(std::vector<Candidate>& candidates, const StudyOptions& options) {
   std::vector<std::size_t> order(candidates.size());
   for (std::size_t i = 0; i < order.size(); ++i) order[i] = i;
@@ -179,12 +205,21 @@ void ChooseKnown(std::vector<Candidate>& candidates, const StudyOptions& options
     candidates[*next].clip.use = use;
     return true;
   };
-  for (const auto& [use, count] : KnownUses(candidates.size(), options)) {
-    for (int k = 0; k < count; ++k) {
-      const Label wanted = k % 2 == 0 ? Label::kSuccess : Label::kFailure;
-      const Label other = k % 2 == 0 ? Label::kFailure : Label::kSuccess;
-      if (!take(wanted, use)) take(other, use);
-    }
+  const auto take_all = [&](const Known& quota, Showing use) {
+    for (int k = 0; k < quota.successes; ++k) take(Label::kSuccess, use);
+    for (int k = 0; k < quota.failures; ++k) take(Label::kFailure, use);
+  };
+  const int quarter = static_cast<int>(candidates.size()) / 4;
+  const int examples = std::min(options.examples, quarter), practice = std::min(options.practice, quarter);
+  const Known uncounted = ShareOf(KnownIn(candidates), examples + practice);
+  const Known shown = ShareOf(uncounted, examples);
+  take_all(shown, Showing::kExample);
+  take_all({uncounted.successes - shown.successes, uncounted.failures - shown.failures}, Showing::kPractice);
+  const int gold = static_cast<int>(std::lround(options.gold_share * static_cast<double>(candidates.size())));
+  for (int k = 0; k < std::min(std::max(options.min_gold, gold), quarter); ++k) {
+    const Label wanted = k % 2 == 0 ? Label::kSuccess : Label::kFailure;
+    const Label other = k % 2 == 0 ? Label::kFailure : Label::kSuccess;
+    if (!take(wanted, Showing::kGold)) take(other, Showing::kGold);
   }
   for (Candidate& candidate : candidates) {
     if (candidate.clip.use != Showing::kCounted) continue;
@@ -265,9 +300,15 @@ Encoded EncodeAll(std::vector<Candidate>& candidates, const StudyInfo& info, con
   return encoded;
 }
 
+/// Of "out/robots/" too.
+std::string LastNameIn(const fs::path& folder) {
+  const fs::path whole = fs::absolute(folder).lexically_normal();
+  return (whole.has_filename() ? whole : whole.parent_path()).filename().string();
+}
+
 StudyInfo InfoFor(const std::vector<Candidate>& candidates, const StudyOptions& options, const fs::path& folder) {
   StudyInfo info;
-  info.name = options.name.empty() ? fs::absolute(folder).lexically_normal().filename().string() : options.name;
+  info.name = options.name.empty() ? LastNameIn(folder) : options.name;
   if (info.name.empty()) info.name = "study";
   info.seed = options.seed;
   info.raters_per_clip = options.raters_per_clip;
@@ -289,19 +330,24 @@ void CheckSameHeight(const StudyInfo& began, const StudyOptions& options, const 
                      folder.string(), began.height_px);
 }
 
+/// A study without a wave, of a call that was killed after it began the file, has clips of no codec yet.
 void CheckSameRoundTrip(const StudyStore& store, const ClipRoundTrip& round_trip, const fs::path& folder) {
   const auto named = [](const std::string& codec) {
     return codec.empty() ? std::string("through none") : fmt::format("through the codec {:.12}…", codec);
   };
-  if (store.Codec() == round_trip.codec_sha256) return;
+  if (store.Waves() == 0 || store.Codec() == round_trip.codec_sha256) return;
   throw InvalidInput("{}: its clips went {}, those of a new wave must go the same way; found {} (--vae-roundtrip)",
                      folder.string(), named(store.Codec()), named(round_trip.codec_sha256));
 }
 
 /// @throws InvalidInput for an episode that is another by now: votes on the clip would be taken for votes on it
 void LeaveOutWhatIsThere(std::vector<Candidate>& candidates, const StudyStore& store) {
-  std::map<std::string, std::string> there;
-  for (const StudyClip& clip : store.Clips()) there[clip.run + "\n" + clip.episode] = clip.source_sha256;
+  std::map<std::string, std::string> there, forms;  // of runs as earlier versions wrote them
+  for (const StudyClip& clip : store.Clips()) {
+    const auto [form, is_new] = forms.try_emplace(clip.run);
+    if (is_new) form->second = OneFormOf(clip.run).string();
+    there[form->second + "\n" + clip.episode] = clip.source_sha256;
+  }
   std::erase_if(candidates, [&](const Candidate& c) {
     const auto known = there.find(c.clip.run + "\n" + c.clip.episode);
     if (known == there.end() || known->second == c.clip.source_sha256) return known != there.end();
@@ -376,7 +422,7 @@ StudyMade MakeStudy(const fs::path& folder, const StudyOptions& options,
                     const std::function<void(std::size_t, std::size_t)>& progress) {
   Check(options);
   Collector collector(options);
-  for (const fs::path& run : options.runs) collector.Read(fs::absolute(run).lexically_normal());
+  for (const fs::path& run : RunsOf(options)) collector.Read(run);
   std::vector<Candidate>& candidates = collector.candidates;
   if (candidates.empty()) throw InvalidInput("{}: no episode with a video to rate", options.runs.front().string());
   DemandRubrics(candidates);

@@ -15,8 +15,8 @@ namespace evac {
 inline constexpr int kStudyHeight_px = 512;
 
 struct StudyOptions {
-  std::vector<std::filesystem::path> runs = {};
-  std::string name = {};  ///< empty: the folder's
+  std::vector<std::filesystem::path> runs = {};  ///< one that is named twice, or by a link, is one
+  std::string name = {};                         ///< empty: the folder's
   std::uint64_t seed = 1;
   int raters_per_clip = 3;
   std::optional<int> height_px = {};  ///< of the first view, 64 … 1080; nothing: kStudyHeight_px, of a study that is
@@ -26,7 +26,8 @@ struct StudyOptions {
   std::string gold_from =
       {};                    ///< a judge of the runs whose verdicts are known to be right; empty: no gold, no practice
   int examples = 4;          ///< clips shown with their label before the session, if there is gold; rated by nobody
-  int practice = 8;          ///< clips with feedback, if there is gold; their answers count nowhere
+  int practice = 8;          ///< clips with feedback, if there is gold; their answers count nowhere. Both together are
+                             ///< successes and failures in the proportion of what is known: it is the rest's too
   double gold_share = 0.06;  ///< of the clips, at least `min_gold`, at most a quarter
   int min_gold = 12;
   ClipRoundTrip round_trip = {};  ///< of clips from worlds that are not imagined; the same for all waves of a study

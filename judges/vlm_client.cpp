@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "core/error.h"
 #include "core/seed.h"
@@ -109,12 +110,16 @@ std::string VlmClient::Fingerprint(const std::string& model) {
 VlmSaid VlmClient::Ask(const json& request) {
   const std::string body = request.dump();
   VlmSaid said = Trouble(VlmOutcome::kHttpError, "nothing was sent");
-  for (int attempt = 1; attempt <= kTries && MaySend(); ++attempt) {
+  for (int attempt = 1; attempt <= kTries; ++attempt) {
+    const std::optional<long> pauses_before = MaySend();
+    if (!pauses_before) break;
     const HttpReply reply = Send("/chat/completions", body);
-    said = Read(reply);
+    const VlmSaid before = std::exchange(said, Read(reply));
     said.attempts = attempt;
+    said.prompt_tokens = before.prompt_tokens + said.completion.prompt_tokens.value_or(0);
+    said.completion_tokens = before.completion_tokens + said.completion.completion_tokens.value_or(0);
     const bool is_passing = IsPassing(reply, said);
-    Count(said, is_passing);
+    Count(said, is_passing, *pauses_before);
     if (IsWrongAddress(reply.status)) End(fmt::format("{}: {}", options_.base_url, said.message));
     if (!is_passing || attempt == kTries) break;
     if (said.trouble == VlmOutcome::kTimeout && attempt == kTriesOfTimeout) break;
@@ -123,44 +128,58 @@ VlmSaid VlmClient::Ask(const json& request) {
   return said;
 }
 
-/// Waits while somebody waits for the server, then says whether one more request may be sent.
-bool VlmClient::MaySend() {
+/// Waits while somebody waits for the server. @returns how many pauses are over, if one more request may be sent.
+std::optional<long> VlmClient::MaySend() {
   const std::lock_guard wait_with_the_others(pause_mutex_);
   const std::lock_guard lock(mutex_);
   const VlmBudget& budget = options_.budget;
-  const long tokens = spent_.prompt_tokens + spent_.completion_tokens;
+  const VlmSpent all{spent_.requests + earlier_.requests, spent_.prompt_tokens + earlier_.prompt_tokens,
+                     spent_.completion_tokens + earlier_.completion_tokens};
+  const long tokens = all.prompt_tokens + all.completion_tokens;
   std::string why;
-  if (budget.max_requests > 0 && spent_.requests >= budget.max_requests)
-    why = fmt::format("{} requests were sent, as many as may be", spent_.requests);
+  if (budget.max_requests > 0 && all.requests >= budget.max_requests)
+    why = fmt::format("{} requests were sent, as many as may be", all.requests);
   if (budget.max_tokens > 0 && tokens >= budget.max_tokens)
     why = fmt::format("{} tokens are spent of {}", tokens, budget.max_tokens);
-  if (budget.max_usd > 0 && spent_.Usd(budget) >= budget.max_usd)
-    why = fmt::format("{:.2f} USD are spent of {:.2f}", spent_.Usd(budget), budget.max_usd);
-  if (!why.empty() && !why_over_) why_over_ = "the budget is spent: " + why;
+  if (budget.max_usd > 0 && all.Usd(budget) >= budget.max_usd)
+    why = fmt::format("{:.2f} USD are spent of {:.2f}", all.Usd(budget), budget.max_usd);
+  if (!why.empty() && earlier_.requests > 0)
+    why += fmt::format(" (with {} requests of earlier calls)", earlier_.requests);
+  if (!why.empty() && !why_over_) why_over_ = fmt::format("{}: {}", kBudgetIsSpent, why);
   if (!why_over_ && options_.interrupted()) why_over_ = "interrupted";
-  if (why_over_) return false;
+  if (why_over_) return std::nullopt;
   ++spent_.requests;
-  return true;
+  return pauses_;
 }
 
-void VlmClient::Count(const VlmSaid& said, bool is_trouble) {
-  bool must_pause = false;
+/// @param pauses_before  how many were over when it was sent: what was under way before a pause says nothing of how the
+/// server is after it.
+void VlmClient::Count(const VlmSaid& said, bool is_trouble, long pauses_before) {
   {
     const std::lock_guard lock(mutex_);
     spent_.prompt_tokens += said.completion.prompt_tokens.value_or(0);
     spent_.completion_tokens += said.completion.completion_tokens.value_or(0);
     troubles_in_a_row_ = is_trouble ? troubles_in_a_row_ + 1 : 0;
-    if (!is_trouble) has_paused_ = false;
-    if (troubles_in_a_row_ < kTroublesBeforePause) return;
-    if (has_paused_ && !why_over_)
-      why_over_ = fmt::format("{} requests in a row failed, also after a pause; the last: {}", troubles_in_a_row_,
-                              said.message);
-    must_pause = !has_paused_;
-    has_paused_ = true;
+    if (!is_trouble) tried_with_.reset();
+    if (troubles_in_a_row_ < kTroublesBeforePause || is_pausing_) return;
+    if (tried_with_) {
+      if (pauses_before >= *tried_with_ && !why_over_)
+        why_over_ = fmt::format("{} requests in a row failed, also after a pause; the last: {}", troubles_in_a_row_,
+                                said.message);
+      return;
+    }
+    is_pausing_ = true;
   }
-  if (!must_pause) return;
+  Pause();
+}
+
+void VlmClient::Pause() {
   const std::lock_guard others_wait_too(pause_mutex_);
   options_.sleep_s(kPause_s);
+  const std::lock_guard lock(mutex_);
+  is_pausing_ = false;
+  ++pauses_;
+  if (troubles_in_a_row_ >= kTroublesBeforePause) tried_with_ = pauses_;  // else a good answer came meanwhile
 }
 
 void VlmClient::Wait(std::optional<double> retry_after_s, int attempt) {
@@ -174,6 +193,11 @@ void VlmClient::Wait(std::optional<double> retry_after_s, int attempt) {
   const std::lock_guard others_wait_too(pause_mutex_);
   if (retry_after_s) wait_s = std::clamp(*retry_after_s, 0.0, kLongestRetryAfter_s);
   options_.sleep_s(wait_s);
+}
+
+void VlmClient::CountEarlier(const VlmSpent& earlier) {
+  const std::lock_guard lock(mutex_);
+  earlier_ = earlier;
 }
 
 void VlmClient::End(const std::string& why) {

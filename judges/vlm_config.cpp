@@ -78,6 +78,12 @@ void ReadBudget(const Config& page, VlmBudget& budget) {
   budget.max_usd = section.Get("max_usd", 0.0);
   budget.usd_per_million_prompt_tokens = section.Get("usd_per_million_prompt_tokens", 0.0);
   budget.usd_per_million_completion_tokens = section.Get("usd_per_million_completion_tokens", 0.0);
+  for (const auto& [key, value] : {std::pair("max_requests", static_cast<double>(budget.max_requests)),
+                                   {"max_tokens", static_cast<double>(budget.max_tokens)},
+                                   {"max_usd", budget.max_usd},
+                                   {"usd_per_million_prompt_tokens", budget.usd_per_million_prompt_tokens},
+                                   {"usd_per_million_completion_tokens", budget.usd_per_million_completion_tokens}})
+    section.Require(value >= 0, key, "0 (none) or more");
   const bool has_prices = budget.usd_per_million_prompt_tokens > 0 || budget.usd_per_million_completion_tokens > 0;
   section.Require(budget.max_usd == 0 || has_prices, "max_usd", "prices too: usd_per_million_prompt_tokens, …");
 }

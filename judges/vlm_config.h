@@ -21,6 +21,7 @@ struct VlmConfig {
   HttpLimits limits{};
   VlmBudget budget{};
 
+  /// @throws InvalidInput naming file and field: one that is not known, out of range, or a budget or price below 0.
   static VlmConfig FromFile(const std::filesystem::path& path);
 
   /// "vlm:qwen3-vl-1a2b3c4d": the digits are of all that decides an answer, where the server stands excepted.

@@ -6,6 +6,7 @@
 #include <atomic>
 #include <cctype>
 #include <chrono>
+#include <cmath>
 #include <future>
 
 #include "core/error.h"
@@ -19,6 +20,7 @@ using nlohmann::json;
 using Clock = std::chrono::steady_clock;
 
 constexpr long kFewestTokensPerFrame = 60;
+constexpr double kFewestOfEstimate = 0.75;  // of patches of 28 px; some models' have 32
 constexpr VlmClipOptions kSmall{.frames = 8, .tail_frames = 0, .long_side_px = 336};
 
 /// What a server says of a request that holds more than it takes, in capitals or not. vLLM: "At most 8 image(s) may be
@@ -36,9 +38,29 @@ VlmAnswer Troubled(VlmOutcome outcome, const std::string& message) {
   return {.outcome = outcome, .observations = message};
 }
 
-/// A server that counts far too few prompt tokens has thrown pictures away and said nothing.
-bool HasLostImages(const VlmCompletion& completion, std::size_t frames) {
-  return completion.prompt_tokens && *completion.prompt_tokens < kFewestTokensPerFrame * static_cast<long>(frames);
+/// A server that counts far too few prompt tokens has thrown pictures away and said nothing. Small pictures cost few.
+bool HasLostImages(const VlmCompletion& completion, const std::vector<VlmFrame>& frames) {
+  const long of_estimate = std::lround(kFewestOfEstimate * static_cast<double>(EstimatedTokens(frames)));
+  const long fewest = std::min(kFewestTokensPerFrame * static_cast<long>(frames.size()), of_estimate);
+  return completion.prompt_tokens && *completion.prompt_tokens < fewest;
+}
+
+/// What a server is shown that takes no more: in nothing more than what it refused.
+VlmClipOptions Smaller(const VlmClipOptions& refused) {
+  return {.frames = std::min(kSmall.frames, refused.frames),
+          .tail_frames = kSmall.tail_frames,
+          .long_side_px = std::min(kSmall.long_side_px, refused.long_side_px),
+          .jpeg_quality = std::min(kSmall.jpeg_quality, refused.jpeg_quality)};
+}
+
+std::size_t Bytes(const std::vector<VlmFrame>& frames) {
+  std::size_t bytes = 0;
+  for (const VlmFrame& frame : frames) bytes += frame.jpeg.size();
+  return bytes;
+}
+
+bool IsLess(const std::vector<VlmFrame>& frames, const std::vector<VlmFrame>& than) {
+  return frames.size() < than.size() || EstimatedTokens(frames) < EstimatedTokens(than) || Bytes(frames) < Bytes(than);
 }
 
 bool Agree(const std::vector<VlmAnswer>& answers) {
@@ -115,9 +137,11 @@ Verdict VlmJudge::Rate(const Task& task, const Episode& episode) {
   Clip clip{task, ReadVlmFrames(video, task, config_.clip)};
   answers = AllWordings(clip);
   if (clip.is_too_large) {
-    const Clip small{task, ReadVlmFrames(video, task, kSmall)};
-    answers = AllWordings(small);
-    name += kVlmSmall;
+    const Clip small{task, ReadVlmFrames(video, task, Smaller(config_.clip))};
+    if (IsLess(small.frames, clip.frames)) {
+      answers = AllWordings(small);
+      name += kVlmSmall;
+    }
   }
   Verdict verdict = VerdictOf(answers);
   verdict.episode_id = episode.key.Id();
@@ -142,7 +166,8 @@ VlmAnswer VlmJudge::AnswerOf(const Clip& clip, VlmWording wording) {
   const json request = VlmRequest(clip.task, clip.frames, wording, config_.sampling);
   JudgeCall call{.key = Sha256Hex(fmt::format("{}\n{}\n{}\n{}", kVlmVersion, options_.fingerprint,
                                               options_.probe == VlmProbe::kRetest ? "again" : "", request.dump())),
-                 .judge = Name()};
+                 .judge = Name(),
+                 .attempts = 0};
   if (const auto known = cache_.Find(call.key))
     return ParseVerdictText(known->response, QuestionOf(clip.task, clip.frames, wording));
   if (options_.offline) throw InvalidInput("no answer in the cache").Called("not_judged");
@@ -157,12 +182,11 @@ VlmAnswer VlmJudge::AnswerOf(const Clip& clip, VlmWording wording) {
 }
 
 /// Asks, again with more room if the answer was cut, and once more for JSON alone if it was none.
-/// Fills in what came, for the cache.
+/// Fills in what came and what all of it took, for the cache.
 VlmAnswer VlmJudge::Asked(const Clip& clip, VlmWording wording, JudgeCall& call) {
   const json request = VlmRequest(clip.task, clip.frames, wording, config_.sampling);
   const VlmQuestion question = QuestionOf(clip.task, clip.frames, wording);
-  VlmSaid said = AskWhole(request);
-  call.attempts = said.attempts;
+  VlmSaid said = AskWhole(request, call);
   if (said.trouble) {
     call.response = said.message;
     call.status = evac::Name(*said.trouble);
@@ -170,7 +194,7 @@ VlmAnswer VlmJudge::Asked(const Clip& clip, VlmWording wording, JudgeCall& call)
     if (IsAboutSize(said.message)) clip.is_too_large = true;
     return Troubled(VlmOutcome::kUnsupportedMedia, said.message);
   }
-  if (HasLostImages(said.completion, clip.frames.size())) {
+  if (HasLostImages(said.completion, clip.frames)) {
     call.status = evac::Name(VlmOutcome::kTruncated);
     call.response = fmt::format("the server counted {} prompt tokens for {} images: it drops some of them",
                                 *said.completion.prompt_tokens, clip.frames.size());
@@ -178,7 +202,7 @@ VlmAnswer VlmJudge::Asked(const Clip& clip, VlmWording wording, JudgeCall& call)
   }
   VlmAnswer answer = ParseVerdictText(said.completion.text, question);
   if (answer.outcome == VlmOutcome::kParseError) {
-    const VlmSaid repaired = AskWhole(RepairRequest(request, said.completion.text, answer.observations));
+    const VlmSaid repaired = AskWhole(RepairRequest(request, said.completion.text, answer.observations), call);
     if (!repaired.trouble) {
       answer = ParseVerdictText(repaired.completion.text, question);
       said = repaired;
@@ -186,17 +210,23 @@ VlmAnswer VlmJudge::Asked(const Clip& clip, VlmWording wording, JudgeCall& call)
   }
   call.response = said.completion.text;
   call.status = answer.outcome == VlmOutcome::kParseError ? evac::Name(answer.outcome) : "ok";
-  call.prompt_tokens = said.completion.prompt_tokens.value_or(0);
-  call.completion_tokens = said.completion.completion_tokens.value_or(0);
   return answer;
 }
 
-VlmSaid VlmJudge::AskWhole(const json& request) {
-  VlmSaid said = client_.Ask(request);
+VlmSaid VlmJudge::AskWhole(const json& request, JudgeCall& call) {
+  const auto ask = [&](const json& what) {
+    VlmSaid said = client_.Ask(what);
+    call.attempts += said.attempts;
+    call.prompt_tokens += said.prompt_tokens;
+    call.completion_tokens += said.completion_tokens;
+    return said;
+  };
+  VlmSaid said = ask(request);
   if (said.trouble != VlmOutcome::kTruncated) return said;
   json longer = request;
   longer["max_tokens"] = 2 * request.at("max_tokens").get<int>();
-  return client_.Ask(longer);
+  VlmSaid again = ask(longer);
+  return again.attempts > 0 ? again : said;  // the budget may have ended between the two
 }
 
 void CheckThatItSees(VlmClient& client, const VlmSampling& sampling) {

@@ -34,8 +34,9 @@ struct VlmJudgeOptions {
 /// steps (what it sees, then the verdict); a verdict only where all agree and cite a frame, else cannot_tell. An error
 /// of any wording is `invalid` with its class as the reason's first word, never a failure.
 ///
-/// A server that finds the images too many or too large is asked with 8 frames of 336 px, and the verdict is given in
-/// the name "NAME:small": another judge, whose verdict says all the same that the episode was asked about.
+/// A server that finds the images too many or too large is asked with 8 frames of 336 px, or with fewer or smaller ones
+/// where the page has such, if that is less than what it refused. The verdict is then given in the name "NAME:small":
+/// another judge, whose verdict says all the same that the episode was asked about.
 /// Rate throws an Error called `not_judged` (no clip, or nothing in the cache) or `judge_over` (VlmClient::WhyOver):
 /// JudgeEpisodes stores nothing then.
 class VlmJudge : public Judge {
@@ -50,7 +51,7 @@ class VlmJudge : public Judge {
   struct Clip;
   VlmAnswer AnswerOf(const Clip& clip, VlmWording wording);
   VlmAnswer Asked(const Clip& clip, VlmWording wording, JudgeCall& call);
-  VlmSaid AskWhole(const nlohmann::json& request);
+  VlmSaid AskWhole(const nlohmann::json& request, JudgeCall& call);
   std::vector<VlmAnswer> AllWordings(const Clip& clip);
 
   VlmConfig config_;

@@ -297,6 +297,8 @@ PolicySpec LcmPolicy::Handshake(const PolicySpec& harness, double wait_s) {
   return policy;
 }
 
+int LcmPolicy::declared() const { return static_cast<int>(impl_->declarations.size()); }
+
 std::string LcmPolicy::Name() const { return impl_->policy ? impl_->policy->name : impl_->options.address.token; }
 
 void LcmPolicy::Reset(SceneId scene, const Task& task, std::uint64_t seed) {

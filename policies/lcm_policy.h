@@ -62,6 +62,10 @@ class LcmPolicy : public Policy {
   /// A process that is started again is asked too: if it declares otherwise, its episodes fail with what changed.
   PolicySpec Handshake(const PolicySpec& harness, double wait_s);
 
+  /// How many processes have declared themselves here: one more whenever it was started again. What a new one answers
+  /// comes after its declaration.
+  int declared() const;
+
   /// The policy's declared name; before the handshake the token.
   std::string Name() const override;
 

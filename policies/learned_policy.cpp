@@ -23,7 +23,6 @@ namespace evac {
 namespace {
 
 constexpr double kGrasps = 0.5;  ///< a hand told to close further than this, or found so, has grasped
-constexpr double kFocalTolerance = 0.05, kMountTolerance_m = 0.03, kMountTolerance_rad = 0.09;
 
 LearnedShape ShapeOf(const WeightFile& file) {
   if (file.Whole("chunk", 1, 1000) != kLearnedChunk)
@@ -42,23 +41,6 @@ TakeParameter From(WeightFile& file) {
     std::memcpy(copy.data_ptr(), view.bytes.data(), view.bytes.size());
     return copy;
   };
-}
-
-/// What differs between a camera as it was in training and as the task has it; empty: nothing that matters.
-std::string Difference(const Camera& trained, const Camera& asked) {
-  const double wide = asked.fx_px / asked.width_px, high = asked.fy_px / asked.height_px,
-               trained_wide = trained.fx_px / trained.width_px, trained_high = trained.fy_px / trained.height_px;
-  const Eigen::Isometry3d between = trained.mount_from_camera.inverse() * asked.mount_from_camera;
-  const double turn_rad = Eigen::AngleAxisd(between.linear()).angle();
-  if (trained.mount != asked.mount) return "is mounted elsewhere";
-  if (std::abs(wide / trained_wide - 1) > kFocalTolerance)
-    return fmt::format("has a focal length of {:.3f} picture widths, in training {:.3f}", wide, trained_wide);
-  if (std::abs(high / trained_high - 1) > kFocalTolerance)
-    return fmt::format("has a focal length of {:.3f} picture heights, in training {:.3f}", high, trained_high);
-  if (between.translation().norm() > kMountTolerance_m || turn_rad > kMountTolerance_rad)
-    return fmt::format("stands {:.3f} m and {:.1f} degrees from where it stood in training",
-                       between.translation().norm(), turn_rad * 180 / M_PI);
-  return "";
 }
 
 bool Grasps(const ArmState& arm) { return arm.closure > kGrasps; }
@@ -135,7 +117,7 @@ void LearnedPolicy::Reset(SceneId scene, const Task& task, std::uint64_t) {
       throw InvalidInput("learned@{}: camera {} of task {} has pictures of {}x{}, in training they were {}x{}",
                          network_->name, trained.name, task.id, found->width_px, found->height_px, shape.width_px,
                          shape.height_px);
-    const std::string difference = Difference(trained, *found);
+    const std::string difference = CalibrationDifference(trained, *found, "in training");
     if (!difference.empty())
       throw InvalidInput("learned@{}: camera {} of task {} {}", network_->name, trained.name, task.id, difference);
     episode.views.push_back(static_cast<std::size_t>(found - task.cameras.begin()));

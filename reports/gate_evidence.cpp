@@ -45,8 +45,8 @@ std::string MorePairs(const GateRule& rule, const PairedOutcomes& seen, std::int
                         (static_cast<double>(seen.flips.only_second) * each + 0.5) / n};
   std::vector<std::string> parts;
   const auto add = [&](const Number& wanted, const std::string& what) {
-    if (wanted)
-      parts.push_back(fmt::format("about {} more pairs to show it {}", FurtherWanted(*wanted, have), what));
+    const Defined<std::int64_t> further = wanted ? FurtherWanted(*wanted, have) : Undefined{wanted.reason()};
+    if (further) parts.push_back(fmt::format("about {} more pairs to show it {}", *further, what));
   };
   const bool is_bet = rule.test == GateTest::kSavi, is_worse = rates.only_second > rates.only_first;
   const Promise promise{rule.alpha, kPower};
@@ -77,9 +77,11 @@ std::string MoreTrials(const GateRule& rule, const Trials& candidate, const Tria
   if (room <= 0.005) return "";
   const double z = NormalQuantile(1 - rule.alpha) + NormalQuantile(kPower);
   const double wanted = std::ceil(z * z * (p * (1 - p) + q * (1 - q)) / (room * room));
-  const auto further = std::max(FurtherWanted(wanted, candidate.Number()), FurtherWanted(wanted, baseline.Number()));
-  return fmt::format("If the rates stay as seen: about {} more episodes of each to show it not worse by {}.", further,
-                     Margin(rule));
+  const Defined<std::int64_t> here = FurtherWanted(wanted, candidate.Number());
+  const Defined<std::int64_t> there = FurtherWanted(wanted, baseline.Number());
+  if (!here || !there) return "";
+  return fmt::format("If the rates stay as seen: about {} more episodes of each to show it not worse by {}.",
+                     std::max(*here, *there), Margin(rule));
 }
 
 /// Rates, difference, flips: what every comparison shows.
@@ -155,6 +157,7 @@ void ComparePairs(const GateRule& rule, const GateInput& input, const GateSides&
   decision.flips_worse = worse;
   Describe(rule, is_bet ? SequentialDifference(pairs, rule.alpha) : DifferenceOf(pairs, PassConfidence(rule)),
            counted.pairs, evidence);
+  evidence.initial_states = is_bet ? counted.pairs : std::ssize(pairs.by_state);
   if (is_bet) {
     Bet(input, pairs, evidence);
   } else {
@@ -182,6 +185,7 @@ void CompareUnpaired(const GateRule& rule, const GateSides& sides, Evidence& evi
   };
   const Trials here(candidate), there(baseline);
   Describe(rule, difference(PassConfidence(rule)), here.all.trials, evidence);
+  evidence.initial_states = std::ssize(candidate);
   const bool by_margin = rule.test == GateTest::kNonInferiority;
   std::string method = by_margin ? "Newcombe" : "Boschloo";
   if (here.all.trials == 0 || there.all.trials == 0) {
@@ -207,9 +211,10 @@ void Block(const GateRule& rule, const GateSides& sides, Evidence& evidence) {
     evidence.blocked = fmt::format("{} of {} episodes ({}) could not go on, more than {}", side.errors, side.episodes,
                                    Percent(share), Percent(rule.max_error_share));
     evidence.more = "Mend what failed and run those again (evac resume --retry-failed).";
-  } else if (evidence.decision.states < rule.min_states) {
-    evidence.blocked = fmt::format("{} of at least {} states", evidence.decision.states, rule.min_states);
-    evidence.more = fmt::format("{} more are asked for.", rule.min_states - evidence.decision.states);
+  } else if (evidence.initial_states < rule.min_states) {
+    evidence.blocked = fmt::format("{} of at least {} states", evidence.initial_states, rule.min_states);
+    evidence.more = fmt::format("The rule asks for {}.",
+                                Counted(rule.min_states - evidence.initial_states, "more initial state"));
   }
 }
 

@@ -24,6 +24,9 @@ struct Evidence {
   RuleDecision decision;               ///< all but outcome, p_adjusted, more and the end of the statement
   bool shows_good = false;             ///< the rule may pass: shown to be good enough, at its alpha
   std::string blocked;                 ///< why the rule cannot be decided (too few states, too many errors); else empty
+  /// (task, initial state) that count, each once whatever the seeds and policies: what `min_states` asks for. Those of a
+  /// rule that compares are in both, or of the candidate where it compares no pairs.
+  std::int64_t initial_states = 0;
   std::optional<GateOutcome> counted;  ///< of a rule that counts instead of testing
   std::string good, bad;               ///< how the two outcomes are called: "not worse by 10 points", "worse"
   std::string more;                    ///< how many more episodes would decide, if it is not decided

@@ -10,6 +10,7 @@
 #include "core/statistics/confusion.h"
 #include "core/statistics/inverted_interval.h"
 #include "core/statistics/special.h"
+#include "reports/counted_judges.h"
 #include "reports/wording.h"
 
 namespace evac {
@@ -70,6 +71,7 @@ void HoldRate(const GateRule& rule, const GateSides& sides, Evidence& evidence) 
     return has_repeats ? RateOfStates(states, confidence) : ClopperPearsonInterval(successes, trials, confidence);
   };
   evidence.decision.states = trials;
+  evidence.initial_states = std::ssize(states);
   Hold(rule, {estimate(1 - 2 * rule.alpha), [=](double c) { return estimate(c).interval; }, *rule.at_least}, evidence);
   evidence.decision.statement =
       fmt::format("{} {} ({:g} %, {}), {}/{}", evidence.decision.policy, PercentWithInterval(evidence.decision.value),
@@ -100,6 +102,13 @@ PointsOfRule PointsOf(const GateRule& rule, const WorldComparison& comparison) {
   return {*task, {comparison.by_state.at(static_cast<std::size_t>(task - comparison.by_task.begin()))}};
 }
 
+/// Of each task those that any of its policies tried in both worlds.
+std::int64_t InitialStatesOf(const std::vector<TaskOutcomes>& tasks) {
+  std::int64_t count = 0;
+  for (const TaskOutcomes& task : tasks) count += task.points.empty() ? 0 : std::ssize(task.points.front().real);
+  return count;
+}
+
 void HoldCorrelation(const GateRule& rule, const RunSummary& run, const GateSides& sides, Evidence& evidence) {
   const WorldComparison& comparison = ComparisonWith(run, sides.world, rule.name);
   const auto [group, by_state] = PointsOf(rule, comparison);
@@ -126,6 +135,7 @@ void HoldCorrelation(const GateRule& rule, const RunSummary& run, const GateSide
   held.value.interval = held.interval(held.value.confidence);
   if (!held.value.interval) dropped.clear();  // its reason says it
   RuleDecision& decision = evidence.decision;
+  evidence.initial_states = InitialStatesOf(by_state);
   for (const PairTable& table : comparison.tables) {
     if (rule.task.empty() || table.task == rule.task) decision.states += table.Counted();
   }
@@ -166,17 +176,28 @@ void HoldUnerringKappa(const GateRule& rule, const Unerring& judge, Estimate kap
                               : "no number of them would show it.");
 }
 
+/// The other judge by its full name, of which the rule may say a part as of every judge.
+std::string JudgeAgainst(const GateRule& rule, const RunSummary& run) {
+  std::string full;
+  try {
+    full = FullJudgeNames(rule.against, run.judges);
+  } catch (const Error& error) {
+    throw InvalidInput("gate rule '{}': against: {}", rule.name, error.what());
+  }
+  if (std::ranges::find(run.judges, full) != run.judges.end()) return full;
+  throw InvalidInput("gate rule '{}': against: found '{}', wanted a judge of the run: {}", rule.name, rule.against,
+                     fmt::join(run.judges, ", "));
+}
+
 void HoldKappa(const GateRule& rule, const RunSummary& run, const GateSides& sides, Evidence& evidence) {
-  if (std::ranges::find(run.judges, rule.against) == run.judges.end())
-    throw InvalidInput("gate rule '{}': against: found '{}', wanted a judge of the run: {}", rule.name, rule.against,
-                       fmt::join(run.judges, ", "));
+  const std::string against = JudgeAgainst(rule, run);
   ConfusionByState states;
   for (const JudgedEpisode& judged : run.episodes) {
     const EpisodeKey& key = judged.episode.key;
     if (key.world != sides.world || (!rule.task.empty() && key.pair.task != rule.task) || !judged.Counts()) continue;
     if (!rule.policy.empty() && PolicyLabel(key.pair.policy, key.pair.checkpoint) != rule.policy) continue;
     const auto verdicts = run.data.verdicts.find(key.Id());
-    const auto other = verdicts->second.find(rule.against);
+    const auto other = verdicts->second.find(against);
     if (other == verdicts->second.end()) continue;
     const Label label = other->second.label;
     if (label != Label::kSuccess && label != Label::kFailure) continue;
@@ -192,14 +213,14 @@ void HoldKappa(const GateRule& rule, const RunSummary& run, const GateSides& sid
     Hold(rule, {seen, [=](double c) { return kappa(c).interval; }, *rule.at_least}, evidence);
   }
   RuleDecision& decision = evidence.decision;
-  decision.states = std::ssize(states);
+  decision.states = evidence.initial_states = std::ssize(states);
   decision.statement = fmt::format(
       "kappa of {} with {} in {}{}: {} ({:g} %) over {} of {} that both judged, {} only {} and {} only {} a "
       "success",
-      run.options.judge, rule.against, sides.world, rule.policy.empty() ? "" : " on the clips of " + rule.policy,
+      run.options.judge, against, sides.world, rule.policy.empty() ? "" : " on the clips of " + rule.policy,
       NumberWithInterval(decision.value), 100 * (1 - 2 * rule.alpha),
       Counted(table.total(), "episode"), Counted(decision.states, "initial state"), table.only_judge_success, run.options.judge, table.only_human_success,
-      rule.against);
+      against);
 }
 
 /// A fact of this run, not a sample of others: no test.

@@ -39,7 +39,7 @@ struct GateRule {
   double alpha = 0.05;            ///< risk of a false "fail" (after the correction) and of a false "pass", in (0, 0.5)
   double margin = 0.1;            ///< how much worse is not worse, in (0, 1)
   std::optional<double> at_least, at_most;
-  int min_states = 0;          ///< fewer that count: inconclusive
+  int min_states = 0;          ///< fewer (task, initial state) that count, whatever the seeds: inconclusive
   double max_error_share = 1;  ///< more errors among the episodes: inconclusive
   OnInconclusive on_inconclusive = OnInconclusive::kWarn;
 

@@ -162,7 +162,9 @@ GateSides SidesOf(const GateRule& rule, const GateData& data) {
   if (!data.baseline->worlds.contains(sides.world))
     throw InvalidInput("{}world: found '{}', which the baseline has not, wanted one of: {}", what, sides.world,
                        fmt::join(Keys(data.baseline->worlds), ", "));
-  DemandSame(data.candidate.judge, data.baseline->judge, what + "judge");
+  if (data.candidate.judge != data.baseline->judge)
+    throw InvalidInput("{}judge: found {}, wanted the baseline's, {}: `evac gate pin --judge` pins another's verdicts",
+                       what, data.candidate.judge, data.baseline->judge);
   const std::string other = BaselinePolicy(rule, policy, data.baseline->Policies(), what);
   sides.baseline = SideOf(*data.baseline, rule, sides.world, other);
   if (sides.baseline.cells.empty())

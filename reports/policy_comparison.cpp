@@ -21,6 +21,9 @@ namespace {
 /// Share of the larger side's episodes from which on only pairs are looked at.
 constexpr double kPairedFrom = 0.8;
 
+/// A difference below this is 0 but for rounding: no rates of fewer than ten thousand episodes are as near.
+constexpr double kNoDifference = 1e-9;
+
 using Where = std::pair<std::string, std::uint64_t>;  // initial state, seed
 
 /// One policy's episodes of one task that count, and how many do not.
@@ -97,8 +100,10 @@ std::vector<PairedOutcomes> PairsByState(const Side& first, const Side& second) 
   return clusters;
 }
 
+bool IsNone(double difference) { return std::abs(difference) < kNoDifference; }
+
 Winner WinnerOf(const ComparisonRow& row, const Number& p, double alpha) {
-  if (!p || !row.difference.value || *p > alpha || *row.difference.value == 0) return Winner::kNotDecided;
+  if (!p || !row.difference.value || *p > alpha || IsNone(*row.difference.value)) return Winner::kNotDecided;
   return *row.difference.value > 0 ? Winner::kFirst : Winner::kSecond;
 }
 
@@ -115,24 +120,30 @@ Defined<std::int64_t> MorePairs(const ComparisonRow& row, const Promise& promise
   return FurtherWanted(static_cast<double>(size.n), row.pairs);
 }
 
+/// As many of each as that one lacks that lacks more.
+Defined<std::int64_t> FurtherOfEach(double wanted_of_first, double wanted_of_second, const ComparisonRow& row) {
+  const Defined<std::int64_t> first = FurtherWanted(wanted_of_first, row.first_trials);
+  const Defined<std::int64_t> second = FurtherWanted(wanted_of_second, row.second_trials);
+  if (!first || !second) return Undefined{first ? second.reason() : first.reason()};
+  return std::max(*first, *second);
+}
+
 /// Every stratum grows alike, so that the difference's variance falls as episodes are added.
 Defined<std::int64_t> MoreOfEachTask(const ComparisonRow& row, const Promise& promise) {
   const double z = TwoSidedZ(1 - promise.alpha) + NormalQuantile(promise.power);
   const double times = std::pow(z * *row.stratified_se / *row.difference.value, 2);
-  const auto further = [times](const Repeated& have) {
-    return FurtherWanted(times * static_cast<double>(have.effective), have);
-  };
-  return std::max(further(row.first_trials), further(row.second_trials));
+  return FurtherOfEach(times * static_cast<double>(row.first_trials.effective),
+                       times * static_cast<double>(row.second_trials.effective), row);
 }
 
 Defined<std::int64_t> MoreEpisodes(const ComparisonRow& row, const Promise& promise) {
   if (!row.first.value || !row.second.value) return Undefined{"one of the two has no episode that counts"};
-  if (*row.difference.value == 0) return Undefined{"the two rates are equal"};  // task by task, where there are several
+  if (IsNone(*row.difference.value)) return Undefined{"the two rates are equal"};  // task by task, where there are several
   if (row.stratified_se) return MoreOfEachTask(row, promise);
   const SampleSize size = TrialsPerPolicy(*row.first.value, *row.second.value, promise);
   if (!size.exact) return Undefined{size.exact.reason()};
   const double wanted = static_cast<double>(size.n);
-  return std::max(FurtherWanted(wanted, row.first_trials), FurtherWanted(wanted, row.second_trials));
+  return FurtherOfEach(wanted, wanted, row);
 }
 
 /// Winner and "how many more", once the p that counts is known.

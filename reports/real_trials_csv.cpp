@@ -82,8 +82,15 @@ std::optional<std::int64_t> WholeNumber(std::string_view cell) {
 using Key = std::tuple<std::string, std::string, std::string, std::string>;
 Key KeyOf(const RealTrial& trial) { return {trial.task, trial.initial_state, trial.policy, trial.checkpoint}; }
 
-/// "trials.csv" of "trials.csv:12".
+/// "/lab/monday/trials.csv" of "/lab/monday/trials.csv:12".
 std::string FileOf(const RealTrial& trial) { return trial.source.substr(0, trial.source.rfind(':')); }
+
+/// Of what an earlier evac imported the file's own name alone is known.
+bool AreOfOneFile(const RealTrial& trial, const RealTrial& stored) {
+  const std::string file = FileOf(trial), before = FileOf(stored);
+  if (before.find('/') != std::string::npos) return file == before;
+  return file.substr(file.rfind('/') + 1) == before;
+}
 
 /// Turns rows into trials, complaining of each that is none.
 class Reader {
@@ -212,7 +219,7 @@ std::vector<RealTrial> NewTrials(const std::vector<RealTrial>& trials, const std
                                  trial.source, Name(trial.outcome), trial.trial, trial.task,
                                  trial.policy + "@" + trial.checkpoint, trial.initial_state,
                                  Name(there->second->outcome), there->second->source));
-    } else if (counted.contains(place) && FileOf(trial) != FileOf(*there->second)) {
+    } else if (counted.contains(place) && !AreOfOneFile(trial, *there->second)) {
       complaints.Add(fmt::format("{}: found no number of the trial, wanted one: as trial {} of {} by {} in {} it was "
                                  "imported from {}",
                                  trial.source, trial.trial, trial.task, trial.policy + "@" + trial.checkpoint,

@@ -30,9 +30,11 @@ struct RealTrialsCsv {
 RealTrialsCsv ReadRealTrialsCsv(std::string_view text, const std::string& file, const KnownNames& known);
 
 /// Those of `trials` that `stored` does not hold yet.
+/// @param trials   `source` with the file's absolute path in front: "/lab/monday/trials.csv:12". Of what is stored without
+///                 a folder, as an earlier evac did, the file's own name alone is compared.
 /// @param counted  as in RealTrialsCsv
 /// @throws InvalidInput naming every one (at most 20) that is there with another outcome, or that is one of `counted` and
-/// there from a file of another name: it may be a repeat.
+/// there from another file: it may be a repeat.
 std::vector<RealTrial> NewTrials(const std::vector<RealTrial>& trials, const std::vector<RealTrial>& stored,
                                  const std::set<std::size_t>& counted = {});
 

@@ -12,7 +12,7 @@ namespace evac {
 /// One world's trust, and what it was held against.
 struct TrustReport {
   std::string world;
-  std::string real;  ///< "24 imported real trials", "world real"
+  std::string real;  ///< "24 imported real trials (2 more without an outcome)", "the world real"
   std::string judge;
   TrustOptions options;
   std::vector<TaskTrust> tasks;

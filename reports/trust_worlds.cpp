@@ -11,10 +11,16 @@
 namespace evac {
 namespace {
 
+/// Of imported trials those that have an outcome are what counts (TrustInputOf).
 std::string HeldAgainst(const RunSummary& summary) {
   const std::vector<RealTrial>& trials = summary.data.real_trials;
-  return trials.empty() ? "the world " + summary.reference
-                        : Counted(static_cast<std::int64_t>(trials.size()), "imported real trial");
+  if (trials.empty()) return "the world " + summary.reference;
+  const auto has_outcome = [](const RealTrial& trial) {
+    return trial.outcome == Label::kSuccess || trial.outcome == Label::kFailure;
+  };
+  const std::int64_t counted = std::ranges::count_if(trials, has_outcome), others = std::ssize(trials) - counted;
+  const std::string left_out = others > 0 ? fmt::format(" ({} more without an outcome)", others) : "";
+  return Counted(counted, "imported real trial") + left_out;
 }
 
 /// Who shows a reason says himself that it is about trust.

@@ -6,23 +6,25 @@
 #include <functional>
 #include <future>
 #include <memory>
+#include <optional>
 #include <thread>
 #include <vector>
 
 #include "apps/commands.h"
 #include "apps/network_parts.h"
-#include "apps/networks/codec_identity.h"
 #include "apps/warnings.h"
 #include "core/config.h"
 #include "core/error.h"
 #include "core/file.h"
 #include "core/hash.h"
+#include "core/store_lock.h"
 #include "worldmodel/evac_config.h"
 #include "worldmodel/nn/library.h"
 #include "worldmodel/nn/threads.h"
 #include "worldmodel/nn/weights.h"
 #include "worldmodel/train/encode_shards.h"
 #include "worldmodel/train/imagine_shards.h"
+#include "worldmodel/train/sha256.h"
 #include "worldmodel/train/trainable_weights.h"
 #include "worldmodel/train/weight_files.h"
 #include "worldmodel/trained_for.h"
@@ -84,15 +86,22 @@ ExitCode Encode(const EncodeArguments& arguments) {
   const at::Device device = DeviceOf(arguments);
   train::TrainableWeights weights(file, arguments.bf16 ? at::kBFloat16 : at::kFloat, device);
   const nn::Vae vae(nn::Scope(weights, train::kCodecPrefix), config.vae);
-  const std::string codec = CodecSha256(arguments.codec);
+  const std::string codec = train::CodecSha256(arguments.codec);
   const std::vector<std::filesystem::path> shards = train::ShardPaths(arguments.shards);
-  KeepWhoBeganLatents(arguments.shards, shards, {codec, "", ProductsOf(arguments), config.vae.scale_factor});
+  const train::EncodeOptions alike{codec, "", ProductsOf(arguments), config.vae.scale_factor, device};
+  std::vector<train::EncodeOptions> options(shards.size(), alike);
+  std::atomic<bool> lacks_some = false;
+  ForEachShard(arguments, shards.size(), [&](std::size_t i) {
+    options[i].shard_sha256 = Sha256HexOfFile(shards[i]);
+    if (!train::IsEncoded(shards[i], options[i])) lacks_some = true;
+  });
+  std::optional<RunLock> lock;
+  if (lacks_some) lock.emplace(std::filesystem::path(arguments.shards) / "lock");  // else nothing is written
+  KeepWhoBeganLatents(arguments.shards, shards, alike);
   std::atomic<std::size_t> encoded = 0;
   ForEachShard(arguments, shards.size(), [&](std::size_t i) {
-    const train::EncodeOptions options{codec, Sha256HexOfFile(shards[i]), ProductsOf(arguments),
-                                       config.vae.scale_factor, device};
-    if (train::IsEncoded(shards[i], options)) return;
-    train::EncodeShard(vae, shards[i], options);
+    if (train::IsEncoded(shards[i], options[i])) return;
+    train::EncodeShard(vae, shards[i], options[i]);
     fmt::print(stderr, "{}: encoded, {} of {}\n", train::LatentsPath(shards[i]).string(), ++encoded, shards.size());
   });
   fmt::print("{}: latents of {} shards, {} of them new\n", arguments.shards, shards.size(), encoded.load());
@@ -131,12 +140,13 @@ ExitCode Imagine(const EncodeArguments& arguments) {
   nn::LoadOptions options;
   if (arguments.bf16) options = {.dtype = at::kBFloat16, .products = at::kBFloat16};
   const nn::EvacModel model = nn::LoadModel(arguments.codec, config, options);
-  const std::string codec = CodecSha256(arguments.codec);
+  const std::string codec = train::CodecSha256(arguments.codec);
   const TrainedFor trained = TrainedFor::Read(arguments.codec);
   const std::string products =
       fmt::format("{}, imagined by {} in {} steps with page {}", ProductsOf(arguments), Sha256HexOfFile(arguments.codec),
                   arguments.steps, Config::FromFile(arguments.config).ContentHash());
   MakeFolders(to);
+  const RunLock lock(to / "lock");
   std::size_t shards = 0;
   std::atomic<std::size_t> imagined = 0;
   for (const train::Split split : {train::Split::kTrain, train::Split::kHoldout}) {
@@ -188,7 +198,7 @@ void AddEncode(CLI::App& app, ExitCode& exit_code) {
       ->capture_default_str()
       ->excludes(imagined);
   command->add_option("--steps", arguments->steps, "with --imagined: calls of the network per chunk")
-      ->check(CLI::Range(1, 1000))
+      ->check(CLI::Range(2, 1000))
       ->capture_default_str()
       ->needs(imagined);
   command->footer(

@@ -11,9 +11,9 @@ void AddFidelity(CLI::App& app, ExitCode& exit_code) {
   CLI::App* command = app.add_subcommand(kFidelityCommand.name, kFidelityCommand.what);
   command->add_option("suite", arguments->suite, "a suite with a real world, the same once more, and a world model (docs/fidelity.md)")->required();
   command->add_option("-o,--out", arguments->out, "the folder to write; one that is there is gone on with")->required();
-  command->add_option("--set", arguments->assignments, "override a field: path.to.field=VALUE (repeatable)")->expected(1)->take_all();
+  command->add_option("--set", arguments->assignments, "override a field: path.to.field=VALUE (repeatable)")->expected(1)->take_all()->allow_extra_args(false);
   command->add_option("--parts", arguments->parts, "beside the closed loop, which is always run: open, executed, counterfactual, horizon")
-      ->delimiter(',')->capture_default_str();
+      ->delimiter(',')->allow_extra_args(false)->capture_default_str();
   command->add_option("--classifier", arguments->classifier, "weights of the judge of imagined clips (docs/classifier_judge.md)");
   command->add_option("--reality", arguments->reality, "an earlier OUT of the same suite, but for its world model, policies and how many initial states: its episodes that would come out the same are taken over")
       ->check(CLI::ExistingDirectory);

@@ -18,7 +18,8 @@ void AddInputs(CLI::App& command, ImagineArguments& arguments) {
   command
       .add_option("--cameras", inputs.cameras, "the views, with commas between them (a folder's; default: what the weights "
                   "say, else the first of head, hand_left, hand_right)")
-      ->delimiter(',');
+      ->delimiter(',')
+      ->allow_extra_args(false);
   command
       .add_option("--arms", inputs.arms, "the actions are where the arms were told to be, or measured; default: as the weights "
                   "say, else measured")

@@ -17,7 +17,7 @@ void AddPack(CLI::App& app, ExitCode& exit_code) {
   command->add_option("-o,--out", arguments->out, "the folder to write; one that holds part of it is gone on with")->required();
   command->add_option("--config", arguments->config, "the network's page: picture size, views, chunk")->required();
   command->add_option("--statistics", arguments->statistics, "the actions' means and deviations that weights were trained with, to train those on; default: of these recordings");
-  command->add_option("--cameras", arguments->cameras, "the views, with commas between them; default: as many as the network has, head first")->delimiter(',');
+  command->add_option("--cameras", arguments->cameras, "the views, with commas between them; default: as many as the network has, head first")->delimiter(',')->allow_extra_args(false);
   command->add_option("--arms", arguments->arms, "actions are where the arms were told to be, or measured; default: told in a collection, else measured")->transform(CLI::CheckedTransformer(kKinds))->option_text("TEXT:{auto,told,measured}");
   command->add_option("--period-s", arguments->period_s, "between two frames of a clip; every nth recorded step is kept")->check(Within(0.001, 10.0))->capture_default_str();
   command->add_option("--crops", arguments->crops, "clips per recording: the whole picture, then random crops")->check(CLI::Range(1, 1000))->capture_default_str();

@@ -6,10 +6,11 @@
 
 #include "apps/commands.h"
 #include "apps/network_parts.h"
-#include "apps/networks/codec_identity.h"
 #include "apps/networks/packed_clips.h"
 #include "apps/networks/run_training.h"
 #include "core/file.h"
+#include "core/hash.h"
+#include "worldmodel/train/sha256.h"
 #include "worldmodel/train/train_forecast.h"
 #include "worldmodel/train/train_world.h"
 #include "worldmodel/train/training_job.h"
@@ -35,6 +36,8 @@ ExitCode WriteJob(const TrainArguments& arguments, const std::string& section, t
   job.begun_with = place.begun_with;
   job.wants_init = !arguments.init.empty();
   job.wants_forecast = !arguments.forecast.empty();
+  if (job.wants_init) job.init_sha256 = Sha256HexOfFile(arguments.init);
+  if (job.wants_forecast) job.forecast_sha256 = Sha256HexOfFile(arguments.forecast);
   train::WriteTrainingJob(arguments.job, job);
   fmt::print("{}: carry it, the shards and the weights that were named. There: evac-train {} SHARDS --out OUT\n",
              arguments.job, fs::path(arguments.job).filename().string());
@@ -72,7 +75,7 @@ void WriteStrips(const fs::path& out, std::int64_t step, const train::Strips& st
 
 ExitCode RunWorld(const TrainArguments& arguments) {
   const train::WorldStart start{arguments.codec,      arguments.init,     arguments.init_except,
-                                arguments.init_widen, arguments.forecast, CodecSha256(arguments.codec)};
+                                arguments.init_widen, arguments.forecast, train::CodecSha256(arguments.codec)};
   if (!arguments.job.empty()) {
     train::TrainingJob job;
     job.start = start;
@@ -138,6 +141,7 @@ void AddWorld(CLI::App& group, ExitCode& exit_code) {
       ->add_option("--init-except", arguments->init_except,
                    "keys that begin so are drawn anew instead, with commas between them")
       ->delimiter(',')
+      ->allow_extra_args(false)
       ->needs(init);
   command
       ->add_flag("--init-widen", arguments->init_widen,

@@ -142,7 +142,9 @@ void AddJudgeTrain(CLI::App& judge, ExitCode& exit_code) {
       ->check(CLI::ExistingDirectory);
   command->add_option("--truth", runs.truth, "whose verdicts: a judge's name, human say (evac ls shows them)")
       ->capture_default_str();
-  command->add_option("--worlds", runs.worlds, "clips of these worlds alone, with commas between them")->delimiter(',');
+  command->add_option("--worlds", runs.worlds, "clips of these worlds alone, with commas between them")
+      ->delimiter(',')
+      ->allow_extra_args(false);
   command->add_option("--holdout", runs.holdout, "share of initial states that are kept apart to measure with")
       ->check(Within(0.05, 0.9))
       ->capture_default_str();
@@ -172,7 +174,8 @@ void AddTrainPolicy(CLI::App& group, ExitCode& exit_code) {
   command
       ->add_option("--keep-steps", arguments->keep_steps,
                    "steps after which a checkpoint is kept beside the last, with commas between them")
-      ->delimiter(',');
+      ->delimiter(',')
+      ->allow_extra_args(false);
   command->footer(
       "Example:\n"
       "  evac train policy out/shards --training apps/configs/desk_training.yaml --config apps/configs/desk_model.yaml "

@@ -12,7 +12,7 @@ void AddVary(CLI::App& app, ExitCode& exit_code) {
   command->add_option("SHARDS", arguments->shards, "a folder of `evac pack`")->required()->check(CLI::ExistingDirectory);
   command->add_option("COLLECTION", arguments->collection, "of `evac collect`, the one that was packed")->required()->check(CLI::ExistingDirectory);
   command->add_option("--recipe", arguments->recipe, "the page that the collection was made by")->required()->check(CLI::ExistingFile);
-  command->add_option("--set", arguments->assignments, "path.to.field=VALUE: as the collection was made with; repeatable")->take_all()->expected(1);
+  command->add_option("--set", arguments->assignments, "path.to.field=VALUE: as the collection was made with; repeatable")->take_all()->expected(1)->allow_extra_args(false);
   command->add_option("--count", arguments->count, "variants of each clip")->check(CLI::Range(1, 1000))->capture_default_str();
   command->add_option("--seed", arguments->seed, "of the changes")->capture_default_str();
   command->add_option("--jobs", arguments->jobs, "clips at the same time; default: one per core")->check(CLI::Range(1, 256));

@@ -248,7 +248,8 @@ void AddWhatFor(const std::string& shards, const std::string& weights, TensorMet
 ExitCode RunConvert(const WeightsArguments& arguments) {
   DemandNew(arguments.out);
   DemandPage(arguments);
-  nn::FileWeights source(arguments.in, ConfigOf(arguments), {.dtype = kTypes.at(arguments.dtype), .with_unread = true});
+  nn::FileWeights source(arguments.in, ConfigOf(arguments),
+                         {.dtype = kTypes.at(arguments.dtype), .with_unread = true, .is_run = false});
   if (!source.report().schedule.empty()) fmt::print(stderr, "{}\n", source.report().schedule);
   nn::SaveOptions options;
   options.without = LeftOut(source, arguments);
@@ -262,7 +263,7 @@ ExitCode RunConvert(const WeightsArguments& arguments) {
   }
   if (!ConfigOf(arguments).object_forecast)
     throw InvalidInput("--forecast {}: the page of sizes has object_forecast: false, wanted true", arguments.forecast);
-  train::CheckForecastFor(arguments.forecast, options.metadata);
+  train::CheckForecastFor(arguments.forecast, train::WhatForecastIsFor(options.metadata, ConfigOf(arguments)));
   train::CheckpointWeights forecast(arguments.forecast);
   train::RoutedWeights routed({{nn::kForecastPrefix, &forecast}, {"", &source}});
   std::erase_if(options.without, [](const std::string& key) { return key.starts_with(nn::kForecastPrefix); });

@@ -25,11 +25,25 @@ cv::Mat AtPictureSize(const cv::Mat& frame, int scale) {
   return small;
 }
 
-std::vector<cv::Mat> ReadClip(const std::filesystem::path& path, int scale) {
-  std::vector<cv::Mat> frames = ReadAllFrames(path);
-  for (cv::Mat& frame : frames) frame = AtPictureSize(frame, scale);
-  return frames;
-}
+/// A clip's frames at picture size, one after the other: at the video's, a whole clip may take gigabytes.
+class Frames {
+ public:
+  Frames(const std::filesystem::path& path, int scale) : reader_(path), scale_(scale) {}
+  /// Empty at the end.
+  cv::Mat Next() {
+    const cv::Mat frame = reader_.Next();
+    return frame.empty() ? frame : AtPictureSize(frame, scale_);
+  }
+  /// What is broken further on is said all the same.
+  void SkipRest() {
+    while (reader_.Skip()) {
+    }
+  }
+
+ private:
+  VideoReader reader_;
+  int scale_;
+};
 
 double SquaredError(const cv::Mat& a, const cv::Mat& b, const cv::Mat& mask) {
   const double distance = cv::norm(a, b, cv::NORM_L2, mask);
@@ -46,6 +60,8 @@ std::vector<cv::Rect> ViewsOf(const Task& task) {
   }
   return views;
 }
+
+cv::Rect HeadOf(const Task& task) { return {0, 0, task.cameras.front().width_px, task.cameras.front().height_px}; }
 
 /// 255 where a channel differs from the first frame.
 cv::Mat Moved(const cv::Mat& frame, const cv::Mat& first) {
@@ -104,42 +120,60 @@ std::optional<cv::Point2d> FindObject(const Task& task, const cv::Mat& head_rgb)
   return std::nullopt;
 }
 
-void DriftMeter::Add(const ClipPair& clips) {
-  const std::vector<cv::Mat> real = ReadClip(clips.real, clips.scale), model = ReadClip(clips.model, clips.scale);
-  const std::size_t frames = std::min(real.size(), model.size());
-  const Camera& head = clips.task->cameras.front();
-  const cv::Rect head_px(0, 0, head.width_px, head.height_px);
-  const std::vector<cv::Rect> views = ViewsOf(*clips.task);
-  const std::size_t chunks = (frames > 0 ? frames - 1 : 0) / static_cast<std::size_t>(chunk_);
-  if (sums_.size() < chunks) sums_.resize(chunks);
-  for (std::size_t t = 1; t <= chunks * static_cast<std::size_t>(chunk_); ++t) {
-    Sums& sums = sums_[(t - 1) / static_cast<std::size_t>(chunk_)];
-    const cv::Mat moved = Moved(real[t], real[0]);
-    sums.clips += (t - 1) % static_cast<std::size_t>(chunk_) == 0;
-    for (const cv::Rect& view : views) {
-      sums.error += SquaredError(real[t](view), model[t](view), {});
-      sums.values += 3.0 * view.area();
-    }
-    sums.moving_error += SquaredError(real[t], model[t], moved);
-    sums.copy_error += SquaredError(real[t], real[0], moved);
-    sums.moving_values += 3.0 * cv::countNonZero(moved);
-    if (t - 1 >= clips.commands.size()) continue;
-    for (const ArmState& arm : clips.commands[t - 1]) {
-      const auto patch = GripperPatch(clips, clips.commands[t - 1], arm, real[t](head_px));
-      if (!patch) continue;
-      ++sums.grippers_in_sight;
-      if (const auto px = GripperError(*patch, real[t](head_px), model[t](head_px))) {
-        sums.gripper_px += *px;
-        ++sums.grippers;
-      }
+void DriftMeter::AddFrame(const ClipPair& clips, std::size_t t, const Shown& shown, Sums& sums) {
+  const cv::Mat moved = Moved(shown.real, shown.first);
+  for (const cv::Rect& view : ViewsOf(*clips.task)) {
+    sums.error += SquaredError(shown.real(view), shown.model(view), {});
+    sums.values += 3.0 * view.area();
+  }
+  sums.moving_error += SquaredError(shown.real, shown.model, moved);
+  sums.copy_error += SquaredError(shown.real, shown.first, moved);
+  sums.moving_values += 3.0 * cv::countNonZero(moved);
+  if (t - 1 >= clips.commands.size()) return;
+  const cv::Rect head_px = HeadOf(*clips.task);
+  for (const ArmState& arm : clips.commands[t - 1]) {
+    const auto patch = GripperPatch(clips, clips.commands[t - 1], arm, shown.real(head_px));
+    if (!patch) continue;
+    ++sums.grippers_in_sight;
+    if (const auto px = GripperError(*patch, shown.real(head_px), shown.model(head_px))) {
+      sums.gripper_px += *px;
+      ++sums.grippers;
     }
   }
+}
+
+void DriftMeter::Add(const ClipPair& clips) {
+  Frames real(clips.real, clips.scale), model(clips.model, clips.scale);
+  Shown shown;
+  shown.first = shown.real = real.Next();
+  shown.model = model.Next();
+  std::vector<Sums> sums = sums_;  // of clips that cannot be read on nothing is kept
+  Sums unfinished;                 // of a chunk that does not become whole nothing is
+  const auto whole = static_cast<std::size_t>(chunk_);
+  std::size_t frames = 1;
+  for (;; ++frames) {
+    const cv::Mat next_real = real.Next(), next_model = model.Next();
+    if (next_real.empty() || next_model.empty()) break;
+    shown.real = next_real;
+    shown.model = next_model;
+    const std::size_t chunk = (frames - 1) / whole, place = (frames - 1) % whole;
+    if (place == 0) unfinished = chunk < sums.size() ? sums[chunk] : Sums();
+    AddFrame(clips, frames, shown, unfinished);
+    if (place + 1 < whole) continue;
+    ++unfinished.clips;
+    if (chunk == sums.size()) sums.emplace_back();
+    sums[chunk] = unfinished;
+  }
+  real.SkipRest();
+  model.SkipRest();
+  sums_ = std::move(sums);
   if (frames < 2) return;
-  const auto truly = FindObject(*clips.task, real[frames - 1](head_px));
+  const cv::Rect head = HeadOf(*clips.task);
+  const auto truly = FindObject(*clips.task, shown.real(head));
   if (!truly) return;
-  const auto seen = FindObject(*clips.task, model[frames - 1](head_px));
+  const auto seen = FindObject(*clips.task, shown.model(head));
   object_px_.push_back(seen ? std::hypot(seen->x - truly->x, seen->y - truly->y)
-                            : std::hypot(head.width_px, head.height_px));
+                            : std::hypot(head.width, head.height));
 }
 
 std::vector<ChunkDrift> DriftMeter::Chunks() const {

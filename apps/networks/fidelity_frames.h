@@ -25,8 +25,9 @@ class DriftMeter {
   /// @param chunk  K, frames
   explicit DriftMeter(int chunk) : chunk_(chunk) {}
 
-  /// Clips of different length are measured as far as both go.
-  /// @throws Error if a video cannot be read.
+  /// Clips of different length are measured as far as both go; of each, the first frame and the last that was read are
+  /// held, and no more.
+  /// @throws Error if a video cannot be read: nothing of the two is added then.
   void Add(const ClipPair& clips);
 
   std::vector<ChunkDrift> Chunks() const;
@@ -39,6 +40,13 @@ class DriftMeter {
     double values = 0, moving_values = 0;
     std::int64_t grippers = 0, grippers_in_sight = 0;  ///< found, of those that the real picture shows
   };
+  /// Frames of the same time, at picture size, and the real clip's first.
+  struct Shown {
+    cv::Mat first, real, model;
+  };
+
+  /// @param t  of the frames, at least 1
+  static void AddFrame(const ClipPair& clips, std::size_t t, const Shown& shown, Sums& sums);
 
   int chunk_;
   std::vector<Sums> sums_;

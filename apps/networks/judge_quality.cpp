@@ -92,7 +92,7 @@ ClassifierCard Calibrate(const std::vector<double>& logits, const JudgeClips& cl
   double best_loss = std::numeric_limits<double>::infinity();
   for (double temperature = 0.2; temperature < 20; temperature *= 1.02) {
     const double loss = OrNotANumber(CalibrationOf(Probabilities(logits, {temperature, 0.5, 0}), outcomes).log_loss);
-    if (loss >= best_loss) continue;
+    if (!(loss < best_loss)) continue;
     best_loss = loss;
     card.temperature = temperature;
   }

@@ -7,6 +7,7 @@
 #include <cstring>
 #include <limits>
 #include <map>
+#include <set>
 #include <utility>
 
 #include "core/hash.h"
@@ -41,7 +42,7 @@ class RunClips final : public JudgeClipSource {
 struct Labelled {
   const Task* task;
   std::filesystem::path video;
-  std::string mark, state;
+  std::string mark, episode, state;
   bool success;
 };
 
@@ -71,8 +72,9 @@ class Tasks {
 };
 
 void AddRun(const std::filesystem::path& run, const LabelledRuns& options, Tasks& tasks,
-            std::vector<Labelled>& labelled) {
+            std::vector<Labelled>& labelled, std::set<std::string>& worlds) {
   const Store store = Store::Open(run, Store::Mode::kReadOnly);
+  for (const WorldInfo& world : store.Worlds()) worlds.insert(world.name);
   std::map<std::string, const Task*> known;
   for (const Task& task : store.Tasks()) known[task.id] = tasks.Add(task, run);
   const auto verdicts = store.CurrentVerdicts();
@@ -87,8 +89,8 @@ void AddRun(const std::filesystem::path& run, const LabelledRuns& options, Tasks
     const Label label = own->second.label;
     if (label != Label::kSuccess && label != Label::kFailure) continue;
     labelled.push_back({known.at(key.pair.task), store.folder() / episode.video,
-                        ClipMark(episode.video_sha256), key.pair.task + "/" + key.pair.initial_state,
-                        label == Label::kSuccess});
+                        ClipMark(episode.video_sha256), (run / key.Id()).string(),
+                        key.pair.task + "/" + key.pair.initial_state, label == Label::kSuccess});
   }
 }
 
@@ -115,6 +117,7 @@ void Add(const Labelled& one, at::Tensor pictures, RunClips& clips) {
   clip.frames = kPictures;
   clip.task = static_cast<std::int32_t>(task - clips.tasks.begin());
   clip.outcome = one.success ? 1 : 0;
+  clip.episode = one.episode;
   clip.state = one.state;
   clips.clips.push_back(std::move(clip));
   clips.pictures.push_back(std::move(pictures));
@@ -135,12 +138,35 @@ void CheckEnough(const RunClips& learn, const LabelledRuns& options) {
   }
 }
 
+/// Of one kind alone nothing can be measured: no AUROC, no kappa.
+void CheckHoldout(const RunClips& holdout, const std::vector<Labelled>& labelled, const LabelledRuns& options) {
+  const auto successes = std::ranges::count_if(holdout.clips, [](const PackedClip& clip) { return clip.outcome == 1; });
+  const auto failures = std::ssize(holdout.clips) - successes;
+  if (successes > 0 && failures > 0) return;
+  std::set<std::string> states, kept;
+  for (const Labelled& one : labelled) states.insert(one.state);
+  for (const PackedClip& clip : holdout.clips) kept.insert(clip.state);
+  throw InvalidInput("{} successes and {} failures in {} of {} initial states with a label are kept to measure with, "
+                     "wanted some of both: more labelled states, a larger share of them (--holdout, found {}), or "
+                     "another seed",
+                     successes, failures, kept.size(), states.size(), options.holdout);
+}
+
+void CheckWorlds(const std::vector<std::string>& wanted, const std::set<std::string>& there) {
+  for (const std::string& world : wanted) {
+    if (there.contains(world)) continue;
+    throw InvalidInput("--worlds: no clip is of world '{}', wanted some of: {}", world, fmt::join(there, ", "));
+  }
+}
+
 }  // namespace
 
 LabelledClips ReadLabelledClips(const LabelledRuns& options, const std::function<void(const std::string&)>& say) {
   Tasks tasks;
   std::vector<Labelled> labelled;
-  for (const std::filesystem::path& run : options.runs) AddRun(run, options, tasks, labelled);
+  std::set<std::string> worlds;
+  for (const std::filesystem::path& run : options.runs) AddRun(run, options, tasks, labelled, worlds);
+  CheckWorlds(options.worlds, worlds);
   if (labelled.empty())
     throw InvalidInput("no clip has a success or failure by '{}': wanted one who has judged these runs", options.truth);
   auto learn = std::make_unique<RunClips>(), holdout = std::make_unique<RunClips>();
@@ -163,6 +189,7 @@ LabelledClips ReadLabelledClips(const LabelledRuns& options, const std::function
       say(fmt::format("left out: {}", error.what()));
     }
   CheckEnough(*learn, options);
+  CheckHoldout(*holdout, labelled, options);
   learn->recipe = holdout->recipe =
       Sha256Hex(fmt::format("{} {} {}x{} {}", marks, options.truth, options.width_px, options.height_px, options.holdout));
   return {std::move(learn), std::move(holdout)};

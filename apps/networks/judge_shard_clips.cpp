@@ -17,6 +17,10 @@ ShardClips::ShardClips(const train::ShardFolders& shards, train::Split split, co
   for (const PackedClip& clip : set_.clips) {
     if (clip.outcome >= 0) clips.push_back(clip);
   }
+  if (clips.empty())
+    throw InvalidInput("{}: none of the {} clips says whether it was a success, wanted shards of what `evac collect` "
+                       "recorded; a judge of clips that somebody rated is `evac judge train`'s",
+                       set_.shards.FolderNames(), set_.clips.size());
   if (codec_) codec_->Open(set_.shards);
 }
 

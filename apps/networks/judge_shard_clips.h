@@ -9,7 +9,7 @@ namespace evac {
 class ShardClips final : public JudgeClipSource {
  public:
   /// @param codec  whose latents lie beside the shards, or null; outlives this
-  /// @throws as PackedSet and ShardCodec::Open
+  /// @throws as PackedSet and ShardCodec::Open; InvalidInput if no clip's outcome is known
   ShardClips(const train::ShardFolders& shards, train::Split split, const ShardCodec* codec);
 
   at::Tensor Pictures(const PackedClip& clip, const std::vector<std::int64_t>& rows) const override;

@@ -20,8 +20,9 @@ std::string JudgedCsv(const std::vector<JudgedClips>& judged, const ClassifierCa
     for (std::size_t i = 0; i < some.clips->size(); ++i) {
       const PackedClip& clip = (*some.clips)[i];
       const double probability = CalibratedProbability(some.logits[i], card);
-      csv += CsvLine({some.part, some.seen, tasks.at(static_cast<std::size_t>(clip.task)), std::to_string(clip.recording),
-                      clip.state, clip.behaviour, clip.fate, std::to_string(clip.outcome), fmt::format("{:.4f}", probability),
+      csv += CsvLine({some.part, some.seen, tasks.at(static_cast<std::size_t>(clip.task)),
+                      clip.episode.empty() ? std::to_string(clip.recording) : clip.episode, clip.state, clip.behaviour,
+                      clip.fate, std::to_string(clip.outcome), fmt::format("{:.4f}", probability),
                       Name(LabelOf(probability, card))});
     }
   }

@@ -17,8 +17,9 @@ struct JudgedClips {
   std::vector<double> logits;  ///< of success, uncalibrated, in the order of the clips
 };
 
-/// A row per clip: part,seen,task,recording,state,behaviour,fate,outcome,probability,verdict. Outcome 1 or 0; the probability
-/// calibrated, the verdict with the card's threshold and its margin.
+/// A row per clip: part,seen,task,recording,state,behaviour,fate,outcome,probability,verdict. The recording is its number
+/// in the packing, or of a run's clip its `episode`. Outcome 1 or 0; the probability calibrated, the verdict with the
+/// card's threshold and its margin.
 /// @param tasks  names by a clip's number of its task
 std::string JudgedCsv(const std::vector<JudgedClips>& judged, const ClassifierCard& card,
                       const std::vector<std::string>& tasks);

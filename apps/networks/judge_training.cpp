@@ -81,6 +81,28 @@ train::Settings SettingsOf(JudgeTrainingOptions& options) {
   return settings;
 }
 
+void CheckJudgeOptions(const JudgeTrainingOptions& options) {
+  if (options.batch < 1) throw InvalidInput("judge training: batch is {}, wanted at least 1", options.batch);
+  if (options.looks < 1 || options.looks > 16) throw InvalidInput("judge training: looks is {}, wanted 1 … 16", options.looks);
+  if (!(options.longest >= 1)) throw InvalidInput("judge training: longest is {}, wanted at least 1", options.longest);
+  train::RequireShares(kTraining, {{"calibration", options.calibration},
+                                   {"drop_view", options.drop_view},
+                                   {"jitter", options.jitter},
+                                   {"mirror_share", options.mirror_share},
+                                   {"reconstructed_share", options.reconstructed_share},
+                                   {"unsure", options.unsure}});
+  train::RequireWeights(kTraining, {{"object_weight", options.object_weight}});
+  CheckChanges(kTraining, options.changes);
+  if (options.shift_px < 0) throw InvalidInput("judge training: shift_px is {}, wanted at least 0", options.shift_px);
+}
+
+void RequireBothOutcomes(const JudgeClips& clips, const char* to) {
+  const auto successes = std::ranges::count_if(clips, [](const PackedClip& clip) { return clip.outcome == 1; });
+  if (successes == 0 || successes == std::ssize(clips))
+    throw InvalidInput("{} of {} clips to {} are successes, wanted some of both kinds: more recordings", successes,
+                       clips.size(), to);
+}
+
 JudgeSplit SplitForJudge(const JudgeClips& clips, const JudgeTrainingOptions& options) {
   const std::uint64_t seed = SeedFor(options.job.trainer.seed, "judge calibration");
   JudgeSplit split;
@@ -88,13 +110,8 @@ JudgeSplit SplitForJudge(const JudgeClips& clips, const JudgeTrainingOptions& op
     const bool calibrates = SplitMix64(SeedFor(seed, clip.state)).Uniform() < options.calibration;
     (calibrates ? split.calibration : split.fit).push_back(clip);
   }
-  for (const JudgeClips* part : {&split.fit, &split.calibration}) {
-    const auto successes =
-        std::count_if(part->begin(), part->end(), [](const PackedClip& c) { return c.outcome == 1; });
-    if (successes == 0 || successes == static_cast<std::ptrdiff_t>(part->size()))
-      throw InvalidInput("{} of {} clips to {} are successes, wanted some of both kinds: more recordings", successes,
-                         part->size(), part == &split.fit ? "learn from" : "calibrate with");
-  }
+  RequireBothOutcomes(split.fit, "learn from");
+  RequireBothOutcomes(split.calibration, "calibrate with");
   return split;
 }
 
@@ -117,18 +134,7 @@ ClassifierClips ForNetwork(const at::Tensor& bytes, const JudgeClips& clips) {
 
 JudgeTraining::JudgeTraining(const JudgeClipSource& source, const JudgeClips& fit, const JudgeTrainingOptions& options)
     : source_(source), fit_(fit), options_(options) {
-  if (options.batch < 1) throw InvalidInput("judge training: batch is {}, wanted at least 1", options.batch);
-  if (options.looks < 1 || options.looks > 16) throw InvalidInput("judge training: looks is {}, wanted 1 … 16", options.looks);
-  if (!(options.longest >= 1)) throw InvalidInput("judge training: longest is {}, wanted at least 1", options.longest);
-  train::RequireShares(kTraining, {{"calibration", options.calibration},
-                                   {"drop_view", options.drop_view},
-                                   {"jitter", options.jitter},
-                                   {"mirror_share", options.mirror_share},
-                                   {"reconstructed_share", options.reconstructed_share},
-                                   {"unsure", options.unsure}});
-  train::RequireWeights(kTraining, {{"object_weight", options.object_weight}});
-  CheckChanges(kTraining, options.changes);
-  if (options.shift_px < 0) throw InvalidInput("judge training: shift_px is {}, wanted at least 0", options.shift_px);
+  CheckJudgeOptions(options);
 }
 
 std::vector<std::array<std::int64_t, 2>> JudgeTraining::DrawShifts(train::Dice& dice, std::int64_t views) const {

@@ -29,6 +29,9 @@ struct JudgeTrainingOptions {
 };
 train::Settings SettingsOf(JudgeTrainingOptions& options);
 
+/// @throws InvalidInput, TensorError naming an option that is out of range: all but the trainer's
+void CheckJudgeOptions(const JudgeTrainingOptions& options);
+
 /// What a clip shows, moved: the same in all its pictures, so that what happens in it stays the same.
 struct SeenClip {
   at::Tensor pictures;  ///< [V, T, H, W, 3] bytes
@@ -36,6 +39,10 @@ struct SeenClip {
 };
 /// @param shift_px  per view: right, down
 SeenClip Moved(const SeenClip& clip, const std::vector<std::array<std::int64_t, 2>>& shift_px, bool is_mirrored);
+
+/// @param to  what they are for: "learn from"
+/// @throws InvalidInput unless there is a success and a failure among them
+void RequireBothOutcomes(const JudgeClips& clips, const char* to);
 
 /// Clips to learn from, by initial state: most of them to learn from, the rest to calibrate with.
 struct JudgeSplit {
@@ -55,7 +62,7 @@ ClassifierClips ForNetwork(const at::Tensor& bytes, const JudgeClips& clips);
 class JudgeTraining {
  public:
   /// @param source, fit  outlive this; fit are clips of the source
-  /// @throws InvalidInput, TensorError naming an option that is out of range.
+  /// @throws InvalidInput, TensorError as CheckJudgeOptions
   JudgeTraining(const JudgeClipSource& source, const JudgeClips& fit, const JudgeTrainingOptions& options);
   at::Tensor Loss(const ClassifierNet& net, const train::StepPlace& place) const;
 

@@ -207,6 +207,18 @@ void PlanShards(const PackArguments& arguments, Packing& packing) {
   }
 }
 
+/// Trainings learn from one split and are measured on the other. No hold-out is meant by --holdout 0 alone.
+void SayEmptySplit(const PackArguments& arguments, const Packing& packing) {
+  const auto held_out = std::ranges::count_if(packing.shards, &PlannedShard::holds_out);
+  const bool lacks_holdout = held_out == 0 && arguments.hold_out > 0;
+  const bool lacks_train = held_out == std::ssize(packing.shards);
+  if (!lacks_holdout && !lacks_train) return;
+  Tell(fmt::format("evac: warning: {} of {} recordings is held out by --holdout {}, and trainings want some on either "
+                   "side: wanted a {} --holdout, or another --seed",
+                   lacks_train ? "every one" : "none", packing.sources.size(), arguments.hold_out,
+                   lacks_train ? "smaller" : "larger"));
+}
+
 std::string RecipeOf(const PackArguments& arguments, const Packing& packing) {
   std::string all =
       fmt::format("evac-shard 1 seed {} crops {} hold-out {} clips {} period {} size {}x{} maps {} arms {}",
@@ -221,6 +233,9 @@ std::string RecipeOf(const PackArguments& arguments, const Packing& packing) {
 
 Packing Plan(const PackArguments& arguments) {
   const nn::ModelConfig config = ReadEvacConfig(arguments.config);
+  if (!arguments.cameras.empty() && std::ssize(arguments.cameras) != config.views)
+    throw InvalidInput("--cameras: {} cameras, wanted {}, one for each view of {}", arguments.cameras.size(),
+                       config.views, arguments.config.string());
   Packing packing;
   packing.how = {arguments.period_s, arguments.cameras, static_cast<std::size_t>(config.views), arguments.arms,
                  static_cast<std::size_t>(config.chunk + 1)};
@@ -236,6 +251,7 @@ Packing Plan(const PackArguments& arguments) {
   SayGrippers(packing);
   MeasureMotion(arguments, packing);
   PlanShards(arguments, packing);
+  SayEmptySplit(arguments, packing);
   packing.recipe = RecipeOf(arguments, packing);
   return packing;
 }

@@ -110,7 +110,7 @@ PackedSet::PackedSet(const train::ShardFolders& folders, train::Split split) : s
       throw InvalidInput("{}: a clip of recording {} and task {}, wanted below {} and {}",
                          shards.shards()[clip.shard].path.string(), recording, clip.task, recordings.states.size(),
                          tasks.size());
-    clips.push_back({clip, recording, recordings.states[at], recordings.behaviours[at], recordings.fates[at]});
+    clips.push_back({clip, recording, "", recordings.states[at], recordings.behaviours[at], recordings.fates[at]});
   }
 }
 

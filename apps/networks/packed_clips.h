@@ -9,12 +9,13 @@
 
 namespace evac {
 
-/// A clip of a shard with what the packing knows of its recording beside the tensors.
+/// A clip of a shard with what the packing knows of its recording beside the tensors; or one of a run.
 struct PackedClip : train::Clip {
   std::int64_t recording = 0;  ///< of its packing
-  std::string state;      ///< recordings that began alike share it: what data is split by
-  std::string behaviour;  ///< entry of the collection's mix; empty where nobody collected it
-  std::string fate;       ///< judges/attempt.h; empty where unknown
+  std::string episode;         ///< of a run's clip instead: the run's folder, /, the episode's id
+  std::string state;           ///< recordings that began alike share it: what data is split by
+  std::string behaviour;       ///< entry of the collection's mix; empty where nobody collected it
+  std::string fate;            ///< judges/attempt.h; empty where unknown
 };
 
 /// One split of some packings, the clips in the order of the shards.

@@ -1,7 +1,7 @@
 #include "apps/networks/shard_codec.h"
 
-#include "apps/networks/codec_identity.h"
 #include "worldmodel/nn/pictures.h"
+#include "worldmodel/train/sha256.h"
 
 namespace evac {
 
@@ -10,7 +10,7 @@ ShardCodec::ShardCodec(const std::filesystem::path& weights, const nn::VaeConfig
 
 void ShardCodec::Open(train::ShardSet& shards) const {
   shards.OpenLatents(config_.z_channels, config_.Stride(), config_.scale_factor);
-  if (shards.codec() != CodecSha256(path_))
+  if (shards.codec() != train::CodecSha256(path_))
     throw TensorError(path_.string() + " did not make the shards' latents (they are of codec " + shards.codec() +
                       "): wanted `evac encode` with this codec");
 }

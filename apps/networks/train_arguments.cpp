@@ -51,7 +51,8 @@ void AddTraining(CLI::App& command, const std::shared_ptr<TrainArguments>& argum
   command
       .add_option("--training", arguments->training, "the page of training options; what is left out is the paper's")
       ->check(CLI::ExistingFile);
-  command.add_option("--set", arguments->settings, "NAME=VALUE, one option of that page; may be given again");
+  command.add_option("--set", arguments->settings, "NAME=VALUE, one option of that page; may be given again")
+      ->allow_extra_args(false);  // or it would take the folders behind it too
   CLI::Option* minutes =
       command.add_option("--minutes", arguments->minutes, "as many steps as fit, counted once after the first");
   minutes->check(Within(0.001, 1e6));

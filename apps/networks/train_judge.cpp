@@ -155,6 +155,13 @@ std::string MarksOf(const JudgeClipSource& learn, const std::filesystem::path& i
   return Joined(marks);
 }
 
+/// What a judge's card says of how long clips may be; nothing: it says nothing.
+std::optional<std::int64_t> LongestOn(const std::filesystem::path& judge) {
+  const WeightFile file(judge, kClassifierFormat);
+  if (!file.card().contains("longest_frames")) return std::nullopt;
+  return file.Whole("longest_frames", 1, 1000000);
+}
+
 /// @param steps  TrainerSummary::CardOfSteps
 TensorMetadata CardText(const Judged& judged, const JudgeData& data, const JudgeTrainingOptions& options,
                         const TensorMetadata& steps) {
@@ -184,7 +191,9 @@ TensorMetadata CardText(const Judged& judged, const JudgeData& data, const Judge
   if (learn.KnowsLengths()) {
     std::int64_t most = 0;
     for (const PackedClip& clip : learn.clips) most = std::max(most, clip.frames);
-    card["longest_frames"] = std::to_string(std::llround(options.longest * static_cast<double>(most)));
+    std::int64_t longest = std::llround(options.longest * static_cast<double>(most));
+    if (!data.init.empty()) longest = std::max(longest, LongestOn(data.init).value_or(0));
+    card["longest_frames"] = std::to_string(longest);
   }
   if (judged.longer) {
     card["longer"] = number(MiddleLength(options));
@@ -208,13 +217,20 @@ void Write(const train::JobPlace& place, const Learners<ClassifierNet>& learners
 
 }  // namespace
 
-void CalibrateJudge(const train::JobPlace& place, const JudgeTrainingOptions& options, const JudgeData& data) {
+void CalibrateJudge(const train::JobPlace& place, const JudgeTrainingOptions& given, const JudgeData& data) {
+  CheckJudgeOptions(given);
+  JudgeTrainingOptions options = given;
+  options.looks = LooksOnCard(WeightFile(data.init, kClassifierFormat));  // the weights stay as they are
   CheckInit(data, options);
+  RequireBothOutcomes(data.learn.clips, "calibrate with");
   const ClassifierShape shape = ShapeOf(data.learn, options);
   const Learners<ClassifierNet> learners(shape, options.job.trainer.seed, 1, BeginningOf(place, shape, options, data.init));
   const Judged judged = MeasureAll(learners.net(), data, data.learn.clips, options);
   Say(place, judged);
-  Write(place, learners, judged, data, CardText(judged, data, options, {{"steps", "0"}}));
+  TensorMetadata card = CardText(judged, data, options, {{"steps", "0"}});
+  card.erase("longest_frames");  // these clips taught the weights nothing
+  if (const auto longest = LongestOn(data.init)) card["longest_frames"] = std::to_string(*longest);
+  Write(place, learners, judged, data, card);
 }
 
 train::TrainerSummary TrainJudge(const train::JobPlace& place, const JudgeTrainingOptions& given,

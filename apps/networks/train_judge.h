@@ -12,9 +12,12 @@ struct JudgeData {
   std::filesystem::path init = {};  ///< a judge of the same tasks and views to go on from; empty: from nothing
 };
 
-/// Writes OUT/judge.safetensors with the weights of `data.init`, not trained on: temperature and threshold are chosen anew on
-/// all of `data.learn`, and what it is worth is measured on the hold-out.
-void CalibrateJudge(const train::JobPlace& place, const JudgeTrainingOptions& options, const JudgeData& data);
+/// Writes OUT/judge.safetensors with the weights of `data.init`, not trained on: temperature and threshold are chosen
+/// anew on all of `data.learn`, and what it is worth is measured on the hold-out. How long a clip may be and at how many
+/// places it looks stay as its card has them, whatever `given` says.
+/// @throws InvalidInput, TensorError naming an option that is out of range (CheckJudgeOptions); InvalidInput if
+///   `data.init` is of other tasks or views, or if `data.learn` has not clips of both outcomes.
+void CalibrateJudge(const train::JobPlace& place, const JudgeTrainingOptions& given, const JudgeData& data);
 
 /// Trains the classifier judge and writes OUT/judge.safetensors: its weights and its card (docs/classifier_judge.md).
 /// Where the clips have a codec, `reconstructed_share` of them are shown as it gives them back, which is how a world

@@ -178,9 +178,11 @@ SampleSize PairsForMcNemar(const FlipRates& rates, const Promise& promise, std::
   return {.exact = static_cast<double>(n + 1), .n = n + 1};
 }
 
-std::int64_t FurtherWanted(double wanted, const Repeated& have) {
+Defined<std::int64_t> FurtherWanted(double wanted, const Repeated& have) {
   const double each = have.effective > 0 ? static_cast<double>(have.all) / static_cast<double>(have.effective) : 1;
-  return std::max<std::int64_t>(1, static_cast<std::int64_t>(std::ceil(wanted * each)) - have.all);
+  const double all = std::ceil(wanted * each);
+  if (!(all < 0x1.0p53)) return Undefined{"more than can be counted"};
+  return std::max<std::int64_t>(1, static_cast<std::int64_t>(all) - have.all);
 }
 
 double FisherPower(std::int64_t n, double p1, double p2, double alpha) {

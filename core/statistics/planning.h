@@ -43,8 +43,8 @@ double McNemarPower(std::int64_t pairs, const FlipRates& rates, double alpha = 0
 SampleSize PairsForMcNemar(const FlipRates& rates, const Promise& promise = {}, std::int64_t most = 5000);
 
 /// How many further pairs or trials, that repeat initial states as those there are do, until they tell as much as
-/// `wanted` independent ones. At least 1.
-std::int64_t FurtherWanted(double wanted, const Repeated& have);
+/// `wanted` independent ones. At least 1; undefined from 2^53 on, beyond which they cannot be counted.
+Defined<std::int64_t> FurtherWanted(double wanted, const Repeated& have);
 
 /// Power of Fisher's exact two-sided test with n trials per policy.
 double FisherPower(std::int64_t n, double p1, double p2, double alpha = 0.05);

@@ -14,13 +14,13 @@ async function start() {
   if (invite) history.replaceState(null, '', '/');
   document.title = `${me.study} · rating`;
   if (me.role === 'lead') return board();
-  await loadOutbox(me.study_id, me.rater);
   const isBusy = await isAnotherTabHere();
   if (isBusy) {
     const choice = await ask('Open in another tab', [make('p', {}, 'This study is open in another tab of this browser. Only one may write.')], [['Leave it there', false], ['Take over', true, 'primary']]);
     if (!choice) { session.epoch = -1; session.isOther = true; return show(make('.sheet', {}, make('h1', {}, 'Open in another tab'), make('p', {}, 'Go on there, or load this page again to take over.'))).className = 'centred'; }
   }
   await becomeTheTab();
+  await loadOutbox(me.study_id, me.rater);  // not before: until then the other tab adds answers, and sends some
   await flush();
   rating.done = rating.doneAtStart = me.progress.done;
   rating.started = Date.now();

@@ -136,6 +136,52 @@ TEST_F(Deciding, ImportedTrialsAreWhatAWorldIsHeldAgainst) {
   EXPECT_EQ(task.at("policies").at(0).at("further_imagined").at("trials"), 8);
 }
 
+/// By its name alone tuesday's file was monday's: repeats that ended alike were "there already".
+TEST_F(Deciding, TwoDaysTablesOfOneNameAreTwoFiles) {
+  const std::string header = "task,initial_state,policy,checkpoint,outcome\n",
+                    row = "take_bottle,41-0000,visual_pick,good,success\n";
+  for (const char* day : {"mon", "tue"}) {
+    std::filesystem::create_directory(folder_ / day);
+    std::ofstream(folder_ / day / "trials.csv") << header << row;
+  }
+  const auto brought = [&](const std::filesystem::path& file) {
+    return Printed(AddImportReal, {"import-real", file.string(), "--run", Run()});
+  };
+  EXPECT_THAT(brought(folder_ / "mon/trials.csv"), HasSubstr("1 real trial imported"));
+  EXPECT_THAT([&] { brought(folder_ / "tue/trials.csv"); },
+              testing::ThrowsMessage<Error>(testing::AllOf(HasSubstr("tue/trials.csv:2: found no number of the trial"),
+                                                           HasSubstr("mon/trials.csv:2"))));
+  std::ofstream(folder_ / "mon/trials.csv", std::ios::app) << "take_bottle,41-0001,visual_pick,good,failure\n";
+  const std::filesystem::path by_another_way = folder_ / "tue/../mon/trials.csv";
+  EXPECT_THAT(brought(by_another_way), HasSubstr("1 real trial imported, on 1 initial state; 1 there already"));
+  EXPECT_THAT(brought(std::filesystem::relative(folder_ / "mon/trials.csv")), HasSubstr("2 there already"));
+  std::ofstream(folder_ / "tue/trials.csv") << "task,initial_state,policy,checkpoint,outcome,trial\n"
+                                            << "take_bottle,41-0000,visual_pick,good,success,2\n";
+  EXPECT_THAT(brought(folder_ / "tue/trials.csv"), HasSubstr("1 real trial imported"));
+}
+
+/// Those that nobody could tell the outcome of were counted among what a world was held against.
+TEST_F(Deciding, ImportedTrialsWithoutAnOutcomeAreNotAmongThoseThatAWorldIsHeldAgainst) {
+  Printed(AddImportReal, {"import-real",
+                          Csv("take_bottle,41-0000,visual_pick,good,success,\n"
+                              "take_bottle,41-0001,visual_pick,good,cannot_tell,\n"
+                              "take_bottle,41-0002,visual_pick,good,invalid,\n"),
+                          "--run", Run()});
+  EXPECT_THAT(Printed(AddTrust, {"trust", Run()}),
+              HasSubstr("Held against 1 imported real trial (2 more without an outcome); judge oracle."));
+}
+
+/// "No imagined episode is judged", whoever had judged them.
+TEST_F(Deciding, AJudgeThatTheRunHasNotIsRefusedWithThoseThatItHas) {
+  try {
+    Printed(AddTrust, {"trust", Run(), "--judge", "orakel"});
+    ADD_FAILURE() << "it was taken";
+  } catch (const Error& error) {
+    EXPECT_EQ(error.exit_code(), ExitCode::kInvalidInput);
+    EXPECT_THAT(error.what(), HasSubstr("--judge: found 'orakel', wanted one who has judged " + Run() + ": oracle"));
+  }
+}
+
 TEST_F(Deciding, AWorldThatNobodyJudgedIsNamedAndTakesNoTrustFromTheOthers) {
   Store::Open(Run(), Store::Mode::kReadWrite).AddWorld({"dream", "evac", false, "d4e"});
   const std::string text = Printed(AddTrust, {"trust", Run()});

@@ -2,9 +2,13 @@
 
 #include <gtest/gtest.h>
 
+#include <atomic>
 #include <cmath>
+#include <functional>
 #include <opencv2/imgproc.hpp>
 
+#include "core/error.h"
+#include "core/file.h"
 #include "core/video.h"
 #include "tests/support/temp_folder.h"
 
@@ -155,6 +159,92 @@ TEST_F(Drift, PicturesAreComparedWhereThereIsAView) {
   drift.Add({&with_hand, write("real.mp4", 100), write("model.mp4", 160), {}, 1, 0});
   const double head = kWidth_px * kHeight_px, hand = 32 * 16, error = 60 * 60 * hand / (head + hand);
   EXPECT_NEAR(*drift.Chunks().at(0).psnr, 10 * std::log10(255 * 255 / error), 0.2);
+}
+
+/// Chunks that only one of the clips has to their end count nothing, nor do clips that cannot be read to theirs.
+TEST_F(Drift, WhatEndsWithinAChunkChangesNothingOfIt) {
+  const auto write = [&](const std::string& name, int frames) {
+    VideoWriter writer(folder_ / name, {.crf = 0});
+    for (int time = 0; time < frames; ++time)
+      writer.Append(Drawn({InReality(time % kFrames).thing, kGripper + cv::Point(1, 0)}));
+    return writer.Finish().path;
+  };
+  DriftMeter drift = Of([](int) { return InReality(0); });
+  const std::vector<ChunkDrift> before = drift.Chunks();
+  ClipPair clips{&task_, Write("other.mp4", InReality), write("short.mp4", kFrames - 1), {}, 1, 0};
+  drift.Add(clips);
+  const std::vector<ChunkDrift> after = drift.Chunks();
+  ASSERT_EQ(after.size(), 2u);
+  EXPECT_EQ(after[0].clips, 2);
+  EXPECT_NE(*after[0].psnr, *before[0].psnr);
+  EXPECT_EQ(after[1].clips, 1);
+  EXPECT_EQ(*after[1].psnr, *before[1].psnr);
+  EXPECT_EQ(*after[1].psnr_moving, *before[1].psnr_moving);
+  EXPECT_EQ(drift.object_px().size(), 2u);
+
+  const std::filesystem::path cut = folder_ / "cut.mp4";
+  const std::string whole = ReadFile(write("long.mp4", 20 * kFrames));
+  WriteFileAtomically(cut, whole.substr(0, whole.size() * 3 / 4));
+  for (const bool is_real : {true, false}) {
+    ClipPair broken = clips;
+    (is_real ? broken.real : broken.model) = cut;
+    EXPECT_THROW(drift.Add(broken), Error) << "behind the other's end";
+  }
+  EXPECT_EQ(drift.Chunks()[0].clips, 2);
+  EXPECT_EQ(*drift.Chunks()[0].psnr, *after[0].psnr);
+}
+
+/// Counts how many bytes of pictures are held at once; OpenCV's own allocator does the work.
+class CountedPictures final : public cv::MatAllocator {
+ public:
+  /// The most while this is done.
+  static std::int64_t PeakOf(const std::function<void()>& work) {
+    static CountedPictures& counted = *new CountedPictures;  // a picture that outlives the work is freed by it too
+    cv::Mat::setDefaultAllocator(&counted);
+    counted.peak_ = counted.now_.load();
+    work();
+    cv::Mat::setDefaultAllocator(counted.own_);
+    return counted.peak_;
+  }
+
+  cv::UMatData* allocate(int dims, const int* sizes, int type, void* data, std::size_t* step, cv::AccessFlag flags,
+                         cv::UMatUsageFlags usage) const override {
+    cv::UMatData* made = own_->allocate(dims, sizes, type, data, step, flags, usage);
+    made->prevAllocator = made->currAllocator = this;
+    const std::int64_t now = now_ += static_cast<std::int64_t>(made->size);
+    for (std::int64_t peak = peak_; now > peak && !peak_.compare_exchange_weak(peak, now);) {
+    }
+    return made;
+  }
+  bool allocate(cv::UMatData* data, cv::AccessFlag flags, cv::UMatUsageFlags usage) const override {
+    return own_->allocate(data, flags, usage);
+  }
+  void deallocate(cv::UMatData* data) const override {
+    if (data == nullptr) return;
+    now_ -= static_cast<std::int64_t>(data->size);
+    own_->deallocate(data);
+  }
+
+ private:
+  cv::MatAllocator* own_ = cv::Mat::getStdAllocator();
+  mutable std::atomic<std::int64_t> now_ = 0, peak_ = 0;
+};
+
+/// Both clips lay in memory as they were decoded: at four times the size, of 320 frames, gigabytes.
+TEST_F(Drift, LongClipsTakeNoMoreMemoryThanShortOnes) {
+  constexpr int kScale = 4, kLong = 120;
+  const auto write = [&](const std::string& name) {
+    VideoWriter writer(folder_ / name, {.preset = "ultrafast", .scale = kScale});
+    for (int time = 0; time < kLong; ++time) writer.Append(Drawn(InReality(time % 30)));
+    return writer.Finish().path;
+  };
+  const ClipPair clips{&task_, write("real.mp4"), write("model.mp4"), {}, kScale, 0};
+  DriftMeter drift(kChunk);
+  constexpr std::int64_t kFrame_bytes = std::int64_t{3} * kScale * kWidth_px * kScale * kHeight_px;
+  const std::int64_t peak = CountedPictures::PeakOf([&] { drift.Add(clips); });
+  EXPECT_EQ(drift.Chunks().size(), std::size_t{(kLong - 1) / kChunk});
+  EXPECT_GT(peak, kFrame_bytes) << "or nothing was counted";
+  EXPECT_LT(peak, 10 * kFrame_bytes);
 }
 
 TEST(FindObject, FindsTheMiddleOfTheTasksThingByItsColour) {

@@ -6,6 +6,7 @@
 
 #include <set>
 
+#include "apps/networks/judge_tables.h"
 #include "apps/networks/train_judge.h"
 #include "core/store.h"
 #include "core/video.h"
@@ -103,6 +104,19 @@ TEST_F(LabelledRun, BesideAnotherOfTheSameTaskByLargerCamerasBothAreReadWhole) {
   EXPECT_EQ(clips.learn->tasks, std::vector<std::string>{"carry"});
 }
 
+/// Each row of judged.csv said recording 0, and which clips the judge takes wrongly could not be looked at.
+TEST_F(LabelledRun, EachRowSaysTheRunAndTheEpisodeThatItsClipIsOf) {
+  const LabelledClips clips = Read(Options());
+  const auto rows = [](const JudgeClipSource& source) {
+    const JudgedClips judged{"hold-out", "recorded", &source.clips, std::vector<double>(source.clips.size(), 1)};
+    return JudgedCsv({judged}, ClassifierCard{}, source.tasks);
+  };
+  const std::string all = rows(*clips.learn) + rows(*clips.holdout);
+  const std::string run = (folder_ / "run").string();
+  EXPECT_THAT(all, HasSubstr("hold-out,recorded,carry," + run + "/real/carry/p@1/5-0003-s1,carry/5-0003,,,1,"));
+  EXPECT_THAT(all, HasSubstr("hold-out,recorded,carry," + run + "/real/carry/p@2/5-0003-s1,carry/5-0003,,,0,"));
+}
+
 TEST_F(LabelledRun, BecomesAClassifierThatJudgesOthersAndNotWhatItLearnedFrom) {
   const LabelledClips clips = Read(Options());
   JudgeTrainingOptions options;
@@ -142,6 +156,38 @@ TEST_F(LabelledRun, WithTooFewLabelsOfOneKindIsRefusedWithTheirNumbers) {
   options = Options();
   options.worlds = {"evac"};
   EXPECT_THAT([&] { Read(options); }, ThrowsMessage<Error>(HasSubstr("no clip")));
+}
+
+/// It learned for hours, measured "AUROC nan", wrote that on the card and ended with 0.
+TEST_F(LabelledRun, WithNothingOrOneKindAloneToMeasureWithIsRefusedBeforeItLearns) {
+  LabelledRuns options = Options();
+  options.holdout = 1e-9;
+  EXPECT_THAT([&] { Read(options); },
+              ThrowsMessage<Error>(HasSubstr("0 successes and 0 failures in 0 of 39 initial states with a label")));
+  const LabelledClips clips = Read(Options());
+  std::set<std::string> held_out;
+  for (const PackedClip& clip : clips.holdout->clips) held_out.insert(clip.state);
+  const auto verdicts = store_.CurrentVerdicts();
+  for (const Episode& episode : store_.Episodes()) {  // "hopeful" has seen no failure in any of these states
+    const auto said = verdicts.find(episode.key.Id());
+    if (said == verdicts.end()) continue;
+    Verdict verdict = said->second.at("people");
+    verdict.judge = "hopeful";
+    const bool is_held_out = held_out.contains("carry/" + episode.key.pair.initial_state);
+    if (!is_held_out || verdict.label == Label::kSuccess) store_.AddVerdict(verdict);
+  }
+  options = Options();
+  options.truth = "hopeful";
+  const std::string counts = fmt::format("{0} successes and 0 failures in {0} of 39 initial states", held_out.size());
+  EXPECT_THAT([&] { Read(options); }, ThrowsMessage<Error>(HasSubstr(counts)));
+}
+
+/// A name with a slip in it was a world without clips, beside another one that was learned from alone.
+TEST_F(LabelledRun, AWorldThatNoRunHasIsRefusedWithThoseThatThereAre) {
+  LabelledRuns options = Options();
+  options.worlds = {"real", "sym"};
+  EXPECT_THAT([&] { Read(options); },
+              ThrowsMessage<Error>(HasSubstr("--worlds: no clip is of world 'sym', wanted some of: real")));
 }
 
 TEST_F(LabelledRun, AClipThatCannotBeReadIsLeftOutAndNamed) {

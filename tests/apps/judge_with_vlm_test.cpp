@@ -135,6 +135,28 @@ TEST_F(ASmallServer, WhoseAnswersAloneCostSomethingHasItsPriceSaidBefore) {
   EXPECT_THAT(Judge(false, true), HasSubstr("about 0.02 USD")) << "8 requests of 250 tokens";
 }
 
+/// Each call of the command had the whole budget anew.
+TEST_F(ASmallServer, ABudgetIsForTheRunHoweverOftenTheCommandIsCalled) {
+  std::ofstream(page_, std::ios::app) << "budget: {max_requests: 9}\n";
+  const auto over = testing::ThrowsMessage<Error>(testing::AllOf(
+      HasSubstr("the budget is spent: "), HasSubstr("requests were sent, as many as may be"),
+      HasSubstr("what was judged is stored; the same command with a larger budget goes on")));
+  const auto judge = [&] {
+    try {
+      Judge();
+    } catch (const Error&) {
+      testing::internal::GetCapturedStdout();
+      throw;
+    }
+  };
+  EXPECT_THAT(judge, over) << "one for whether it sees, six about the first episode, two about the second";
+  const std::size_t asked = server_.Seen().size();
+  EXPECT_EQ(asked, 10u) << "and who it is";
+  EXPECT_THAT(judge, over) << "eight are spent, and one for whether it sees";
+  EXPECT_THAT(judge, over);
+  EXPECT_EQ(server_.Seen().size(), asked + 4) << "who it is and whether it sees, each time";
+}
+
 TEST_F(ASmallServer, IsAskedAnewWhereThatIsWanted) {
   Judge();
   EXPECT_THAT(Judge(true, true), HasSubstr("2 clips, 8 requests"));

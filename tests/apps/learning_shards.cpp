@@ -3,12 +3,12 @@
 #include <nlohmann/json.hpp>
 #include <string>
 
-#include "apps/networks/codec_identity.h"
 #include "core/file.h"
 #include "core/hash.h"
 #include "core/seed.h"
 #include "worldmodel/nn/tensor.h"
 #include "worldmodel/train/encode_shards.h"
+#include "worldmodel/train/sha256.h"
 #include "worldmodel/train/train_codec.h"
 #include "worldmodel/train/weight_files.h"
 
@@ -118,7 +118,7 @@ void WriteLearningShards(const std::filesystem::path& folder, const LearningShar
     const Tensors tensors = Empty(options, holds_out ? options.clips : 0);
     for (std::int64_t clip = 0; clip < options.clips; ++clip) {
       const bool success = clip % 2 == 0;
-      tensors.outcome[clip] = success ? 1 : 0;
+      tensors.outcome[clip] = !options.knows_outcome ? -1 : success ? 1 : 0;
       const auto y = 4 + static_cast<std::int64_t>(random.Below(static_cast<std::uint64_t>(options.height_px) - 7));
       for (std::int64_t i = 0; i < options.frames; ++i)
         Draw(options, tensors, clip * options.frames + i,
@@ -158,7 +158,7 @@ std::filesystem::path EncodeLearningShards(const std::filesystem::path& folder, 
   train::CheckpointWeights weights(codec);
   const nn::Vae vae(nn::Scope(weights, train::kCodecPrefix), place.config.vae);
   for (const auto& shard : train::ShardPaths(folder))
-    train::EncodeShard(vae, shard, {CodecSha256(codec), Sha256HexOfFile(shard)});
+    train::EncodeShard(vae, shard, {train::CodecSha256(codec), Sha256HexOfFile(shard)});
   return codec;
 }
 

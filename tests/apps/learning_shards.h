@@ -15,6 +15,7 @@ struct LearningShards {
   std::int64_t frames = 20;
   std::int64_t height_px = 16, width_px = 24;
   const char* behaviour = "good";
+  bool knows_outcome = true;  ///< as a collection's shards; those of a robot's recordings do not
 };
 
 /// Writes a training and a hold-out shard and shards.json, as docs/formats/shards.md says.

@@ -71,7 +71,8 @@ TEST_F(MeaninglessOption, OfARunIsRefusedOfATableOfRates) {
     EXPECT_THROW(Printed(AddReport, words), CLI::ExcludesError) << option.front();
   }
   EXPECT_FALSE(std::filesystem::exists(out));
-  for (const std::vector<std::string>& option : {std::vector<std::string>{"--judge", "human"}, {"--world", "sim"}}) {
+  for (const std::vector<std::string>& option :
+       {std::vector<std::string>{"--judge", "human"}, {"--world", "sim"}, {"--seed", "3"}}) {
     std::vector<std::string> words = {"correlate", "--pairs", csv};
     words.insert(words.end(), option.begin(), option.end());
     EXPECT_THROW(Printed(AddCorrelate, words), CLI::ExcludesError) << option.front();

@@ -257,6 +257,19 @@ TEST_F(Resolving, TheStatusSaysHowManyReplicatesAlphasIntervalIsNotFrom) {
                                                "dropped\\), Fleiss"));
 }
 
+/// It counted who said so: of four clips that neither of two raters could play "8 unplayable".
+TEST_F(Resolving, TheStatusCountsClipsThatCannotBePlayedAndNotWhoSaysSo) {
+  AtTheDesk ann(store, desk), bob(store, desk);
+  for (AtTheDesk* rater : {&ann, &bob}) {
+    for (DeskAnswer next = rater->Next(); !next.body.contains("done"); next = rater->Next())
+      desk.Unplayable(rater->Me(), {rater->epoch, next.body.at("presentation"), "media error 4"}, rater->now_ms);
+  }
+  ASSERT_EQ(store.UnplayableClips().size(), 8u);
+  testing::internal::CaptureStdout();
+  PrintRatingStatus(store, 1, false);
+  EXPECT_THAT(testing::internal::GetCapturedStdout(), testing::HasSubstr(" disputes, 4 unplayable\n"));
+}
+
 /// It was "0 %", as of somebody who has seen nothing but failures.
 TEST_F(Resolving, TheStatusGivesWhoHasSaidNothingNoShareOfSuccesses) {
   AtTheDesk ann(store, desk), bob(store, desk);

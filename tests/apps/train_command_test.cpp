@@ -101,6 +101,17 @@ TEST_F(TrainCommand, SaysThatAnotherVersionOfEvacBeganTheTraining) {
   EXPECT_THAT(note(), HasSubstr("was begun by an evac that did not write down its version"));
 }
 
+/// Its sampler takes two or more, and said so when everything was loaded.
+TEST_F(TrainCommand, ImaginingInOneStepIsRefused) {
+  const auto steps = [&](const char* number) {
+    Printed(AddEncode, {"encode", Path("shards"), "--config", Path("page.yaml"), "--codec", Path("page.yaml"),
+                        "--imagined", Path("imagined"), "--steps", number});
+  };
+  EXPECT_THROW(steps("1"), CLI::ValidationError);
+  EXPECT_THROW(steps("2"), TensorError) << "that page is no codec";
+  EXPECT_FALSE(std::filesystem::exists(Path("imagined")));
+}
+
 /// Nothing said which version had made half of the latents.
 TEST_F(TrainCommand, EncodingSaysThatAnotherVersionOfEvacBeganIt) {
   TrainCodec();
@@ -119,6 +130,26 @@ TEST_F(TrainCommand, EncodingSaysThatAnotherVersionOfEvacBeganIt) {
     std::filesystem::remove(Path(latents));
   EXPECT_THAT(note(), Not(HasSubstr("was begun by"))) << "begun anew";
   EXPECT_EQ(ReadFile(Path("shards/latents_begun_by")), EVAC_VERSION "\n");
+}
+
+/// It wrote beside a packing or another encoding that went on there.
+TEST_F(TrainCommand, EncodingIsRefusedWhereAnotherProcessWritesUnlessAllIsThere) {
+  TrainCodec();
+  const auto encode = [&](const std::vector<std::string>& more = {}) {
+    std::vector<std::string> words = {"encode", Path("shards"), "--config", Path("page.yaml"), "--codec", Path("codec/codec.safetensors")};
+    words.insert(words.end(), more.begin(), more.end());
+    return Printed(AddEncode, words);
+  };
+  const auto refused =
+      ThrowsMessage<Error>(HasSubstr("process " + std::to_string(::getpid()) + " is writing here; wait for it"));
+  {
+    const RunLock lock(Path("shards/lock"));
+    EXPECT_THAT([&] { encode(); }, refused);
+    EXPECT_FALSE(std::filesystem::exists(Path("shards/latents_00000.safetensors")));
+  }
+  EXPECT_THAT(encode(), HasSubstr("latents of 2 shards, 2 of them new"));
+  const RunLock lock(Path("shards/lock"));
+  EXPECT_THAT(encode(), HasSubstr("latents of 2 shards, 0 of them new")) << "nothing is written: the folder may be read-only";
 }
 
 TEST_F(TrainCommand, AFolderThatAnotherTrainingWritesIsRefusedWithItsProcess) {
@@ -190,6 +221,20 @@ TEST_F(TrainCommand, WhatOneFolderHoldsOutAnotherMayNotLearnFrom) {
     const std::vector<std::string> words = {learner, Path("shards"), Path("more"), "--steps", "1", "--out", Path("out")};
     EXPECT_THAT([&] { Train(words); }, refused) << learner;
   }
+}
+
+/// --set and --keep-steps took the folders behind them for further values.
+TEST_F(TrainCommand, AnOptionTakesItsOwnValueAndNotTheFoldersBehindIt) {
+  EXPECT_THAT(Train({"codec", "--config", Path("page.yaml"), "--steps", "1", "--set", "batch=2", "--set", "seed=4",
+                     Path("shards"), "--out", Path("codec")}),
+              HasSubstr("done after 1 steps"));
+  MakeFolders(Path("policy"));
+  const RunLock lock(Path("policy/lock"));
+  const auto is_read = ThrowsMessage<Error>(HasSubstr("is writing here; wait for it"));
+  for (const char* steps : {"1", "1,2"})
+    EXPECT_THAT([&] { Train({"policy", "--out", Path("policy"), "--keep-steps", steps, Path("shards"), "--steps", "2"}); },
+                is_read)
+        << steps;
 }
 
 TEST_F(TrainCommand, OptionsThatDoNothingAreRefused) {
@@ -267,6 +312,63 @@ TEST_F(TrainCommand, AJobThatIsCarriedElsewhereTrainsTheSameWeights) {
   refused({"--out", Path("x"), "--device", "gpu"}, "--device: found 'gpu', wanted cpu, cuda or cuda:N");
   refused({"--out", Path("x"), "--steps", "0"}, "--steps: found '0', wanted 1 to ");
   refused({"--out", Path("there"), "--steps", "2", "--threads", "2"}, Path("there/training.safetensors") + " is a training with other options");
+}
+
+/// It held a file of its own, so both could write into one OUT, and wrote no begun_by, so each later one had a note.
+TEST_F(TrainCommand, AJobThatIsCarriedElsewhereHoldsItsFolderAndSaysItsVersionAsTrainingsDo) {
+  Train({"codec", Path("shards"), "--config", Path("page.yaml"), "--job", Path("job"), "--set", "batch=2", "--steps", "1"});
+  const auto there = [&] {
+    return RunCommand({Binary("evac-train"), Path("job"), Path("shards"), "--threads", "1", "--out", Path("there")});
+  };
+  MakeFolders(Path("there"));
+  {
+    const RunLock lock(Path("there/lock"));
+    const CommandResult refused = there();
+    EXPECT_EQ(refused.exit_code, 2) << refused.err;
+    EXPECT_THAT(refused.err, HasSubstr("process " + std::to_string(::getpid()) + " is writing here; wait for it"));
+  }
+  EXPECT_FALSE(std::filesystem::exists(Path("there/metrics.csv")));
+  EXPECT_THAT(there().err, Not(HasSubstr("was begun by")));
+  EXPECT_EQ(ReadFile(Path("there/begun_by")), EVAC_VERSION "\n");
+  WriteFileAtomically(Path("there/begun_by"), "0.0.1\n");
+  EXPECT_THAT(there().err, HasSubstr("evac-train: note: " + Path("there") + " was begun by evac 0.0.1; evac " EVAC_VERSION));
+  WriteFileAtomically(Path("there/lock"), "mine: do not touch\n");
+  const CommandResult somebodys = there();
+  EXPECT_EQ(somebodys.exit_code, 2) << somebodys.err;
+  EXPECT_EQ(ReadFile(Path("there/lock")), "mine: do not touch\n");
+}
+
+/// A codec that was trained anew, or another checkpoint: it was learned from, and said to be what the job names.
+TEST_F(TrainCommand, AJobThatIsCarriedElsewhereTakesTheFilesThatItWasWrittenForAlone) {
+  TrainCodec();
+  const std::string own = Path("codec/codec.safetensors"), other = Path("other.safetensors"), config = Path("page.yaml");
+  std::string bytes = ReadFile(own);
+  bytes[bytes.size() - 4] ^= 1;  // the last digit of its last number
+  WriteFileAtomically(other, bytes);
+  const auto there = [&](std::vector<std::string> more) {
+    more.insert(more.begin(), {Binary("evac-train"), Path("job"), Path("shards"), "--threads", "1", "--out", Path("there")});
+    return RunCommand(more);
+  };
+  const auto refused = [&](const std::vector<std::string>& more, const std::string& option) {
+    const CommandResult result = there(more);
+    EXPECT_EQ(result.exit_code, 2) << option;
+    EXPECT_THAT(result.err, HasSubstr("evac-train: " + option + ": " + other + " is another one than the job was written for"));
+    EXPECT_FALSE(std::filesystem::exists(Path("there"))) << option;
+  };
+  const std::string job = Path("job");
+  Train({"world", Path("shards"), "--config", config, "--codec", own, "--init", own, "--forecast", own, "--job", job});
+  refused({"--codec", other, "--init", own, "--forecast", own}, "--codec");
+  refused({"--codec", own, "--init", other, "--forecast", own}, "--init");
+  refused({"--codec", own, "--init", own, "--forecast", other}, "--forecast");
+
+  Train({"codec", Path("shards"), "--config", config, "--init", own, "--job", job, "--set", "batch=2", "--steps", "1"});
+  refused({"--init", other}, "--init");
+  const std::string text = ReadFile(job);
+  const std::size_t line = text.find("init_sha256 ");
+  ASSERT_NE(line, std::string::npos);
+  WriteFileAtomically(job, text.substr(0, line) + text.substr(text.find('\n', line) + 1));
+  const CommandResult of_an_earlier_version = there({"--init", other});
+  EXPECT_EQ(of_an_earlier_version.exit_code, 0) << of_an_earlier_version.err;
 }
 
 TEST_F(TrainCommand, WantsAFolderToWriteOrAJobAndNotBoth) {

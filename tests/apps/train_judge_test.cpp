@@ -7,7 +7,6 @@
 #include <cmath>
 #include <fstream>
 
-#include "apps/networks/codec_identity.h"
 #include "apps/networks/judge_quality.h"
 #include "apps/networks/judge_shard_clips.h"
 #include "apps/networks/judge_tables.h"
@@ -20,6 +19,7 @@
 #include "tests/apps/learning_shards.h"
 #include "tests/support/temp_folder.h"
 #include "worldmodel/train/encode_shards.h"
+#include "worldmodel/train/sha256.h"
 
 namespace evac {
 namespace {
@@ -201,7 +201,7 @@ TEST_F(CodedJudgeTest, ItLearnsFromClipsAsTheCodecGivesThemBackAndIsMeasuredOnTh
 
   Train(Place("judge"), Quick(150), &shard_codec);
   const WeightFile file(folder_ / "judge" / "judge.safetensors", "evac-classifier 1");
-  EXPECT_EQ(file.Text("codec"), CodecSha256(codec_));
+  EXPECT_EQ(file.Text("codec"), train::CodecSha256(codec_));
   EXPECT_GT(file.Number("kappa"), 0.8);
   EXPECT_GT(file.Number("kappa_reconstructed"), 0.8);
 
@@ -229,7 +229,7 @@ TEST_F(CodedJudgeTest, ATrainingGoesOnOnlyWithLatentsThatWereMadeAlike) {
   for (const auto& shard : train::ShardPaths(folder_ / "shards")) {
     train::CheckpointWeights weights(codec_);
     train::EncodeShard(nn::Vae(nn::Scope(weights, train::kCodecPrefix), config_), shard,
-                       {CodecSha256(codec_), Sha256HexOfFile(shard), "bfloat16"});
+                       {train::CodecSha256(codec_), Sha256HexOfFile(shard), "bfloat16"});
   }
   EXPECT_THAT([&] { Train(Place("judge"), Quick(2), &shard_codec); },
               ThrowsMessage<TensorError>(HasSubstr("is a training with other options")));
@@ -244,7 +244,7 @@ TEST_F(CodedJudgeTest, AFileThatHoldsTheSameCodecAndMoreMadeTheSameLatents) {
   WriteTensorFile(whole, tensors, {{"a_world", "model's card"}});
   train::ShardSet shards(folder_ / "shards", train::Split::kTrain);
   ShardCodec(whole, config_).Open(shards);
-  EXPECT_EQ(CodecSha256(whole), CodecSha256(codec_));
+  EXPECT_EQ(train::CodecSha256(whole), train::CodecSha256(codec_));
 
   std::vector<std::byte> last(tensors.back().bytes.begin(), tensors.back().bytes.end());
   last[0] ^= std::byte{1};
@@ -266,8 +266,8 @@ TEST_F(CodedJudgeTest, TheSameNumbersInAnotherTypeAreTheSameCodec) {
   }
   WriteTensorFile(folder_ / "halves.safetensors", of_halves, {});
   WriteTensorFile(folder_ / "floats.safetensors", of_floats, {});
-  EXPECT_EQ(CodecSha256(folder_ / "halves.safetensors"), CodecSha256(folder_ / "floats.safetensors"));
-  EXPECT_NE(CodecSha256(folder_ / "halves.safetensors"), CodecSha256(codec_)) << "rounded";
+  EXPECT_EQ(train::CodecSha256(folder_ / "halves.safetensors"), train::CodecSha256(folder_ / "floats.safetensors"));
+  EXPECT_NE(train::CodecSha256(folder_ / "halves.safetensors"), train::CodecSha256(codec_)) << "rounded";
 }
 
 TEST_F(TrainJudgeTest, CalibrationSharesNoInitialStateWithLearning) {
@@ -284,6 +284,14 @@ TEST_F(TrainJudgeTest, OutcomesOfOneKindAloneAreRefused) {
   for (PackedClip& clip : set.clips) clip.outcome = 1;
   EXPECT_THAT([&] { SplitForJudge(set.clips, Quick(2)); },
               ThrowsMessage<Error>(HasSubstr("wanted some of both kinds")));
+}
+
+/// "0 of 0 clips to learn from are successes … more recordings", which would say as little.
+TEST_F(TrainJudgeTest, ShardsThatSayNothingOfOutcomesAreRefusedAsSuch) {
+  WriteLearningShards(folder_ / "shards", {.knows_outcome = false});
+  EXPECT_THAT([&] { Train(Place("judge"), Quick(2)); },
+              ThrowsMessage<Error>(HasSubstr((folder_ / "shards").string() +
+                                             ": none of the 24 clips says whether it was a success, wanted shards of")));
 }
 
 TEST_F(TrainJudgeTest, APackingThatSaysNothingOfStatesIsRefused) {

@@ -3,7 +3,6 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "apps/networks/codec_identity.h"
 #include "apps/networks/learners.h"
 #include "core/error.h"
 #include "core/hash.h"
@@ -13,6 +12,7 @@
 #include "tests/apps/learning_shards.h"
 #include "tests/support/temp_folder.h"
 #include "worldmodel/train/encode_shards.h"
+#include "worldmodel/train/sha256.h"
 
 namespace evac {
 namespace {
@@ -257,7 +257,7 @@ TEST_F(TrainPolicyTest, ItIsShownWhatTheCodecGivesBackAndNoOtherCodecsLatents) {
 
   TrainPolicy(Place("policy"), Quick(2), &codec, {});
   EXPECT_EQ(WeightFile(folder_ / "policy" / "policy.safetensors", kLearnedFormat).Text("codec"),
-            CodecSha256(weights));
+            train::CodecSha256(weights));
   const auto encode = [&](const std::string& as, const std::string& products) {
     for (const auto& shard : train::ShardPaths(folder_ / "shards")) {
       train::CheckpointWeights again(weights);
@@ -265,7 +265,7 @@ TEST_F(TrainPolicyTest, ItIsShownWhatTheCodecGivesBackAndNoOtherCodecsLatents) {
                          {as, Sha256HexOfFile(shard), products});
     }
   };
-  encode(CodecSha256(weights), "bfloat16");
+  encode(train::CodecSha256(weights), "bfloat16");
   EXPECT_THAT([&] { TrainPolicy(Place("policy"), Quick(2), &codec, {}); },
               ThrowsMessage<TensorError>(HasSubstr("is a training with other options"))) << "latents made otherwise";
   encode("another", "float32");

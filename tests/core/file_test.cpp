@@ -2,6 +2,7 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include <chrono>
@@ -67,6 +68,42 @@ TEST(File, WhatCannotBeWrittenIsNamedAndTheOldFileStays) {
   EXPECT_THAT(MessageOf([&] { WriteFileAtomically(folder / "f", "new"); }), HasSubstr("No space left"));
   EXPECT_EQ(ReadFile(folder / "f"), "old");
   EXPECT_FALSE(fs::is_symlink(folder / "f.tmp"));
+}
+
+/// A file took the link's place, and what it led to stayed as it was.
+TEST(File, ALinkStaysOneAndTheFileThatItLeadsToIsWritten) {
+  const TempFolder folder;
+  MakeFolders(folder / "below");
+  fs::create_symlink("../f", folder / "below/link");
+  fs::create_symlink("below/link", folder / "to_link");
+  for (const char* bytes : {"a link to nothing yet", "to a file"}) {
+    WriteFileAtomically(folder / "to_link", bytes);
+    EXPECT_EQ(ReadFile(folder / "f"), bytes);
+    EXPECT_FALSE(fs::is_symlink(folder / "f"));
+    EXPECT_TRUE(fs::is_symlink(folder / "to_link") && fs::is_symlink(folder / "below/link"));
+  }
+  fs::create_symlink("loop", folder / "loop");
+  EXPECT_THAT(MessageOf([&] { WriteFileAtomically(folder / "loop", "x"); }), HasSubstr("Too many levels of symbolic links"));
+}
+
+/// `evac gate pin RUN --out /dev/null` put a file in the device's place.
+TEST(File, WhatIsNoRegularFileIsRefusedAndStays) {
+  const TempFolder folder;
+  ASSERT_EQ(::mkfifo((folder / "pipe").c_str(), 0600), 0);
+  fs::create_symlink("pipe", folder / "to_pipe");
+  for (const char* name : {"pipe", "to_pipe"}) {
+    for (const bool writes : {false, true}) {
+      try {
+        writes ? WriteFileAtomically(folder / name, "x") : RefuseFolder(folder / name);
+        ADD_FAILURE() << name;
+      } catch (const Error& error) {
+        EXPECT_EQ(error.exit_code(), ExitCode::kInvalidInput);
+        EXPECT_THAT(error.what(), HasSubstr((folder / name).string() + ": is no regular file"));
+      }
+    }
+  }
+  EXPECT_TRUE(fs::is_fifo(folder / "pipe"));
+  EXPECT_TRUE(fs::is_symlink(folder / "to_pipe"));
 }
 
 TEST(File, TwoThatWriteTheSameFileLeaveOneOfThemWhole) {

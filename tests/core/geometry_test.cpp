@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <functional>
 #include <numbers>
 
 #include "core/error.h"
@@ -89,6 +90,27 @@ TEST(Geometry, TheRotationBetweenTwoPosesIsTheAngleThatTurnsOneIntoTheOther) {
     EXPECT_NEAR(RotationBetween(a, b), angle, 1e-7);
     EXPECT_NEAR(RotationBetween(b, a), angle, 1e-7);
   }
+}
+
+TEST(Geometry, ACameraIsTheSameOneWithinAToleranceWhateverTheSizeOfItsPictures) {
+  using testing::HasSubstr;
+  const Camera known = SomeCamera();
+  const auto differs = [&](const std::function<void(Camera&)>& change) {
+    Camera asked = known;
+    change(asked);
+    return CalibrationDifference(known, asked, "in training");
+  };
+  EXPECT_EQ(differs([](Camera& camera) { camera = Resized(camera, 48, 96); }), "");
+  EXPECT_EQ(differs([](Camera& camera) { camera.fx_px *= 1.04; }), "");
+  EXPECT_THAT(differs([](Camera& camera) { camera.fx_px *= 1.06; }),
+              HasSubstr("has a focal length of 0.994 picture widths, in training 0.938"));
+  EXPECT_EQ(differs([](Camera& camera) { camera.mount_from_camera.translation().y() = 0.029; }), "");
+  EXPECT_THAT(differs([](Camera& camera) { camera.mount_from_camera.translation().y() = -0.031; }),
+              HasSubstr("stands 0.031 m and 0.0 degrees from where it stood in training"));
+  const Eigen::AngleAxisd turn(0.1, Vector3d::UnitX());
+  EXPECT_THAT(differs([&](Camera& camera) { camera.mount_from_camera.rotate(turn); }),
+              HasSubstr("and 5.7 degrees from"));
+  EXPECT_EQ(differs([](Camera& camera) { camera.mount = Mount::kRightGripper; }), "is mounted elsewhere");
 }
 
 }  // namespace

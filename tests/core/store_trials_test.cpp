@@ -51,6 +51,36 @@ TEST(StoreTrials, TheyAloneKeepARunFromMakingRoomForAnotherSuite) {
   EXPECT_THROW(Store::CreateOrContinue(folder / "run", other), Error);
 }
 
+/// A real episode of a lower seed that ran again took the place of the scene that stored imagined episodes began from.
+TEST(StoreScenes, WhatAnImaginedEpisodeBeganFromStays) {
+  const TempFolder folder;
+  Store store = Store::InMemory(folder.path(), SomeRun());
+  Declare(store);
+  store.AddWorld({.name = "model", .type = "evac", .is_real = false, .profile_hash = "e7ac"});
+  const auto kept = [&](int seed) {
+    store.AddInitialScene(Key(seed).pair, {{Image(seed)}, Arms(1), SomeTask().cameras});
+    const auto scene = store.LoadInitialScene("take_bottle", "41-0007");
+    const std::uint64_t its = store.InitialScenes().at(0).seed;
+    EXPECT_EQ(cv::norm(scene->images.at(0), Image(static_cast<int>(its)), cv::NORM_INF), 0);
+    return its;
+  };
+  EXPECT_EQ(kept(9), 9u);
+  store.Add(SomeEpisode(store, Key(9)));
+  EXPECT_EQ(kept(8), 8u) << "a world of physics begins from none";
+  store.Add(SomeEpisode(store, Key(8, "model"), StopReason::kWorldError));
+  EXPECT_EQ(kept(7), 7u) << "it runs again";
+  store.Add(SomeEpisode(store, Key(7, "model")));
+  EXPECT_EQ(kept(6), 7u);
+  PairKey earlier = Key(7).pair;
+  earlier.policy = "a";
+  store.AddInitialScene(earlier, {{Image(7)}, Arms(1), SomeTask().cameras});
+  EXPECT_EQ(store.InitialScenes().at(0).policy, "a") << "those of one seed are alike, in whatever order they come";
+  PairKey elsewhere = Key(6).pair;
+  elsewhere.initial_state = "41-0008";
+  store.AddInitialScene(elsewhere, {{Image(6)}, Arms(1), SomeTask().cameras});
+  EXPECT_TRUE(store.LoadInitialScene("take_bottle", "41-0008"));
+}
+
 TEST(StoreVerdicts, AProbabilityThatIsNoneIsRefused) {
   const TempFolder folder;
   Store store = Store::InMemory(folder.path(), SomeRun());

@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <sys/resource.h>
+#include <sys/stat.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -145,6 +146,22 @@ TEST_F(TensorFileOnDisk, AFullDiskIsAnotherErrorThanAFolderThatIsNotThere) {
   }
   std::filesystem::remove(folder_ / "folder");
   EXPECT_TRUE(std::filesystem::is_empty(folder_)) << "parts are left";
+}
+
+/// Weights took the place of the link, or of the device, that they were written to.
+TEST_F(TensorFileOnDisk, ALinkStaysOneAndWhatIsNoRegularFileIsRefused) {
+  namespace fs = std::filesystem;
+  fs::create_directory(folder_ / "below");
+  fs::create_symlink("../a", folder_ / "below/link");
+  for (int twice = 0; twice < 2; ++twice) {
+    WriteTensorFile(folder_ / "below/link", {}, {{"time", std::to_string(twice)}});
+    EXPECT_EQ(TensorFile::Open(folder_ / "a").metadata().at("time"), std::to_string(twice));
+    EXPECT_TRUE(fs::is_symlink(folder_ / "below/link"));
+  }
+  ASSERT_EQ(::mkfifo((folder_ / "pipe").c_str(), 0600), 0);
+  EXPECT_THAT([&] { WriteTensorFile(folder_ / "pipe", {}, {}); },
+              ThrowsMessage<TensorError>(HasSubstr((folder_ / "pipe").string() + ": is no regular file")));
+  EXPECT_TRUE(fs::is_fifo(folder_ / "pipe"));
 }
 
 TEST_F(TensorFileOnDisk, AMissingFileIsNamed) {

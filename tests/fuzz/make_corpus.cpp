@@ -147,7 +147,8 @@ void MakeTextSeeds(const fs::path& corpus) {
                   "t,1,p,,0,,\n");
   evac::WriteText(corpus / "training_tables_fuzz/small.csv", "step,loss\n1,0.5\n2,0.25\n200,nan\n");
   evac::WriteText(corpus / "training_job_fuzz/small",
-                  "evac-training 1\nworld\nsize chunk 8\nsize unet.channel_mult 1,2,4,4\noption batch 4\ninit_widen true\nbegun_with x\n");
+                  "evac-training 1\nworld\nsize chunk 8\nsize unet.channel_mult 1,2,4,4\noption batch 4\ninit_widen true\n"
+                  "init_sha256 a\nbegun_with x\n");
   evac::WriteText(corpus / "vlm_config_fuzz/server.yaml",
                   "name: qwen3-vl\nbase_url: http://localhost:8000/v1\nmodel: m\nkey: {env: KEY}\n"
                   "sampling: {temperature: 0.1, seed: 7, max_tokens: 500}\nclip: {frames: 8, tail_frames: 2}\n"

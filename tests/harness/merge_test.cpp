@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <functional>
+#include <future>
 
 #include "core/error.h"
 #include "core/file.h"
@@ -108,6 +109,19 @@ TEST_F(MergedRuns, KeepTheVerdictsOfTheCopyThatWasNotTakenAndSayOnceWhatBothSay)
   b_.AddVerdict(Says("human:night:r1", "I saw it"));
   EXPECT_EQ(Merge().duplicates, 1);
   EXPECT_EQ(Said(), (std::vector<std::string>{"oracle: it stands", "human:night:r1: I saw it"}));
+}
+
+/// The order of the shards decided which scene was the run's, once what was imagined came with them.
+TEST_F(MergedRuns, BeginWhereTheLowestSeedDidWhicheverShardHasIt) {
+  for (const auto& [store, seed] : {std::pair(&a_, 2), std::pair(&b_, 1)}) {
+    store->AddWorld({.name = "model", .type = "evac", .is_real = false, .profile_hash = "e7ac"});
+    store->AddInitialScene(samples::Key(seed).pair, {{samples::Image(seed)}, Arms(1), samples::SomeTask().cameras});
+    store->Add(samples::SomeEpisode(*store, samples::Key(seed, "model")));
+  }
+  Merge("ab");
+  MergeRuns({b_.folder(), a_.folder()}, folder_ / "ba");
+  for (const char* out : {"ab", "ba"})
+    EXPECT_EQ(Store::Open(folder_ / out, Store::Mode::kReadOnly).InitialScenes().at(0).seed, 1u) << out;
 }
 
 /// The last verdict of a judge counts: an older copy beside a newer one brought an outdated one back.
@@ -245,6 +259,40 @@ TEST_F(MergedRuns, AreMadeOverWhatAMergeLeftThatWasBrokenOff) {
   EXPECT_EQ(Merge().episodes, 1);
   EXPECT_FALSE(std::filesystem::exists(folder_ / "merged.tmp"));
   EXPECT_FALSE(std::filesystem::exists(folder_ / "merged/merging"));
+}
+
+/// Its mark went first: between that and its name it was a folder that no later merge took for its own.
+TEST_F(MergedRuns, AreMadeOverWhatAMergeLeftThatWasBrokenOffJustBeforeItHadItsName) {
+  a_.Add(samples::SomeEpisode(a_, key_));
+  std::filesystem::create_symlink("nowhere", folder_ / "merged");  // in the way of the name alone
+  EXPECT_THROW(Merge(), Error);
+  ASSERT_TRUE(std::filesystem::exists(folder_ / "merged.tmp/evac.sqlite")) << "it came to the end";
+  EXPECT_FALSE(std::filesystem::exists(folder_ / "merged.lock"));
+  std::filesystem::remove(folder_ / "merged");
+  EXPECT_EQ(Merge().episodes, 1);
+  MakeFolders(folder_ / "merged/merging");  // of one that was broken off just behind it
+  EXPECT_EQ(Store::Open(folder_ / "merged", Store::Mode::kReadWrite).Episodes().size(), 1u);
+  EXPECT_EQ(MergeRuns({folder_ / "merged", b_.folder()}, folder_ / "all").episodes, 1);
+}
+
+/// The second looked whether the name is free before it waited for the first.
+TEST_F(MergedRuns, OfTwoMergesToOneNameOneIsRefused) {
+  a_.Add(samples::SomeEpisode(a_, key_));
+  for (int i = 0; i < 20; ++i) {
+    const std::string out = "merged" + std::to_string(i);
+    std::future<MergeSummary> merges[] = {std::async(std::launch::async, [&] { return Merge(out); }),
+                                          std::async(std::launch::async, [&] { return Merge(out); })};
+    int made = 0;
+    for (std::future<MergeSummary>& merge : merges) {
+      try {
+        made += merge.get().episodes;
+      } catch (const Error& error) {
+        EXPECT_EQ(error.exit_code(), ExitCode::kInvalidInput) << error.what();
+      }
+    }
+    EXPECT_EQ(made, 1);
+    EXPECT_FALSE(std::filesystem::exists(folder_ / (out + ".tmp")));
+  }
 }
 
 TEST_F(MergedRuns, AreMadeWithTheFoldersAboveThem) {

@@ -339,6 +339,18 @@ TEST_F(Rollout, WhatTheStoreRefusesWhereAnEpisodeBeginsIsNoFailureOfItsWorld) {
   EXPECT_EQ(store.Episodes().size(), 1u);
 }
 
+TEST_F(Rollout, APolicyThatIsAnotherThanWasGreetedEndsTheRunAndNothingOfItIsKept) {
+  Store store = NewDeclaredStore("run");
+  WalkingPolicy policy;
+  int answers = 0;
+  options_.check_policy = [&] {
+    if (++answers == 2 * task_.max_chunks) throw InvalidInput("weights: it is another file");
+  };
+  options_.lanes = 1;
+  EXPECT_THAT([&] { Run(policy, Jobs(3), store); }, testing::ThrowsMessage<Error>(HasSubstr("another file")));
+  EXPECT_EQ(store.Episodes().size(), 1u) << "the first was over, the second's last answer was the wrong one's";
+}
+
 TEST_F(Rollout, WhoeverWasSentAwayByAnInterruptIsNotStoredAsFailed) {
   bool wants_an_end = false;
   FaultyPolicy policy([&](Acted plain, std::uint64_t request) -> Acted {

@@ -118,6 +118,42 @@ TEST_F(EvacSuite, AFileThatWasWrittenToSinceIsNamedWithBothHashes) {
                                  HasSubstr("found SHA-256 " + Sha256HexOfFile(folder_ / "w.safetensors"))));
 }
 
+/// They were hashed when the suite was read and never looked at again: episodes of two weights stood under one hash.
+TEST_F(EvacSuite, APolicysFilesAndARecordingThatWereWrittenToSinceAreNamedWithBothHashes) {
+  std::filesystem::create_directory(folder_ / "ckpts");
+  Write("ckpts/p.safetensors", "weights");
+  Write("script.py", "print()");
+  const std::string files = "policies.0.files=[" + (folder_ / "ckpts").string() + ", " + (folder_ / "script.py").string() + "]";
+  const std::string replay = "policies.0.command=[evac-policy, replay, --recording, \"${recording}\"]";
+  const Suite suite = Read({files, replay});
+  EXPECT_EQ(suite.hash, Read({files, replay}).hash);
+  const auto complaint = [&]() -> std::string {
+    try {
+      DemandUnchanged(suite, suite.policies.at(0));
+    } catch (const Error& error) {
+      EXPECT_EQ(error.exit_code(), ExitCode::kInvalidInput);
+      return error.what();
+    }
+    return "no complaint";
+  };
+  EXPECT_EQ(complaint(), "no complaint");
+  const auto is_named = [&](const std::string& name, const std::string& before) {
+    Write(name, "of another step");
+    EXPECT_THAT(complaint(), AllOf(HasSubstr((folder_ / name).string()), HasSubstr("than when the suite was read"),
+                                   HasSubstr("found SHA-256 " + Sha256Hex("of another step")),
+                                   HasSubstr("wanted " + Sha256Hex(before))));
+    Write(name, before);
+    EXPECT_EQ(complaint(), "no complaint") << "as it was, at another time";
+  };
+  is_named("ckpts/p.safetensors", "weights");
+  is_named("script.py", "print()");
+  is_named("rec/action.npy", "bytes");
+  Write("ckpts/later.pyc", "what its own interpreter writes");
+  EXPECT_EQ(complaint(), "no complaint") << "nothing of it was hashed";
+  std::filesystem::remove(folder_ / "script.py");
+  EXPECT_THAT(complaint(), HasSubstr("script.py: cannot be read"));
+}
+
 TEST_F(EvacSuite, RealityIsTheSameWhateverTheModelAndThePoliciesAndAnotherWithAnotherWorldOrState) {
   const Suite suite = Read();
   EXPECT_NE(suite.reality_hash, suite.hash);

@@ -385,6 +385,39 @@ TEST(RatingHttp, AnAnswerThatIsTakenPieceByPieceIsSentToItsEndAndOneThatNobodyTa
   at_work.join();
 }
 
+TEST(PublicUrl, IsAsBrowsersNameItOrIsRefused) {
+  const std::vector<std::pair<std::string, std::string>> named = {{"https://rate.lab.org", "https://rate.lab.org"},
+                                                                  {"HTTPS://Rate.Lab.org:443/", "https://rate.lab.org"},
+                                                                  {"http://10.0.0.5:80", "http://10.0.0.5"},
+                                                                  {"https://rate:80", "https://rate:80"},
+                                                                  {"http://[::1]:08766/", "http://[::1]:8766"}};
+  for (const auto& [given, wanted] : named) EXPECT_EQ(PublicUrl(given), wanted);
+  for (const std::string wrong :
+       {"rate.lab.org", "https://", "ftp://rate.lab.org", "https://rate.lab.org/studies", "https://rate.lab.org?a",
+        "https://ann@rate.lab.org", "https://rate.lab.org:0", "https://rate.lab.org:65536", "https://rate.lab.org:",
+        "https://rate lab.org", "https://rate.lab.org#"})
+    EXPECT_THAT([&] { PublicUrl(wrong); },
+                testing::ThrowsMessage<Error>(HasSubstr("--url: found '" + wrong + "', wanted http")));
+}
+
+/// Browsers say "Host: rate.lab.org": every page was "another site's name points here".
+TEST(RatingServerBehindAProxy, IsFoundUnderItsNameHoweverThatWasWritten) {
+  SmallStudy study(2);
+  RatingServerOptions options;
+  options.study = study.folder();
+  options.public_url = "https://rate.lab.org/studies";
+  EXPECT_THROW(RatingServer{options}, Error) << "pages stand at the root";
+  options.public_url = "HTTPS://Rate.Lab.org:443/";
+  RatingServer server(options);
+  EXPECT_EQ(server.url(), "https://rate.lab.org/");
+  std::thread at_work([&] { server.Serve(); });
+  const std::string asked = "GET / HTTP/1.1\r\nConnection: close\r\nHost: ";
+  EXPECT_EQ(RawExchange(server.port(), asked + "rate.lab.org\r\n\r\n").status, 200);
+  EXPECT_EQ(RawExchange(server.port(), asked + "evil.example\r\n\r\n").status, 403);
+  server.Stop();
+  at_work.join();
+}
+
 TEST_F(RatingServerTest, AStudyHasOneServer) {
   EXPECT_THROW(RatingServer another(OptionsFor(study.folder())), Error);
   EXPECT_THAT(server.url(), StartsWith("http://127.0.0.1:"));

@@ -5,6 +5,9 @@
 #include <algorithm>
 #include <array>
 #include <atomic>
+#include <latch>
+#include <thread>
+#include <vector>
 
 #include "core/error.h"
 #include "tests/support/scripted_server.h"
@@ -143,6 +146,33 @@ TEST(VlmClient, AfterTenTroublesInARowItPausesOnceAndThenGivesUp) {
   EXPECT_EQ(std::count(talk.waits_s().begin(), talk.waits_s().end(), 60), 1);
 }
 
+/// Failures of requests that were under way when the pause began counted as failures after it, and nothing was waited
+/// for: the eleventh of those that were sent together ended the run.
+TEST(VlmClient, WhatWasSentBeforeThePauseDoesNotSayThatItDidNotHelp) {
+  constexpr int kTogether = 24;
+  for (const bool helps : {true, false}) {
+    std::latch all_are_sent(kTogether);
+    std::atomic<int> asked = 0;
+    std::atomic<bool> has_paused = false;
+    std::vector<double> waits_s;  // one waits at a time
+    const ScriptedServer server([&](const SeenRequest&) {
+      if (asked++ < kTogether) all_are_sent.arrive_and_wait();
+      return has_paused && helps ? Answer(200, kGood) : Answer(500, "oops");
+    });
+    VlmClient client({.base_url = server.Url(), .sleep_s = [&](double wait_s) {
+                        waits_s.push_back(wait_s);
+                        if (wait_s == 60) has_paused = true;
+                      }});
+    {
+      std::vector<std::jthread> raters;
+      for (int i = 0; i < kTogether; ++i) raters.emplace_back([&client] { client.Ask({{"model", "m"}}); });
+    }
+    EXPECT_GE(std::count(waits_s.begin(), waits_s.end(), 60), 1);
+    const std::string why_over = client.WhyOver().value_or("it goes on");
+    EXPECT_THAT(why_over, HasSubstr(helps ? "it goes on" : "in a row failed, also after a pause"));
+  }
+}
+
 TEST(VlmClient, AGoodAnswerEndsARowOfTroubles) {
   std::vector<ScriptedAnswer> answers;
   for (int i = 0; i < 40; ++i) answers.push_back(i % 5 == 4 ? Answer(200, kGood) : Answer(500, "oops"));
@@ -187,6 +217,16 @@ TEST(VlmClient, NothingIsSentBeyondTheBudget) {
     ASSERT_TRUE(talk.client().WhyOver()) << why;
     EXPECT_THAT(*talk.client().WhyOver(), AllOf(HasSubstr("the budget is spent"), HasSubstr(why)));
   }
+}
+
+TEST(VlmClient, TheBudgetHoldsOverWhatEarlierCallsSpent) {
+  Talk talk({Answer(200, kGood)}, {.max_tokens = 440});
+  talk.client().CountEarlier({.requests = 2, .prompt_tokens = 200, .completion_tokens = 20});
+  for (int i = 0; i < 4; ++i) talk.Ask();
+  EXPECT_EQ(talk.Seen().size(), 2u);
+  EXPECT_THAT(talk.client().WhyOver().value_or("it goes on"),
+              HasSubstr("440 tokens are spent of 440 (with 2 requests of earlier calls)"));
+  EXPECT_EQ(talk.client().spent().requests, 2) << "of its own";
 }
 
 /// Six tries and their waits went on for minutes after Ctrl-C.

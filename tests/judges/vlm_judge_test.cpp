@@ -2,7 +2,9 @@
 
 #include <gmock/gmock.h>
 
+#include <algorithm>
 #include <atomic>
+#include <fstream>
 #include <mutex>
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
@@ -88,10 +90,10 @@ class VlmJudgeTest : public testing::Test {
  protected:
   Verdict Rate(ScriptedServer::Script script, VlmJudgeOptions options = {}) {
     server_ = std::make_unique<ScriptedServer>(std::move(script));
-    VlmClient client({.base_url = server_->Url(), .sleep_s = [](double) {}});
+    VlmClient client({.base_url = server_->Url(), .budget = budget_, .sleep_s = [](double) {}});
     options.run_folder = folder_.path();
     options.now = [] { return "2026-01-01T00:00:00Z"; };
-    CallCache cache(folder_ / "calls.sqlite");
+    CallCache cache(folder_ / CallCache::kFile);
     return VlmJudge(config_, options, client, cache).Rate(task_, episode_);
   }
 
@@ -99,6 +101,7 @@ class VlmJudgeTest : public testing::Test {
   Task task_ = PickTask();
   Episode episode_ = PickEpisode(folder_.path());
   VlmConfig config_{.name = "test", .sampling = {.model = "m"}};
+  VlmBudget budget_{};
   std::unique_ptr<ScriptedServer> server_;
 };
 
@@ -187,6 +190,59 @@ TEST_F(VlmJudgeTest, AServerThatDropsImagesIsFoundOutByItsTokens) {
   EXPECT_THAT(verdict.reason, AllOf(testing::StartsWith("truncated: "), HasSubstr("700 prompt tokens")));
 }
 
+/// Every answer was "truncated": pictures of 28 px cost two tokens each.
+TEST_F(VlmJudgeTest, SmallImagesAreNotTakenForDroppedOnes) {
+  config_.clip.long_side_px = 28;
+  const auto counting = [](long prompt_tokens) {
+    return [prompt_tokens](const SeenRequest&) { return Saying(Content("success"), "stop", prompt_tokens); };
+  };
+  EXPECT_EQ(Rate(counting(900)).label, Label::kSuccess);
+  ++config_.sampling.seed;
+  EXPECT_THAT(Rate(counting(20)).reason, testing::StartsWith("truncated: ")) << "it cannot have seen twenty";
+}
+
+/// The last of several requests alone was kept, and of a call that came to nothing no tokens.
+TEST_F(VlmJudgeTest, ACallCostsAllThatWasAskedForItWhateverCameOfIt) {
+  const auto always = [](const std::string& content, const std::string& reason) {
+    return [=](const SeenRequest&) { return Saying(content, reason); };
+  };
+  const auto if_long = [](const SeenRequest& request) {
+    return json::parse(request.body)["max_tokens"] == 2400 ? Saying(Content("success")) : Saying("{\"obs", "length");
+  };
+  const auto if_urged = [](const SeenRequest& request) {
+    return Saying(Asks(request, "Return the JSON object only") ? Content("success") : "Well.");
+  };
+  const struct {
+    const char* what;
+    ScriptedServer::Script script;
+    std::int64_t requests;
+    long max_requests = 0;
+  } cases[] = {{"cut, then whole", if_long, 2},
+               {"cut twice", always("{\"obs", "length"), 2},
+               {"no JSON, then some", if_urged, 2},
+               {"never JSON", always("Yes.", "stop"), 2},
+               {"refused", always("", "content_filter"), 1},
+               {"cut, and the budget is spent", always("{\"obs", "length"), 1, 1},
+               {"no JSON, and the budget is spent", always("Yes.", "stop"), 1, 1},
+               {"too few tokens", [](const SeenRequest&) { return Saying("{}", "stop", 320); }, 1}};
+  for (const auto& one : cases) {
+    ++config_.sampling.seed;  // asked anew, by a judge of another name
+    budget_.max_requests = one.max_requests;
+    try {
+      Rate(one.script, {.probe = VlmProbe::kFlip});
+    } catch (const Error& error) {
+      EXPECT_STREQ(error.kind(), "judge_over") << one.what;
+    }
+    const std::vector<CallTotals> all = TotalsOfCalls(folder_.path());
+    const auto own = std::ranges::find(all, config_.JudgeName() + ":flip", &CallTotals::judge);
+    ASSERT_NE(own, all.end()) << one.what;
+    EXPECT_EQ(own->attempts, one.requests) << one.what;
+    const bool is_short = std::string(one.what) == "too few tokens";
+    EXPECT_EQ(own->prompt_tokens, one.requests * (is_short ? 320 : 3200)) << one.what;
+    EXPECT_EQ(own->completion_tokens, 80 * one.requests) << one.what;
+  }
+}
+
 TEST_F(VlmJudgeTest, ARefusalIsInvalidAndNeverAFailure) {
   const Verdict verdict = Rate([](const SeenRequest&) { return Saying("", "content_filter"); });
   EXPECT_EQ(verdict.label, Label::kInvalid);
@@ -201,6 +257,29 @@ TEST_F(VlmJudgeTest, TooManyImagesAreAskedAboutWithFewerUnderAnotherName) {
   EXPECT_EQ(verdict.label, Label::kSuccess) << verdict.reason;
   EXPECT_EQ(verdict.judge, config_.JudgeName() + ":small");
   EXPECT_EQ(server_->Seen().size(), 6u);
+}
+
+/// Eight frames of 336 px were sent to a server that had just refused four of 224.
+TEST_F(VlmJudgeTest, WhatIsAskedAgainIsInNothingMoreThanWhatWasRefused) {
+  std::mutex mutex;
+  std::vector<int> images;
+  const auto at_most_two = [&](const SeenRequest& request) {
+    const std::lock_guard lock(mutex);
+    images.push_back(Images(request));
+    return images.back() > 2 ? Answer(400, R"({"error": {"message": "At most 2 images"}})")
+                             : Saying(Content("success"), "stop", 900);
+  };
+  config_.clip = {.frames = 4, .tail_frames = 0, .long_side_px = 224};
+  const Verdict refused = Rate(at_most_two);
+  EXPECT_EQ(refused.judge, config_.JudgeName()) << "there is nothing smaller to ask with";
+  EXPECT_THAT(refused.reason, testing::StartsWith("unsupported_media: "));
+  EXPECT_EQ(images, (std::vector<int>{4, 4, 4}));
+  images.clear();
+  config_.clip = {.frames = 2, .tail_frames = 3, .long_side_px = 224};
+  const Verdict smaller = Rate(at_most_two);
+  EXPECT_EQ(smaller.judge, config_.JudgeName() + ":small");
+  EXPECT_EQ(smaller.label, Label::kSuccess) << smaller.reason;
+  EXPECT_EQ(std::ranges::count(images, 2), 3);
 }
 
 TEST_F(VlmJudgeTest, WhatServersSayOfTooManyImagesIsUnderstoodInCapitalsOrNot) {
@@ -282,6 +361,28 @@ TEST_F(VlmJudgeTest, AProbeThatIsShownFewerImagesHasTheNameThatCalibrationLooksF
       },
       {.probe = VlmProbe::kFlip});
   EXPECT_EQ(verdict.judge, config_.JudgeName() + ":flip:small");
+}
+
+/// -5 was "no limit".
+TEST(VlmConfigPage, ABudgetOrAPriceBelowZeroOrThatIsNoNumberIsRefusedByName) {
+  const TempFolder folder;
+  const auto read = [&](const std::string& budget) {
+    std::ofstream(folder / "page.yaml") << "name: a\nbase_url: http://localhost/v1\nmodel: m\nbudget: {" << budget
+                                        << "}\n";
+    return VlmConfig::FromFile(folder / "page.yaml").budget;
+  };
+  for (const char* key : {"max_requests", "max_tokens", "max_usd", "usd_per_million_prompt_tokens",
+                          "usd_per_million_completion_tokens"}) {
+    const std::string price = std::string(key) == "max_usd" ? ", usd_per_million_prompt_tokens: 1" : "";
+    for (const char* wrong : {"-5", ".nan"}) {
+      EXPECT_THAT([&] { read(std::string(key) + ": " + wrong + price); },
+                  testing::ThrowsMessage<Error>(AllOf(HasSubstr("page.yaml"), HasSubstr(key))))
+          << wrong;
+    }
+    EXPECT_NO_THROW(read(std::string(key) + ": 0" + price)) << key;
+  }
+  EXPECT_EQ(read("max_requests: 3").max_requests, 3);
+  EXPECT_EQ(read("").max_tokens, 0);
 }
 
 TEST(VlmSight, AModelWithoutEyesIsRefused) {

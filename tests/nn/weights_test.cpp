@@ -275,5 +275,40 @@ TEST_F(Weights, SayWhichSizesTheyWereTrainedWithThatNoShapeShows) {
   EXPECT_NO_THROW(CompareSizes(TensorFile::Open(Saved(2)), config_)) << "of earlier versions it is not known";
 }
 
+/// With another page it was run as another network than the one that learned, without a word.
+TEST_F(Weights, SayHowManyFramesOfWhichSizeTheyWereTrainedWith) {
+  config_.schedule.from_last_frame = true;
+  const fs::path path = Saved(1, {.metadata = {{"sizes", SizesNobodySees(config_)}}});
+  const ModelConfig page = config_;
+  const auto refused = [&](const std::function<void(ModelConfig&)>& change, const char* what) {
+    config_ = page;
+    change(config_);
+    EXPECT_THAT(Refusal(path), HasSubstr(what));
+    EXPECT_NO_THROW(FileWeights(path, config_, {.is_run = false})) << "a copy";
+  };
+  refused([](ModelConfig& config) { config.chunk = 4; }, "was trained with chunk 3, the page of sizes says 4");
+  refused([](ModelConfig& config) { config.memory = 3; }, "was trained with memory 2");
+  refused([](ModelConfig& config) { config.image_height_px = 32; }, "was trained with image_height_px 16");
+  refused([](ModelConfig& config) { config.image_width_px = 48; }, "was trained with image_width_px 24");
+  config_ = page;
+  config_.schedule.unchanged_below = 0.15;
+  EXPECT_EQ(Refusal(path), "nothing was thrown") << "chosen when it is run";
+}
+
+TEST_F(Weights, SayHowManyFramesWereCarriedAndNotWhatIsChosenWhenTheyAreRun) {
+  config_.views = 2;
+  config_.schedule.from_last_frame = true;
+  config_.schedule.carry_plane_m = 0;
+  config_.schedule.carry_frames = 2;
+  config_.unet.in_channels += config_.vae.z_channels + 1;
+  const fs::path path = Saved(1, {.metadata = {{"sizes", SizesNobodySees(config_)}}});
+  EXPECT_EQ(Refusal(path), "nothing was thrown");
+  config_.schedule.carry_unless_changed = 0.4;
+  EXPECT_EQ(Refusal(path), "nothing was thrown");
+  config_.schedule.carry_unless_changed = 0;
+  config_.schedule.carry_frames = 1;
+  EXPECT_THAT(Refusal(path), HasSubstr("was trained with schedule.carry_frames 2, the page of sizes says 1"));
+}
+
 }  // namespace
 }  // namespace evac::nn

@@ -1,6 +1,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "core/error.h"
 #include "reports/gate.h"
 #include "tests/reports/repeated_run.h"
 
@@ -47,6 +48,21 @@ TEST(GateOfAnUnerringJudge, IsAskedForMoreStatesWhereNearlyAllEndAlike) {
   const std::string lopsided = std::string(38, 's') + "ff";
   EXPECT_EQ(HeldAgainstItself(lopsided, "at_least: 0.6").outcome, GateOutcome::kInconclusive)
       << "two failures show little of how it sees failures";
+}
+
+/// "against: classifier" was refused although `judge: classifier` beside it was understood.
+TEST(GateOfAnUnerringJudge, TheOtherJudgeMayBeCalledByItsShortName) {
+  RunSummary run = RepeatedRun({{"t", "p", {}, {Half(40)}}});
+  run.judges.push_back("classifier:0123456789ab");
+  for (auto& [episode, verdicts] : run.data.verdicts) verdicts["classifier:0123456789ab"] = verdicts.at("oracle");
+  const GateRules rules = ReadGateRules(Config::FromText(
+      "gates: [{name: r, test: judge_kappa, world: sim, at_least: 0.6, against: classifier}]\n", "gate.yaml"));
+  const RuleDecision decision = Decide(rules, {run, "out", {}}, nullptr).decision.rules.at(0);
+  EXPECT_EQ(decision.outcome, GateOutcome::kPass) << decision.statement;
+  EXPECT_THAT(decision.statement, HasSubstr("kappa of oracle with classifier:0123456789ab in sim"));
+  run.judges.push_back("classifier:ba9876543210");
+  EXPECT_THAT([&] { Decide(rules, {run, "out", {}}, nullptr); },
+              testing::ThrowsMessage<Error>(HasSubstr("gate rule 'r': against: judge 'classifier': stands for")));
 }
 
 TEST(GateOfAnUnerringJudge, OneAnswerAloneIsNoKappa) {

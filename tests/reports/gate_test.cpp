@@ -200,7 +200,7 @@ TEST(Gate, HowManyMoreIsPlannedFromWhatRepeatsTell) {
               HasSubstr("40 pairs, 0 better / 30 worse, p = 0.50 (exact McNemar on 3 effective pairs)"));
   const SampleSize size = PairsForMcNemar({0.5 / 4, 2.75 / 4});
   EXPECT_THAT(paired.more, HasSubstr(fmt::format("about {} more pairs to show it worse",
-                                                 FurtherWanted(static_cast<double>(size.n), {40, 3}))));
+                                                 *FurtherWanted(static_cast<double>(size.n), {40, 3}))));
   const RuleDecision unpaired =
       DecidedOnRepeats("test: boschloo", Alike(10, "sssf"), Alike(10, "sssf")).decision.rules.at(0);
   EXPECT_THAT(unpaired.statement, HasSubstr("(Boschloo on 4 and 4 effective episodes)"));

@@ -88,6 +88,17 @@ TEST(NewTrials, TheSameFileAgainAddsNothingAndAContradictionIsRefused) {
   EXPECT_THROW(NewTrials(trials, stored), Error);
 }
 
+TEST(NewTrials, OfWhatAnEarlierEvacImportedTheFilesNameAloneIsKnown) {
+  const std::string rows = "task,initial_state,policy,checkpoint,outcome\ntake,41-0001,p,good,1\n";
+  RealTrialsCsv csv = Read(rows);
+  const std::vector<RealTrial> earlier = csv.trials;
+  csv.trials.at(0).source = "/lab/monday/t.csv:2";
+  EXPECT_THAT(NewTrials(csv.trials, earlier, csv.counted), IsEmpty());
+  csv.trials.at(0).source = "/lab/monday/other.csv:2";
+  EXPECT_THAT([&] { NewTrials(csv.trials, earlier, csv.counted); },
+              testing::ThrowsMessage<Error>(HasSubstr("imported from t.csv:2")));
+}
+
 TEST(NewTrials, ARepeatFromAnotherFileIsNotTakenForWhatIsThere) {
   const std::string rows = "task,initial_state,policy,checkpoint,outcome\ntake,41-0001,p,good,1\n";
   const RealTrialsCsv first = ReadRealTrialsCsv(rows, "monday.csv", kKnown);

@@ -106,7 +106,7 @@ class FaultyPolicy {
   /// Wrong from the first answer on.
   static bool IsOfConvention(const std::string& f) {
     return f == "wxyz" || f == "delta" || f == "degrees" || f == "millimetres" || f == "other_period" ||
-           f == "reversed";
+           f == "reversed" || f == "silent";
   }
 
   void Answer(const observation_t& asked) {
@@ -153,6 +153,7 @@ class FaultyPolicy {
       std::fflush(stdout);
       ::usleep(static_cast<useconds_t>(options_.late_s * 1e6));
     }
+    if (fault == "silent") return fmt::print("is silent\n"), std::fflush(stdout), false;
     if (fault == "previous") --reply.request;
     if (fault == "error") reply.error = "CUDA out of memory";
     if (fault == "short") reply.targets.resize(reply.num_targets = 5);

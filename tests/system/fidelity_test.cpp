@@ -285,6 +285,17 @@ TEST_F(FidelityRun, LooksAtTheClassifierBeforeItAsksReality) {
   EXPECT_FALSE(fs::exists(folder_ / "out" / "closed"));
 }
 
+TEST_F(FidelityRun, TakesTheSuiteBehindAnOptionForTheSuite) {
+  const auto said = [&](const std::vector<std::string>& options) {
+    std::vector<std::string> words = {Binary("evac"), "fidelity"};
+    words.insert(words.end(), options.begin(), options.end());
+    words.insert(words.end(), {kSuite, "--out", (folder_ / "out").string(), "--parts", "none"});
+    return RunCommand(words).err;
+  };
+  EXPECT_THAT(said({"--parts", "closed,open"}), HasSubstr("--parts: found 'none', wanted some of"));
+  EXPECT_THAT(said({"--set", "lanes=1"}), HasSubstr("--parts: found 'none', wanted some of"));
+}
+
 TEST_F(FidelityRun, SaysWhichWorldTheSuiteLacks) {
   std::vector<std::string> words = Words(folder_ / "out");
   words[2] = EVAC_SOURCE_DIR "/tests/system/imagined.yaml";

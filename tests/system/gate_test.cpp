@@ -154,7 +154,8 @@ TEST_F(GateCommand, SequentialBetsAreKeptInTheRunOnceForEachDataSet) {
 TEST_F(GateCommand, ARunThatTheJudgeHasNotJudgedIsNoBaseline) {
   const CommandResult nobody = Evac({"gate", "pin", Path("main"), "--judge", "orakel", "--out", Path("nobody.json")});
   EXPECT_EQ(nobody.exit_code, 2) << nobody.out;
-  EXPECT_THAT(nobody.err, HasSubstr("judge orakel: found no episode that succeeded or failed"));
+  EXPECT_THAT(nobody.err, HasSubstr("judge orakel: found no episode that succeeded or failed, wanted a judge of this run "
+                                    "(evac ls) as --judge"));
   EXPECT_FALSE(std::filesystem::exists(folder_ / "nobody.json"));
 }
 
@@ -244,6 +245,10 @@ TEST_F(GateCommand, AFolderThatTheJudgeHasNotJudgedIsNoBaselineEither) {
   const CommandResult result = Evac({"gate", Path("gate.yaml"), Path("other"), "--baseline", Path("main")});
   EXPECT_EQ(result.exit_code, 2) << result.out;
   EXPECT_THAT(result.err, HasSubstr(Path("main") + ": judge human: found no episode that succeeded or failed"));
+  EXPECT_THAT(result.err, HasSubstr("as the field judge of " + Path("gate.yaml")));
+  const CommandResult pinned = Evac({"gate", Path("gate.yaml"), Path("other"), "--baseline", Path("baseline.json")});
+  EXPECT_EQ(pinned.exit_code, 2) << pinned.out;
+  EXPECT_THAT(pinned.err, HasSubstr("judge: found human, wanted the baseline's, oracle: `evac gate pin --judge`"));
 }
 
 }  // namespace

@@ -77,6 +77,33 @@ TEST(Interrupts, WhileTheWorldTriesOutItsTasksItDoesNotTryTheOthersFirst) {
   EXPECT_LT(seconds[1], seconds[0] / 2) << "of " << seconds[0] << " s for all";
 }
 
+/// The rows were gone, with their reasons, and nothing ran again.
+TEST(Interrupts, WhileThePolicyIsTriedFailedEpisodesThatWereToRunAgainStay) {
+  const TempFolder folder;
+  const std::filesystem::path run = folder / "run", script = folder / "policy.sh";
+  const auto fail_by = [&](const std::string& fault) {
+    std::ofstream(script) << "exec '" << Binary("faulty-policy") << "' --fault " << fault << "\n";
+  };
+  fail_by("error");
+  ASSERT_EQ(RunCommand(RunWords(kFaults, run, {"policies.0.command=[/bin/sh, " + script.string() + "]",
+                                               "transport.deadline_s=600", "initial_states.count=1"}))
+                .exit_code,
+            0);
+  const std::string before = List(run);
+  EXPECT_NE(before.find("policy_error"), std::string::npos) << before;
+
+  fail_by("silent");
+  const std::filesystem::path log = run / "logs/faulty@default.log";
+  const pid_t pid = StartCommand({Binary("evac"), "resume", run.string(), "--retry-failed"}, folder / "resume.log");
+  EXPECT_TRUE(WaitUntil([&] { return ReadFile(log).find("is silent") != std::string::npos; }))
+      << ReadFile(folder / "resume.log");
+  ::kill(pid, SIGINT);
+  int status = 0;
+  ::waitpid(pid, &status, 0);
+  EXPECT_TRUE(WIFEXITED(status) && WEXITSTATUS(status) == 4) << status;
+  EXPECT_EQ(List(run), before);
+}
+
 struct Interruption {
   const char* name;
   int signal;           ///< 0: the terminal is closed

@@ -64,15 +64,20 @@ TEST(Help, SaysAllThatTheLastExitCodeMeans) {
               HasSubstr("4 internal error, error budget spent, or interrupted"));
 }
 
+/// The desk's, with a forecast.
+std::string PageWithForecast() {
+  std::string page = ReadFile(EVAC_SOURCE_DIR "/apps/configs/desk_model.yaml");
+  if (page.find("object_forecast: true") != std::string::npos) return page;
+  const std::size_t channels = page.find("in_channels: 49");
+  EXPECT_NE(channels, std::string::npos);
+  page.replace(channels, 15, "in_channels: 50");
+  page += "object_forecast: true\n";
+  return page;
+}
+
 TEST(NetworkProgram, ANewForecastTakesThePlaceOfTheOldOneAndAllElseStays) {
   const TempFolder folder;
-  std::string page = ReadFile(EVAC_SOURCE_DIR "/apps/configs/desk_model.yaml");
-  if (page.find("object_forecast: true") == std::string::npos) {
-    const std::size_t channels = page.find("in_channels: 49");
-    ASSERT_NE(channels, std::string::npos);
-    page = page.replace(channels, 15, "in_channels: 50") + "object_forecast: true\n";
-  }
-  WriteFileAtomically(folder / "page.yaml", page);
+  WriteFileAtomically(folder / "page.yaml", PageWithForecast());
   const auto run = [&](std::vector<std::string> words) {
     words.insert(words.begin(), {Binary("evac"), "weights"});
     words.insert(words.end(), {"--config", folder / "page.yaml"});
@@ -89,6 +94,29 @@ TEST(NetworkProgram, ANewForecastTakesThePlaceOfTheOldOneAndAllElseStays) {
     EXPECT_FALSE(same(world, key)) << key;
   }
   EXPECT_TRUE(same(world, "model.diffusion_model.input_blocks.0.0.weight"));
+}
+
+/// It was taken over, and looked for the thing where no table is.
+TEST(NetworkProgram, AForecastOfAnotherPlaneIsNotTakenOver) {
+  const TempFolder folder;
+  WriteFileAtomically(folder / "page.yaml", PageWithForecast());
+  const std::string world = folder / "world.safetensors", forecast = folder / "forecast.safetensors",
+                    out = folder / "out.safetensors";
+  const std::vector<std::string> page = {"--config", folder / "page.yaml"};
+  const auto run = [&](std::vector<std::string> words) {
+    words.insert(words.begin(), {Binary("evac"), "weights"});
+    words.insert(words.end(), page.begin(), page.end());
+    return RunCommand(words);
+  };
+  ASSERT_EQ(run({"init", world}).exit_code, 0);
+  const TensorFile file = TensorFile::Open(world);
+  WriteTensorFile(forecast, file.tensors(), {{"carry_plane_m", "0.4"}});
+  const CommandResult refused = run({"convert", world, out, "--forecast", forecast});
+  EXPECT_EQ(refused.exit_code, 2);
+  EXPECT_THAT(refused.err, HasSubstr(forecast + ": the forecast was trained for carry_plane_m '0.4', wanted '0'"));
+  EXPECT_FALSE(std::filesystem::exists(out));
+  WriteTensorFile(forecast, file.tensors(), {{"carry_plane_m", "0"}});
+  EXPECT_EQ(run({"convert", world, out, "--forecast", forecast}).exit_code, 0);
 }
 
 /// Weights of another size once made a page of keys that do not fit, and no word of the page that was wanted.

@@ -1,6 +1,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstring>
@@ -13,6 +14,7 @@
 #include "core/collection.h"
 #include "core/file.h"
 #include "core/hash.h"
+#include "core/store_lock.h"
 #include "core/tensor_file.h"
 #include "harness/suite.h"
 #include "reports/csv.h"
@@ -143,6 +145,17 @@ TEST_F(PackCommand, WithNothingToPackSaysWhyAndExitsWith2) {
   EXPECT_THAT(result.err, HasSubstr("5 frames, wanted one for each"));
 }
 
+/// They were all looked at and packed, and the first training refused the shards.
+TEST_F(PackCommand, OtherThanAsManyCamerasAsTheNetworkHasViewsAreRefusedAtOnce) {
+  SyntheticClip cut = Good();
+  cut.frames = 5;
+  Add("would_be_left_out", cut);
+  const CommandResult result = RunCommand(Words("out", {"--cameras", "head,hand_left"}));
+  EXPECT_EQ(result.exit_code, 2);
+  EXPECT_THAT(result.err, HasSubstr("--cameras: 2 cameras, wanted 1, one for each view of " + (folder_ / "tiny.yaml").string()));
+  EXPECT_THAT(result.err, Not(HasSubstr("left out")));
+}
+
 TEST_F(PackCommand, RealRecordingsAreThinnedToTheClipsPeriodAndKnowNoOutcome) {
   Add("a", Good());
   ASSERT_EQ(RunCommand(Words("out")).exit_code, 0);
@@ -247,6 +260,31 @@ TEST_F(PackCommand, WarnsOfGrippersThatNeverClose) {
                                 HasSubstr("from 0 (open) to 120 (closed)")));
 }
 
+/// A training said so, once the shards were made and encoded, and named no option.
+TEST_F(PackCommand, WarnsWhereNothingIsHeldOutOrNothingIsLeftToLearnFrom) {
+  for (const char* name : {"a", "b"}) Add(name, Good());
+  const auto said = [&](const std::string& out, const std::string& share) {
+    std::vector<std::string> words = Words(out);
+    *(std::find(words.begin(), words.end(), "--holdout") + 1) = share;
+    const CommandResult result = RunCommand(words);
+    EXPECT_EQ(result.exit_code, 0) << result.err;
+    return result.err;
+  };
+  EXPECT_THAT(said("few", "0.05"), HasSubstr("evac: warning: none of 2 recordings is held out by --holdout 0.05, and "
+                                             "trainings want some on either side: wanted a larger --holdout"));
+  EXPECT_THAT(said("most", "0.9"), HasSubstr("every one of 2 recordings is held out by --holdout 0.9"));
+  EXPECT_THAT(said("one", "0.37"), Not(HasSubstr("held out"))) << "a and not b, by the default seed";
+  EXPECT_THAT(said("asked", "0"), Not(HasSubstr("held out")));
+}
+
+TEST_F(PackCommand, TakesTheFoldersBehindItsCamerasForRecordings) {
+  Add("a", Good());
+  const CommandResult result = RunCommand({Binary("evac"), "pack", "--config", folder_ / "tiny.yaml", "--holdout", "0",
+                                           "--cameras", "head", folder_ / "data", "--out", folder_ / "out"});
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_EQ(Said("out").at("cameras"), "head");
+}
+
 TEST_F(PackCommand, DrawsMapsAsThePageOfTheNetworkSays) {
   Add("a", Good());
   ASSERT_EQ(RunCommand(Words("published")).exit_code, 0);
@@ -288,6 +326,10 @@ TEST_F(PackCommand, ShardsAreImaginedAgainIntoAFolderOfTheirOwn) {
   EXPECT_EQ(early.exit_code, 2);
   EXPECT_THAT(early.err, HasSubstr("has no latents"));
   ASSERT_EQ(RunCommand(encode).exit_code, 0);
+  {
+    const RunLock lock(folder_ / "imagined/lock");
+    EXPECT_THAT(RunCommand(imagine).err, HasSubstr("is writing here; wait for it"));
+  }
   const CommandResult result = RunCommand(imagine);
   ASSERT_EQ(result.exit_code, 0) << result.err;
   EXPECT_THAT(result.out, HasSubstr("imagined latents of 2 shards, 2 of them new"));

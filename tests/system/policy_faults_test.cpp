@@ -5,6 +5,7 @@
 #include <fstream>
 #include <nlohmann/json.hpp>
 
+#include "core/file.h"
 #include "core/seed.h"
 #include "harness/job.h"
 #include "tests/support/temp_folder.h"
@@ -73,6 +74,38 @@ TEST(PolicyFaults, EachFailsItsOwnEpisodeWithTheReasonTheOthersGoOnAndRetryFaile
   EXPECT_EQ(retried.exit_code, 0) << retried.err;
   ASSERT_EQ(RunCommand(RunWords(kFaults, folder / "healthy", {count})).exit_code, 0);
   EXPECT_EQ(List(folder / "run"), List(folder / "healthy"));
+}
+
+/// A training that overwrote last.safetensors during a run: episodes of both weights stood under one hash.
+TEST(PolicyFaults, FilesThatWereWrittenToSinceTheSuiteWasReadEndTheRunWhereAProcessHasReadThem) {
+  const TempFolder folder;
+  WriteFileAtomically(folder / "weights", "step 1");
+  std::filesystem::create_directory(folder / "started");
+  // It starts as the policy does, and from its N-th start on over other weights.
+  const std::string script = (folder / "policy.sh").string(), weights = (folder / "weights").string();
+  WriteFileAtomically(script, fmt::format("touch {0}/started/$$\n"
+                                          "[ $(ls {0}/started | wc -l) -lt $1 ] || echo step 2 > {0}/weights\n"
+                                          "shift\nexec {1} \"$@\"\n",
+                                          folder.path().string(), Binary("faulty-policy")));
+  const auto run = [&](const std::string& name, int start, const std::string& fault) {
+    const std::string words = fmt::format("policies.0.command=[sh, {}, '{}'{}]", script, start, fault);
+    return RunCommand(RunWords(kFaults, folder / name, {words, "policies.0.files=[" + weights + "]"}));
+  };
+  const auto is_told = [&](const CommandResult& result) {
+    EXPECT_EQ(result.exit_code, 2) << result.err;
+    EXPECT_THAT(result.err, HasSubstr(weights + ": it is another file than when the suite was read"));
+  };
+  const CommandResult again = run("again", 2, fmt::format(", --fault, die@{}", SeedOfEpisode(1)));
+  is_told(again);
+  const auto episodes = nlohmann::json::parse(List(folder / "again"));
+  ASSERT_EQ(episodes.size(), 2u) << "of the first weights, one failed as they were gone";
+  EXPECT_EQ(episodes[0]["stop"], "still");
+  EXPECT_EQ(episodes[1]["stop"], "policy_error");
+
+  WriteFileAtomically(weights, "step 1");
+  const CommandResult at_once = run("at_once", 1, "");
+  is_told(at_once);
+  EXPECT_EQ(nlohmann::json::parse(List(folder / "at_once")).size(), 0u);
 }
 
 TEST(PolicyFaults, WhenNothingWorksTheErrorBudgetEndsTheRunWithCodeFourSayingSo) {

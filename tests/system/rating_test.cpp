@@ -101,6 +101,48 @@ TEST(RatingSession, ASheetComesInAndLabelsGoBackIntoTheRun) {
   EXPECT_EQ(nlohmann::json::parse(lines.substr(0, lines.find('\n'))).at("note"), "clean, quick");
 }
 
+/// They came in without a word, and no rate had them.
+TEST(RatingSession, ASheetOfAllClipsComesInWholeAndIsToldWhichOfItCountNowhere) {
+  const StoredRun run("whole", "sfsf", "sffs");
+  const std::string study = (run.folder().parent_path() / "study").string(), sheet = study + ".csv";
+  const std::vector<std::string> made = {"new", study, "--run", run.folder().string(), "--gold-from", "oracle"};
+  ASSERT_EQ(Rate(made).exit_code, 0);
+  std::ofstream written(sheet);
+  written << "episode,rater,label\n";
+  int uncounted = 0;
+  for (const StudyClip& clip : StudyStore::Open(study, StudyStore::Mode::kReadOnly).Clips()) {
+    written << clip.episode << ",ann,success\n";
+    uncounted += clip.use == Showing::kExample || clip.use == Showing::kPractice ? 1 : 0;
+  }
+  written.close();
+  ASSERT_EQ(uncounted, 4);
+  const CommandResult imported = Rate({"import", study, sheet});
+  ASSERT_EQ(imported.exit_code, 0) << imported.err;
+  EXPECT_THAT(imported.out, HasSubstr("8 verdicts, 8 new\nnote: 4 of them are of examples and practice clips"));
+  EXPECT_EQ(nlohmann::json::parse(Rate({"status", study, "--json"}).out).at("progress").at("votes"), 4);
+}
+
+/// A run was the text that the study has for it, which nobody typed: "out/run/" had no clip.
+TEST(RatingSession, ASheetMayNameARunInAnyWayThatNamesItsFolder) {
+  const StoredRun one("one", "s", "s"), two("two", "s", "s");
+  const std::string study = (one.folder().parent_path() / "study").string(), sheet = study + ".csv";
+  const CommandResult made =
+      Rate({"new", "--height", "64", "--run", one.folder().string(), "--run", two.folder().string(), study});
+  ASSERT_EQ(made.exit_code, 0) << made.err;
+  const auto import_votes = [&](const std::string& first, const std::string& second) {
+    std::ofstream(sheet) << "episode,run,rater,label\nreal/take/pick@1/41-0000-s1," << first
+                         << ",ann,success\nreal/take/pick@1/41-0000-s1," << second << ",ann,failure\n";
+    return Rate({"import", study, sheet});
+  };
+  const std::string there = two.folder().parent_path().string();
+  const CommandResult other = import_votes(one.folder().string(), there + "/other");
+  EXPECT_EQ(other.exit_code, 2) << other.out;
+  EXPECT_THAT(other.err, HasSubstr("has no clip"));
+  const CommandResult imported = import_votes(one.folder().string() + "/", there + "/./two");
+  EXPECT_EQ(imported.exit_code, 0) << imported.err;
+  EXPECT_THAT(imported.out, HasSubstr("2 verdicts, 2 new"));
+}
+
 TEST(RatingSession, ClipsThatWereNotImaginedAreShownAsTheWorldModelsCodecGivesThemBackIfAskedFor) {
   const StoredRun run("soft", "sf", "fs");
   const auto beside = [&](const char* name) { return (run.folder().parent_path() / name).string(); };

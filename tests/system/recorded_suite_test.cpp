@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <map>
+#include <nlohmann/json.hpp>
 #include <set>
 
 #include "apps/evaluate.h"
@@ -300,6 +301,37 @@ TEST_F(RecordedStates, ThoseThatCannotBeginAreLeftOutAndNoneIsRefused) {
   EXPECT_THAT([&] { Many("", "none"); }, ThrowsMessage<Error>(HasSubstr("no recording can be begun from")));
   fs::create_directories(folder_ / "empty");
   EXPECT_THAT([&] { Many("", "empty"); }, ThrowsMessage<Error>(HasSubstr("no recordings; wanted")));
+}
+
+/// Policies were told where the first recording's cameras stood, and not a word of it, wherever those of a state did.
+TEST_F(RecordedStates, ThoseByCamerasThatStandElsewhereThanPoliciesAreToldAreLeftOutAndCounted) {
+  const auto move_head = [&](const std::string& name, double by_m) {
+    WriteClip(name, 25, 0);
+    const fs::path page = folder_ / name / "head_extrinsic_params_aligned.json";
+    nlohmann::json poses = nlohmann::json::parse(ReadFile(page));
+    for (auto& pose : poses) {
+      auto& x_m = pose["extrinsic"]["translation_vector"][0];
+      x_m = x_m.get<double>() + by_m;
+    }
+    WriteText(page, poses.dump());
+  };
+  const auto see_otherwise = [&](const std::string& name, const std::string& camera, const std::string& intrinsics) {
+    WriteClip(name, 25, 0);
+    WriteText(folder_ / name / (camera + "_intrinsic_params.json"), "{\"intrinsic\": {" + intrinsics + "}}");
+  };
+  move_head("many/d_nearly", 0.02);
+  move_head("many/e_moved", 0.04);
+  see_otherwise("many/f_zoomed", "hand_right", R"("fx": 44, "fy": 41, "ppx": 24, "ppy": 16)");
+  see_otherwise("many/g_cut", "head", R"("fx": 40, "fy": 41, "ppx": 27.6, "ppy": 16)");
+  WriteClip("many/h_reaches", 25, 30);  // the hand's camera is elsewhere too, and where it was on the hand
+  testing::internal::CaptureStderr();
+  const Suite suite = Many();
+  EXPECT_THAT(testing::internal::GetCapturedStderr(),
+              AllOf(HasSubstr("camera head stands 0.040 m and 0.0 degrees from where it stood in a"),
+                    HasSubstr("camera hand_right has a focal length of 0.917 picture widths, in a 0.833"),
+                    HasSubstr("camera head has its principal point 0.075 picture widths"),
+                    HasSubstr("warning: 3 recordings of")));
+  EXPECT_EQ(States(suite), (std::vector<std::string>{"a", "b", "c", "d_nearly", "h_reaches"}));
 }
 
 TEST_F(RecordedStates, OfATreeTheyAreOfOneTask) {

@@ -11,6 +11,7 @@
 #include <nlohmann/json.hpp>
 #include <thread>
 
+#include "core/file.h"
 #include "core/hash.h"
 #include "core/seed.h"
 #include "core/store.h"
@@ -142,6 +143,36 @@ TEST(Resume, WhoRanWithOtherTimesThanTheRunBeganWithIsToldTheCommandThatKeepsThe
   words.push_back("--retry-failed");
   const CommandResult good = RunCommand(words);
   EXPECT_EQ(good.exit_code, 0) << good.err;
+}
+
+/// `evac resume` was named, which looked where the suite had lain.
+TEST(Resume, WhoGoesOnWithASuiteThatWasMovedIsToldACommandThatFindsIt) {
+  const TempFolder folder;
+  const std::string run = (folder / "run").string(), sick = (folder / "sick").string();
+  std::ofstream(sick) << "yes";
+  std::string text = ReadFile(kFaults);
+  const auto put = [&](const std::string& found, const std::string& wanted) {
+    text.replace(text.find(found), found.size(), wanted);
+  };
+  put("../../worldmodel/sim/profiles/real.yaml", "real.yaml");
+  put("../../worldmodel", EVAC_SOURCE_DIR "/worldmodel");
+  for (const char* place : {"old", "new"}) {
+    fs::create_directory(folder / place);
+    std::ofstream(folder / place / "suite.yaml") << text;
+    fs::copy_file(EVAC_SOURCE_DIR "/worldmodel/sim/profiles/real.yaml", folder / place / "real.yaml");
+  }
+  const std::vector<std::string> assignments = {
+      "policies.0.command=[faulty-policy, --fault, error, --while, " + sick + "]", "error_budget=0"};
+  const CommandResult began = RunCommand(RunWords((folder / "old/suite.yaml").string(), run, assignments));
+  EXPECT_THAT(began.err, HasSubstr("go on with: evac resume " + run + " --retry-failed"));
+  fs::remove_all(folder / "old");
+  std::vector<std::string> words = RunWords((folder / "new/suite.yaml").string(), run, assignments);
+  const CommandResult moved = RunCommand(words);
+  EXPECT_EQ(moved.exit_code, 4) << moved.err;
+  EXPECT_THAT(moved.err, HasSubstr("go on with: evac run " + words.at(2) + " --out " + run + " --set "));
+  fs::remove(sick);
+  words.push_back("--retry-failed");
+  EXPECT_EQ(RunCommand(words).exit_code, 0);
 }
 
 TEST(Resume, FailedEpisodesKeepTheirReasonsWhereTheirPolicyCannotBeStartedAgain) {

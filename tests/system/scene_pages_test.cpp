@@ -3,10 +3,13 @@
 
 #include <filesystem>
 
+#include "apps/evaluate.h"
 #include "apps/factory.h"
+#include "apps/recorded_suite.h"
 #include "core/error.h"
 #include "core/file.h"
 #include "harness/suite_hash.h"
+#include "tests/support/synthetic_recording.h"
 #include "tests/support/temp_folder.h"
 #include "tests/system/run_support.h"
 
@@ -78,6 +81,27 @@ TEST(ScenePages, WhatWasWrittenToBetweenTheReadingOfTheSuiteAndTheWorldsTurnIsRe
   };
   is_refused("take_bottle.yaml", "take_bottle.yaml", with_a_field("chance: 0.75", "chance: 0.5"));
   is_refused("real.yaml", "real.yaml", with_a_field("mass: 1.2", "mass: 1.3"));
+}
+
+/// Each of several is read again where its episode begins, hours later: what was stored bore the suite's hash.
+TEST(RecordedStart, OfARecordingThatWasWrittenToSinceTheSuiteWasReadEndsTheRun) {
+  const TempFolder folder;
+  for (const char* name : {"a", "b"}) SyntheticClip(25).Write(OneFolder(folder / "many" / name));
+  WriteText(folder / "suite.yaml",
+            "suite: recorded\nrecording: many\nworlds: [{name: echo, type: echo}]\nlanes: 1\nerror_budget: 1\n"
+            "policies: [{name: hold, command: [evac-policy, hold]}]\n");
+  Suite suite = ReadSuite(folder / "suite.yaml", {});
+  FillInRecordedTask(suite);
+  SyntheticClip(28).Write(OneFolder(folder / "many/b"));
+  Suite anew = ReadSuite(folder / "suite.yaml", {});
+  EXPECT_NO_THROW(FillInRecordedTask(anew)) << "who reads the suite now has the new one";
+  Store store = Store::CreateOrContinue(
+      folder / "run", {.suite_text = suite.text, .suite_hash = suite.hash, .suite_path = "", .evac_version = "1"});
+  EXPECT_THAT([&] { Evaluate(suite, store, {}); },
+              testing::ThrowsMessage<Error>(
+                  AllOf(HasSubstr("many/b"), HasSubstr("it is another file than when the suite was read"))));
+  ASSERT_EQ(store.Episodes().size(), 1u);
+  EXPECT_EQ(store.Episodes().front().key.pair.initial_state, "a");
 }
 
 }  // namespace

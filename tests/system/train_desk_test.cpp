@@ -1,3 +1,4 @@
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <sys/wait.h>
 
@@ -83,6 +84,16 @@ TEST(TrainDesk, TooFewPairsToBalanceTheJudgeByAreNoFailure) {
   const CommandResult result = WithEndings(folder.path(), "'judge balance') exit 3;;\n");
   EXPECT_EQ(result.exit_code, 0) << result.err;
   EXPECT_NE(result.out.find("judge balance\n9 starts of steps took"), std::string::npos) << result.out;
+}
+
+/// Its line said that it had ended with 0.
+TEST(TrainDesk, AStepThatIsKilledIsWrittenDownAsOne) {
+  const TempFolder folder;
+  const CommandResult result = WithEndings(folder.path(), "'train codec') kill -9 $$;;\n");
+  EXPECT_EQ(result.exit_code, 128 + 9);
+  const std::string times = ReadFile(folder / "out/time.csv");
+  EXPECT_THAT(times, testing::MatchesRegex("collect,[0-9.]+,[0-9]+,0\npack,[0-9.]+,[0-9]+,0\ncodec,[0-9.]+,[0-9]+,137\n"));
+  EXPECT_FALSE(fs::exists(folder / "out/time.step"));
 }
 
 TEST(TrainDesk, AStepThatFailsEndsIt) {

@@ -53,6 +53,15 @@ class WeightsCommand : public ::testing::Test {
     const Answer answer = Evac("init " + file + " --config tiny.yaml " + options);
     ASSERT_EQ(answer.exit_code, 0) << answer.text;
   }
+  /// `file` with its codec from another one: as two trainings with one codec are.
+  void TakeCodec(const std::string& file, const std::string& from) const {
+    const TensorFile own = TensorFile::Open(folder_ / file), other = TensorFile::Open(folder_ / from);
+    std::vector<TensorView> tensors = own.tensors();
+    for (TensorView& tensor : tensors) {
+      if (tensor.name.starts_with("first_stage_model")) tensor.bytes = other.Get(tensor.name).bytes;
+    }
+    WriteTensorFile(folder_ / file, tensors, own.metadata());
+  }
   std::string Hash(const std::string& file) const { return Sha256HexOfFile(folder_ / file); }
 
   const TempFolder temp_;
@@ -100,6 +109,11 @@ TEST_F(WeightsCommand, ConvertThereAndBackLosesNothing) {
 TEST_F(WeightsCommand, MeanFitsAndSaysWhatItIsOf) {
   Init("a.safetensors", "--seed 7");
   Init("b.safetensors", "--seed 8");
+  const Answer of_two_codecs = Evac("mean a.safetensors b.safetensors --config tiny.yaml --out mean.safetensors");
+  EXPECT_EQ(of_two_codecs.exit_code, 2);
+  EXPECT_THAT(of_two_codecs.text, HasSubstr("wanted trainings with one codec"));
+  EXPECT_FALSE(fs::exists(folder_ / "mean.safetensors"));
+  TakeCodec("b.safetensors", "a.safetensors");
   const Answer made = Evac("mean a.safetensors b.safetensors --config tiny.yaml --dtype bf16 --out mean.safetensors");
   ASSERT_EQ(made.exit_code, 0) << made.text;
   const Answer answer = Evac("inspect mean.safetensors --config tiny.yaml --json");

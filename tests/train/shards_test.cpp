@@ -42,6 +42,15 @@ TEST(ShardSet, NumbersThatAreNoneAreRefusedByFileTensorAndRow) {
   }
 }
 
+TEST(ShardSet, ASplitThatIsNotThereIsSaidWithTheOptionThatMakesIt) {
+  const TempFolder folder;
+  WriteSyntheticShards(folder.path(), {});
+  ChangeSyntheticShard(folder.path(), kNothing, {{"split", "holdout"}});
+  EXPECT_NO_THROW(ShardSet(folder.path(), Split::kHoldout));
+  EXPECT_THAT([&] { ShardSet(folder.path(), Split::kTrain); },
+              ThrowsMessage<TensorError>(HasSubstr("has no shard with split train (evac pack --holdout)")));
+}
+
 TEST(ShardSet, WhereTheObjectIsMayBeUnknown) {
   const TempFolder folder;
   WriteSyntheticShards(folder.path(), {.knows_object = false});

@@ -29,6 +29,8 @@ TrainingJob JobOf(const Prepared& at) {
   job.world.view_weights = "1";
   job.start.codec_sha256 = "codec";
   job.start.init_except = {"model.diffusion_model.out."};
+  job.init_sha256 = "5678";
+  job.forecast_sha256 = "9abc";
   job.begun_with = " page 1234 init 5678";
   return job;
 }
@@ -42,6 +44,8 @@ TEST(TrainingJob, IsTheSameWhenReadAgain) {
   EXPECT_EQ(again.world.job.trainer.learning_rate, 1.0 / 3000) << "to the last digit";
   EXPECT_EQ(again.begun_with, job.begun_with);
   EXPECT_EQ(again.start.init_except, job.start.init_except);
+  EXPECT_EQ(again.init_sha256, "5678");
+  EXPECT_EQ(again.forecast_sha256, "9abc");
   TrainingJob codec;
   codec.kind = TrainingKind::kCodec;
   codec.config = at.config;
@@ -67,6 +71,29 @@ TEST(TrainingJob, TrainsTheSameWeights) {
   const std::string bytes = BytesOf(at.folder / "here" / "weights.safetensors");
   ASSERT_FALSE(bytes.empty());
   EXPECT_EQ(BytesOf(at.folder / "there" / "weights.safetensors"), bytes);
+}
+
+/// It trained with the defaults of what was missing.
+TEST(TrainingJob, CutOffOnItsWayItIsRefusedWhereverThatWas) {
+  const std::string whole = TextOf(JobOf(Prepared(1))), first = "evac-training 1\nworld\n";
+  ASSERT_TRUE(whole.starts_with(first));
+  const std::size_t last_line = whole.rfind('\n', whole.size() - 2) + 1;
+  for (std::size_t size = first.size(); size < whole.size(); ++size)
+    EXPECT_THAT([&] { ParseTrainingJob(whole.substr(0, size), "job"); },
+                ThrowsMessage<TensorError>(HasSubstr("job: it is cut off: wanted 'begun_with …' as its last line")))
+        << size << " of " << whole.size() << ", the last line from " << last_line;
+  for (std::size_t size = 0; size < first.size(); ++size)
+    EXPECT_THROW(ParseTrainingJob(whole.substr(0, size), "job"), TensorError) << size;
+  EXPECT_NO_THROW(ParseTrainingJob(whole, "job"));
+}
+
+/// What wrote them did not know which files they were written for.
+TEST(TrainingJob, OfAnEarlierVersionItIsReadAsBefore) {
+  TrainingJob job = JobOf(Prepared(1));
+  job.init_sha256 = job.forecast_sha256 = "";
+  const std::string text = TextOf(job);
+  EXPECT_EQ(text.find("init_sha256"), std::string::npos);
+  EXPECT_EQ(TextOf(ParseTrainingJob(text, "job")), text);
 }
 
 TEST(TrainingJob, WhatIsWrongIsNamedWithItsLine) {

@@ -14,7 +14,9 @@ namespace evac::nn {
 class MeanWeights final : public ParameterSource {
  public:
   /// @param paths  at least two, of one size
-  /// @throws TensorError as FileWeights; files whose metadata name different codecs, whose latents mean different things
+  /// @throws TensorError as FileWeights; files whose metadata name different codecs, whose latents mean different things,
+  ///   or that were trained for different things or with different sizes (CompareSizes); naming the first key of codec or
+  ///   forecast that differs by more than how its types round
   MeanWeights(const std::vector<std::filesystem::path>& paths, const ModelConfig& config);
 
   Tensor Take(const std::string& key, at::IntArrayRef shape) override;

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <iterator>
 #include <set>
+#include <span>
 #include <sstream>
 
 #include "worldmodel/nn/model_sizes.h"
@@ -37,6 +38,12 @@ constexpr const char* kNotInShapes[] = {
     "unet.num_head_channels",      "unet.init_attention_heads",
     "vae.scale_factor",            "action_resampler.heads",
     "image_resampler.heads",       "image_encoder.head_width"};
+/// Likewise, of how a network is run: a file that is copied is not asked.
+constexpr const char* kOfARun[] = {"chunk", "memory", "image_height_px", "image_width_px", "schedule.carry_frames"};
+
+bool IsIn(std::span<const char* const> keys, const std::string& key) {
+  return std::ranges::find(keys, key) != keys.end();
+}
 
 }  // namespace
 
@@ -59,7 +66,7 @@ std::string SizesNobodySees(const ModelConfig& config) {
   ModelConfig sizes = config;
   std::string text;
   for (const Size& size : SizesOf(sizes)) {
-    if (std::ranges::find(kNotInShapes, size.Key()) != std::end(kNotInShapes))
+    if (IsIn(kNotInShapes, size.Key()) || IsIn(kOfARun, size.Key()))
       text += size.Key() + " " + TextOf(size) + "\n";
   }
   return text;
@@ -89,7 +96,9 @@ FileWeights::FileWeights(const std::filesystem::path& path, const ModelConfig& c
     : tensors_(TensorFile::OpenCheckpoint(path)), options_(options) {
   KeyFit fit = CompareKeys(file(), config);
   if (!fit.Fits()) throw TensorError(file().name() + " does not fit the configuration: " + fit.Complaint());
-  CompareSizes(file(), config);
+  std::vector<std::string> asked;
+  if (!options.is_run) asked.assign(std::begin(kNotInShapes), std::end(kNotInShapes));
+  CompareSizes(file(), config, asked);
   report_ = {std::move(fit.unread), CompareSchedule(tensors_, config)};
   std::sort(report_.ignored_keys.begin(), report_.ignored_keys.end());
 }

@@ -17,6 +17,9 @@ struct LoadOptions {
   /// between the layers.
   std::optional<at::ScalarType> products = std::nullopt;
   bool with_unread = false;  ///< also give what nothing reads, for copying a file: dead keys, leftovers of CLIP
+  /// False: the file is copied, and may be of another chunk, memory, picture size or `carry_frames` than the page, which
+  /// say how a network is run.
+  bool is_run = true;
 };
 
 struct LoadReport {
@@ -31,9 +34,11 @@ struct LoadReport {
 ///   scaled otherwise (`scale_arr`; of the codec's scale_factor CompareSizes knows).
 std::string CompareSchedule(const MappedTensors& tensors, const ModelConfig& config);
 
-/// Sizes that no tensor's shape shows, as the card of weights keeps them ("sizes"): how many heads attention has, what
-/// latents are scaled by, what the network's answer is counted from, the table's plane, robot and rate.
-/// @returns "unet.num_head_channels 64\n…"
+/// Sizes that no tensor's shape shows, as the card of weights keeps them ("sizes"): how many frames are imagined at once,
+/// remembered and carried, how large pictures are, how many heads attention has, what latents are scaled by, what the
+/// network's answer is counted from, the table's plane, robot and rate. `carry_unless_changed` and `unchanged_below` are
+/// none of them: they are chosen when a network is run.
+/// @returns "chunk 16\n…"
 std::string SizesNobodySees(const ModelConfig& config);
 /// @param only  beginnings of the sizes to compare; none: all
 /// @throws TensorError naming the file, the first size that differs, what was found and what is wanted. A file that says
@@ -46,7 +51,7 @@ class FileWeights final : public ParameterSource {
   /// @param path  .safetensors, or .pt/.ckpt of torch.save
   /// @throws TensorError naming the file: unreadable; missing, extra and misshapen keys (ten of each, and how many);
   ///   a schedule that ends in pure noise like the configuration's, and is another; latents scaled otherwise; a size that
-  ///   its card says and the configuration has otherwise (CompareSizes).
+  ///   its card says and the configuration has otherwise (CompareSizes; LoadOptions::is_run).
   FileWeights(const std::filesystem::path& path, const ModelConfig& config, const LoadOptions& options = {});
 
   /// Undefined for a key that nothing reads, unless asked for with `with_unread`.

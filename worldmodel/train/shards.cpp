@@ -302,7 +302,7 @@ ShardSet::ShardSet(const ShardFolders& folders, Split split) : folders_(folders)
   }
   for (const std::string& task : tasks_) append(tasks, ",", task);
   if (shards_.empty())
-    throw TensorError(FolderNames() + " has no shard with split " + NameOf(split));
+    throw TensorError(FolderNames() + " has no shard with split " + NameOf(split) + " (evac pack --holdout)");
   metadata_["recipe"] = recipes;
   metadata_["tasks"] = tasks;
 }

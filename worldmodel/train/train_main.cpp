@@ -3,6 +3,7 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <array>
 #include <cerrno>
 #include <chrono>
 #include <csignal>
@@ -18,6 +19,7 @@
 #include "worldmodel/nn/number_text.h"
 #include "worldmodel/nn/open_blas.h"
 #include "worldmodel/nn/threads.h"
+#include "worldmodel/train/sha256.h"
 #include "worldmodel/train/training_job.h"
 
 /// evac-train: a training that `evac train … --job` wrote, on a machine that has a compiler and libtorch alone.
@@ -93,16 +95,37 @@ void RequireFile(const char* option, const std::filesystem::path& given, bool wa
   if (!wanted && !given.empty()) throw TensorError(std::string(option) + ": the job was written without it");
 }
 
-/// One process in OUT, as long as it lives.
+/// @param identity  of a file, as the job has it: begun with others the training would be another one
+void RequireSame(const char* option, const std::filesystem::path& given, const std::string& wanted,
+                 std::string (*identity)(const std::filesystem::path&)) {
+  if (given.empty() || wanted.empty()) return;  // the job is of an earlier version
+  if (const std::string found = identity(given); found != wanted)
+    throw TensorError(std::string(option) + ": " + given.string() +
+                      " is another one than the job was written for: SHA-256 " + found + ", wanted " + wanted);
+}
+
+/// One process in OUT, as long as it lives: it holds OUT/lock as `evac train` does (core/store_lock.h, which is not
+/// built here), so that the two do not write one another's files either.
 class Hold {
  public:
   explicit Hold(const std::filesystem::path& out) {
     std::error_code error;
     std::filesystem::create_directories(out, error);
-    const std::string file = (out / "evac-train.lock").string();
-    descriptor_ = ::open(file.c_str(), O_CREAT | O_RDWR | O_CLOEXEC | O_NOFOLLOW, 0666);
+    const std::string file = (out / "lock").string();
+    descriptor_ = ::open(file.c_str(), O_CREAT | O_RDWR | O_CLOEXEC | O_NOFOLLOW, 0644);
     if (descriptor_ < 0) throw TensorError(file + ": cannot be made: " + std::strerror(errno));
-    if (::flock(descriptor_, LOCK_EX | LOCK_NB) != 0) throw TensorError(out.string() + ": another process trains there");
+    std::array<char, 17> text{};
+    const ssize_t size = ::read(descriptor_, text.data(), text.size());
+    const std::string holder(text.data(), size > 0 ? static_cast<std::size_t>(size) : 0);
+    if (size < 0 || holder.size() == text.size() || holder.find_first_not_of("0123456789\n") != std::string::npos)
+      throw TensorError(file + ": is no lock of evac's, wanted that name free, or another folder");
+    if (::flock(descriptor_, LOCK_EX | LOCK_NB) != 0)
+      throw TensorError(out.string() + ": process " + holder.substr(0, holder.find('\n')) +
+                        " is writing here; wait for it or stop it");
+    const std::string own = std::to_string(::getpid()) + "\n";
+    if (::ftruncate(descriptor_, 0) != 0 || ::pwrite(descriptor_, own.data(), own.size(), 0) < 0) {
+      // Only the message to a second process is poorer for it.
+    }
   }
   ~Hold() { ::close(descriptor_); }
   Hold(const Hold&) = delete;
@@ -111,6 +134,24 @@ class Hold {
  private:
   int descriptor_ = -1;
 };
+
+/// OUT/begun_by, as `evac train` writes it: where another version began the training, a note says so.
+void KeepWhoBegan(const std::filesystem::path& out) {
+  const std::filesystem::path file = out / "begun_by";
+  if (!std::filesystem::exists(out / "training.safetensors")) {
+    std::ofstream text(file, std::ios::binary | std::ios::trunc);
+    text << EVAC_TRAIN_VERSION "\n" << std::flush;
+    if (!text) throw TensorWriteError(file.string() + ": cannot be written");
+    return;
+  }
+  std::string began;
+  std::ifstream text(file);
+  std::getline(text, began);
+  if (began == EVAC_TRAIN_VERSION) return;
+  began = began.empty() ? "an evac that did not write down its version" : "evac " + began;
+  std::fprintf(stderr, "evac-train: note: %s was begun by %s; evac " EVAC_TRAIN_VERSION " goes on with it\n",
+               out.c_str(), began.c_str());
+}
 
 volatile std::sig_atomic_t g_interrupted = 0;
 
@@ -148,6 +189,9 @@ int Train(const Arguments& arguments) {
   RequireFile("--codec", arguments.codec, !is_codec);
   RequireFile("--init", arguments.init, job.wants_init);
   RequireFile("--forecast", arguments.forecast, job.wants_forecast);
+  RequireSame("--codec", arguments.codec, job.start.codec_sha256, CodecSha256);
+  RequireSame("--init", arguments.init, job.init_sha256, Sha256OfFile);
+  RequireSame("--forecast", arguments.forecast, job.forecast_sha256, Sha256OfFile);
   for (JobOptions* options : {&job.codec.job, &job.world.job}) {
     if (arguments.steps == 0) continue;
     options->trainer.steps = arguments.steps;
@@ -159,6 +203,7 @@ int Train(const Arguments& arguments) {
                        ShowNowAndThen, [](const std::string& sentence) { std::fprintf(stderr, "%s\n", sentence.c_str()); },
                        job.begun_with, arguments.device};
   const Hold hold(arguments.out);
+  KeepWhoBegan(arguments.out);
   CatchInterrupts();
   nn::KeepFreedMemory();
   const nn::LibraryThreads library(Workers(place, job.options()) > 1 ? 1 : threads);

@@ -12,7 +12,7 @@
 namespace evac::train {
 namespace {
 
-constexpr const char *kFirstLine = "evac-training 1", *kSize = "size ", *kOption = "option ";
+constexpr const char *kFirstLine = "evac-training 1", *kSize = "size ", *kOption = "option ", *kLastLine = "begun_with";
 constexpr std::size_t kMostBytes = 1 << 20;
 
 Settings OptionsOf(TrainingJob& job) {
@@ -23,7 +23,9 @@ Settings OptionsOf(TrainingJob& job) {
 bool SetOther(TrainingJob& job, const std::string& name, const std::string& value) {
   if (name == "codec_sha256") job.start.codec_sha256 = value;
   else if (name == "init_except") job.start.init_except.push_back(value);
-  else if (name == "begun_with") job.begun_with = value;
+  else if (name == "init_sha256") job.init_sha256 = value;
+  else if (name == "forecast_sha256") job.forecast_sha256 = value;
+  else if (name == kLastLine) job.begun_with = value;
   else if (name == "init_widen") return nn::ParseFlag(value, job.start.init_widen);
   else if (name == "wants_init") return nn::ParseFlag(value, job.wants_init);
   else if (name == "wants_forecast") return nn::ParseFlag(value, job.wants_forecast);
@@ -69,7 +71,9 @@ std::string TextOf(const TrainingJob& given) {
   flag("init_widen", job.start.init_widen);
   flag("wants_init", job.wants_init);
   flag("wants_forecast", job.wants_forecast);
-  return text + "begun_with " + job.begun_with + "\n";
+  if (!job.init_sha256.empty()) text += "init_sha256 " + job.init_sha256 + "\n";
+  if (!job.forecast_sha256.empty()) text += "forecast_sha256 " + job.forecast_sha256 + "\n";
+  return text + kLastLine + " " + job.begun_with + "\n";
 }
 
 TrainingJob ParseTrainingJob(const std::string& text, const std::string& name) {
@@ -78,16 +82,22 @@ TrainingJob ParseTrainingJob(const std::string& text, const std::string& name) {
   if (!std::getline(lines, line) || line != kFirstLine)
     throw TensorError(name + ": its first line is '" + line.substr(0, 40) + "', wanted '" + kFirstLine +
                       "', as `evac train … --job` writes it");
+  const TensorError cut_off(name + ": it is cut off: wanted '" + kLastLine +
+                            " …' as its last line, as `evac train … --job` writes it");
+  if (!text.ends_with('\n')) throw cut_off;
   TrainingJob job;
   std::getline(lines, kind);
   if (kind != "codec" && kind != "world")
     throw TensorError(name + ":2: found '" + kind.substr(0, 40) + "', wanted codec or world");
   job.kind = kind == "codec" ? TrainingKind::kCodec : TrainingKind::kWorld;
+  bool is_whole = false;
   for (int number = 3; std::getline(lines, line); ++number) {
     if (!SetLine(job, line))
       throw TensorError(name + ":" + std::to_string(number) + ": found '" + line.substr(0, 100) +
                         "', wanted a size or an option that this version has, and a value that it may have");
+    is_whole = line.starts_with(kLastLine);
   }
+  if (!is_whole) throw cut_off;
   try {
     job.config.Check();
   } catch (const TensorError& error) {

@@ -20,6 +20,8 @@ struct TrainingJob {
   /// Of the latter: the files' names are given again where they are carried to, the rest is here.
   WorldStart start;
   bool wants_init = false, wants_forecast = false;  ///< weights that the training begins with
+  /// Of these files, SHA-256, as `start.codec_sha256` is of the codec's tensors (sha256.h); empty: not asked.
+  std::string init_sha256, forecast_sha256;
   std::string begun_with;  ///< JobPlace::begun_with
 
   const JobOptions& options() const { return kind == TrainingKind::kCodec ? codec.job : world.job; }
@@ -28,8 +30,8 @@ struct TrainingJob {
 /// The job as text; read again it is the same, to the last digit.
 std::string TextOf(const TrainingJob& job);
 /// @param name  of the file, for messages
-/// @throws TensorError naming file and line: not such a file, an unknown name, a value that its field cannot have, or
-///   sizes that make no network
+/// @throws TensorError naming file and line: not such a file, one that was cut off on its way, an unknown name, a value
+///   that its field cannot have, or sizes that make no network
 TrainingJob ParseTrainingJob(const std::string& text, const std::string& name);
 
 /// @throws TensorError if it cannot be written; nothing is there then, or what was

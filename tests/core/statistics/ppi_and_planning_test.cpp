@@ -1,6 +1,9 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <cmath>
+#include <limits>
+
 #include "core/error.h"
 #include "core/seed.h"
 #include "core/statistics/betting.h"
@@ -256,10 +259,20 @@ TEST(SequentialPlanning, WhatCannotBeShownIsUndefined) {
 }
 
 TEST(FurtherWanted, CountsRepeatsByWhatTheyTell) {
-  EXPECT_EQ(FurtherWanted(30, {20, 20}), 10);
-  EXPECT_EQ(FurtherWanted(30, {200, 20}), 100) << "ten repeats tell as much as one state";
-  EXPECT_EQ(FurtherWanted(10, {20, 20}), 1);
-  EXPECT_EQ(FurtherWanted(7, {0, 0}), 7);
+  EXPECT_EQ(*FurtherWanted(30, {20, 20}), 10);
+  EXPECT_EQ(*FurtherWanted(30, {200, 20}), 100) << "ten repeats tell as much as one state";
+  EXPECT_EQ(*FurtherWanted(10, {20, 20}), 1);
+  EXPECT_EQ(*FurtherWanted(7, {0, 0}), 7);
+}
+
+/// 10^32 was cast to a 64-bit integer.
+TEST(FurtherWanted, MoreThanCanBeCountedAreNoNumber) {
+  EXPECT_EQ(*FurtherWanted(0x1.0p52, {20, 20}), (std::int64_t{1} << 52) - 20);
+  for (const double wanted : {0x1.0p53, 1e32, std::numeric_limits<double>::infinity(), std::nan("")}) {
+    ASSERT_FALSE(FurtherWanted(wanted, {20, 20})) << wanted;
+    EXPECT_EQ(FurtherWanted(wanted, {20, 20}).reason(), "more than can be counted");
+  }
+  EXPECT_FALSE(FurtherWanted(0x1.0p52, {200, 20})) << "of those that are there, ten tell as much as one";
 }
 
 }  // namespace
