@@ -41,7 +41,7 @@ function hideToast() { $('#toast').hidden = true; }
 const banners = new Map();
 function banner(name, sentence, button = null) {
   if (sentence) banners.set(name, {sentence, button}); else banners.delete(name);
-  const box = $('#banner'), first = [...banners.values()][0];
+  const box = $('#banner'), first = banners.get('tab') ?? [...banners.values()][0];  // what waits here goes from there
   box.hidden = !first;
   if (!first) return;
   box.replaceChildren(make('span', {}, first.sentence));

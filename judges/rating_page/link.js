@@ -48,7 +48,7 @@ async function patiently(act) {
       banner('offline', '');
       return result;
     } catch (error) {
-      if (!(error instanceof Offline)) throw error;
+      if (!(error instanceof Offline)) { banner('offline', ''); throw error; }  // who refuses is there
       banner('offline', 'No connection to the server. What you rate is kept here and sent when it is back.');
       await sleep(wait);
     }

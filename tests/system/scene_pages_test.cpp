@@ -1,6 +1,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <filesystem>
 
 #include "apps/evaluate.h"
@@ -86,13 +87,18 @@ TEST(ScenePages, WhatWasWrittenToBetweenTheReadingOfTheSuiteAndTheWorldsTurnIsRe
 /// Each of several is read again where its episode begins, hours later: what was stored bore the suite's hash.
 TEST(RecordedStart, OfARecordingThatWasWrittenToSinceTheSuiteWasReadEndsTheRun) {
   const TempFolder folder;
-  for (const char* name : {"a", "b"}) SyntheticClip(25).Write(OneFolder(folder / "many" / name));
+  const auto write = [&](const char* name, int steps) {
+    SyntheticClip clip(steps);
+    std::ranges::fill(clip.grippers, 60.0F);  // half closed
+    clip.Write(OneFolder(folder / "many" / name));
+  };
+  for (const char* name : {"a", "b"}) write(name, 25);
   WriteText(folder / "suite.yaml",
             "suite: recorded\nrecording: many\nworlds: [{name: echo, type: echo}]\nlanes: 1\nerror_budget: 1\n"
             "policies: [{name: hold, command: [evac-policy, hold]}]\n");
   Suite suite = ReadSuite(folder / "suite.yaml", {});
   FillInRecordedTask(suite);
-  SyntheticClip(28).Write(OneFolder(folder / "many/b"));
+  write("b", 28);
   Suite anew = ReadSuite(folder / "suite.yaml", {});
   EXPECT_NO_THROW(FillInRecordedTask(anew)) << "who reads the suite now has the new one";
   Store store = Store::CreateOrContinue(
