@@ -4,10 +4,12 @@
 #include <algorithm>
 #include <cstdio>
 #include <filesystem>
+#include <map>
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <set>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "apps/commands.h"
@@ -15,6 +17,7 @@
 #include "core/statistics/sequential.h"
 #include "core/store.h"
 #include "reports/counted_judges.h"
+#include "reports/gate_baseline.h"
 #include "reports/policy_comparison_output.h"
 #include "reports/summary.h"
 
@@ -156,20 +159,25 @@ std::string NameOfLooks(const ComparedWorld& compared, const JudgedRun& first, c
                      compared.world, judge, other_judge == judge ? "" : " and " + other_judge);
 }
 
-std::vector<ComparisonRow> RowsOf(const PolicyComparison& comparison) {
+/// What can be bet on: pairs, however few of the episodes have a partner yet. A task without one waits.
+std::vector<ComparisonRow> RowsWithPairs(const PolicyComparison& comparison) {
   std::vector<ComparisonRow> rows = comparison.tasks;
   if (rows.size() > 1) rows.push_back(comparison.all);
+  std::erase_if(rows, [](const ComparisonRow& row) { return row.shared == 0; });
   return rows;
 }
 
-/// Before a look is kept of any world.
-void DemandPairs(const PolicyComparison& comparison) {
-  for (const ComparisonRow& row : RowsOf(comparison)) {
-    if (row.is_paired) continue;
-    throw InvalidInput("compare: --sequential bets on pairs, but {} shares {} of {} and {} initial states",
-                       row.task.empty() ? "all tasks together" : row.task, row.shared, row.first_episodes,
-                       row.second_episodes);
+/// Before a look is kept of any world. One that only one of the two has begun waits, if there are pairs in another.
+void DemandPairs(const std::vector<ComparedWorld>& worlds) {
+  for (const ComparedWorld& compared : worlds) {
+    const ComparisonRow& all = compared.comparison.all;
+    if (all.shared == 0 && all.first_episodes > 0 && all.second_episodes > 0)
+      throw InvalidInput("compare: --sequential bets on pairs, but in {} none of {} and {} episodes have one",
+                         compared.world, all.first_episodes, all.second_episodes);
   }
+  if (std::ranges::all_of(worlds, [](const auto& compared) { return RowsWithPairs(compared.comparison).empty(); }))
+    throw InvalidInput("compare: --sequential bets on pairs, but {} and {} have none that counts yet",
+                       worlds.front().comparison.first, worlds.front().comparison.second);
 }
 
 /// This look's bets, and what was kept under `name` of the looks before in `run`; only what has changed since is a new
@@ -178,7 +186,7 @@ std::vector<BetState> Bet(const PolicyComparison& comparison, const std::string&
   const std::vector<SequentialLook> before = Store::Open(run, Store::Mode::kReadOnly).Looks();
   std::vector<SequentialLook> added;
   std::vector<BetState> bets;
-  for (const ComparisonRow& row : RowsOf(comparison)) {
+  for (const ComparisonRow& row : RowsWithPairs(comparison)) {
     BetState bet{row.task, row.shared, row.flips, FlipsEValue(row.flips.only_first, row.flips.only_second), 1, 0};
     SequentialLook look{name, row.task, row.shared, row.flips.only_first, row.flips.only_second, bet.e_value};
     bool is_new = true;
@@ -197,6 +205,45 @@ std::vector<BetState> Bet(const PolicyComparison& comparison, const std::string&
   return bets;
 }
 
+using TextByName = std::map<std::string, std::string>;
+
+/// Of what both know: a run of an earlier evac lacks some.
+bool IsAnother(const std::string& name, const TextByName& first, const TextByName& second) {
+  const auto one = first.find(name), two = second.find(name);
+  return one != first.end() && two != second.end() && one->second != two->second;
+}
+
+/// What gates would refuse: tasks, worlds and settings of one name that are not the same in both runs.
+std::vector<std::string> Changes(const JudgedRun& first, const JudgedRun& second,
+                                 const std::vector<ComparedWorld>& compared) {
+  const PinnedResult a = Pin(first.summary, first.folder), b = Pin(second.summary, second.folder);
+  std::set<std::string> tasks;  // with episodes of both
+  std::vector<std::pair<std::string, const char*>> found;
+  for (const ComparedWorld& one : compared) {
+    if (IsAnother(one.world, a.worlds, b.worlds)) found.emplace_back("the profile of world " + one.world, "world's");
+    for (const ComparisonRow& row : one.comparison.tasks) {
+      if (row.first_episodes > 0 && row.second_episodes > 0) tasks.insert(row.task);
+    }
+  }
+  for (const std::string& task : tasks) {
+    if (IsAnother(task, a.tasks, b.tasks)) {
+      found.emplace_back("the page of task " + task, "task's");
+    } else if (IsAnother(task, a.scenes, b.scenes)) {
+      found.emplace_back("a file that the page of task " + task + " names", "task's");
+    } else if (IsAnother(task, a.definitions, b.definitions)) {
+      found.emplace_back("one of the cameras, stop rule and limits of task " + task, "task's");
+    }
+  }
+  for (const auto& [name, value] : a.settings) {
+    if (IsAnother(name, a.settings, b.settings)) found.emplace_back("the suite's " + name, "suite's");
+  }
+  std::vector<std::string> changes;
+  for (const auto& [what, whose] : found)
+    changes.push_back(fmt::format("{} is another in {} than in {}: what the policies differ by may be the {}", what,
+                                  first.folder, second.folder, whose));
+  return changes;
+}
+
 void Compare(const CompareArguments& arguments) {
   Check(arguments.options);
   const PolicyPlace first = PlaceOf(arguments.first, arguments.run), second = PlaceOf(arguments.second, arguments.run);
@@ -209,22 +256,34 @@ void Compare(const CompareArguments& arguments) {
   if (same_run && a == b) throw InvalidInput("compare: {} against itself", a);
   const bool are_two_judges = one.summary.options.judge != two.summary.options.judge;
   std::vector<ComparedWorld> worlds;
+  std::vector<std::string> not_begun;
   for (const std::string& world : WorldsOfBoth(one, two, arguments.world)) {
     ComparedPolicy left = Side(one, a, world), right = Side(two, b, world);
     if (a == b) {
       left.name = first.run + ":" + a;
       right.name = second.run + ":" + b;
     }
+    if (left.episodes.empty() && right.episodes.empty()) {
+      not_begun.push_back(world);
+      continue;
+    }
     ComparedWorld& compared = worlds.emplace_back(
         ComparedWorld{world, one.summary.options.judge, ComparePolicies(left, right, arguments.options), {}});
     if (are_two_judges) compared.second_judge = two.summary.options.judge;
     compared.other_judges = OtherJudges(one, two, compared);
-    if (arguments.sequential) DemandPairs(compared.comparison);
   }
+  if (worlds.empty())
+    throw InvalidInput("compare: neither {} of {} nor {} of {} has an episode in {}", a, first.run, b, second.run,
+                       fmt::join(not_begun, ", "));
+  if (!not_begun.empty())
+    fmt::print(stderr, "evac: note: left out, as neither policy has an episode there yet: {}\n",
+               fmt::join(not_begun, ", "));
+  if (arguments.sequential) DemandPairs(worlds);
   if (are_two_judges)
     PrintWarnings({fmt::format("{} is judged by {} and {} by {}: what they differ by may be the judges', not the "
                                "policies'; name one that judged both",
                                first.run, one.summary.options.judge, second.run, two.summary.options.judge)});
+  if (!same_run) PrintWarnings(Changes(one, two, worlds));
   Json all = {{"schema", 1}, {"worlds", Json::array()}};
   for (ComparedWorld& compared : worlds) {
     if (arguments.sequential) compared.bets = Bet(compared.comparison, NameOfLooks(compared, one, two), first.run);

@@ -9,7 +9,9 @@
 #include <string>
 
 #include "apps/commands.h"
+#include "apps/warnings.h"
 #include "core/file.h"
+#include "core/run_extent.h"
 #include "core/store.h"
 #include "core/version.h"
 #include "reports/counted_judges.h"
@@ -40,7 +42,13 @@ RunSummary SummaryOf(const std::string& run, const std::string& judge, SummaryOp
 PinnedResult PinRun(const std::string& run, const std::string& judge) {
   SummaryOptions options;
   options.bootstrap_replicates = 1;
-  return Pin(SummaryOf(run, judge, options), run);
+  const RunSummary summary = SummaryOf(run, judge, options);
+  const RunExtent extent = ExtentOf(summary.data.plan, summary.data.episodes);
+  if (extent.missing > 0)  // pairs refuse a candidate that has them all, and rates are of what came first
+    PrintWarnings({fmt::format("{}: {} of {} episodes are there, and a baseline is a whole run: evac resume runs the "
+                               "others, evac merge adds those of other shards",
+                               run, extent.planned - extent.missing, extent.planned)});
+  return Pin(summary, run);
 }
 
 /// A baseline in which nothing succeeded or failed would be found out by the first candidate, long after.
@@ -93,9 +101,10 @@ bool AskForCorrelation(const GateRules& rules) {
   return std::ranges::any_of(rules.rules, [](const GateRule& rule) { return rule.test == GateTest::kCorrelation; });
 }
 
-/// Correlations are asked for by few rules; the others need not wait for their bootstrap.
-SummaryOptions OptionsFor(const GateRules& rules, SummaryOptions options) {
-  if (!AskForCorrelation(rules)) options.bootstrap_replicates = 1;
+/// Correlations are asked for by few rules, and told in summary.md; the others need not wait for their bootstrap.
+SummaryOptions OptionsFor(const GateRules& rules, const GateArguments& arguments) {
+  SummaryOptions options = arguments.options;
+  if (!AskForCorrelation(rules) && arguments.out.empty()) options.bootstrap_replicates = 1;
   return options;
 }
 
@@ -142,12 +151,13 @@ ExitCode Gate(const GateArguments& arguments) {
   const GateRules rules = ReadGateRules(Config::FromFile(arguments.rules));
   if (arguments.run.empty()) {  // before the run: what it will take
     const std::optional<PinnedResult> baseline = BaselineOf(arguments, rules);
+    if (baseline) DemandBaseline(rules, *baseline);
     for (const std::string& size : SizesOf(rules, baseline ? &*baseline : nullptr)) fmt::print("{}.\n", size);
     return ExitCode::kOk;
   }
   if (arguments.names_seed && !AskForCorrelation(rules))
     throw InvalidInput("--seed: no rule of {} is a correlation, and only these draw: wanted none", arguments.rules);
-  const RunSummary summary = SummaryOf(arguments.run, rules.judge, OptionsFor(rules, arguments.options));
+  const RunSummary summary = SummaryOf(arguments.run, rules.judge, OptionsFor(rules, arguments));
   DemandTheJudge(rules, summary, arguments);
   const GateDecision decision = DecisionOf(rules, summary, arguments);
   if (arguments.json) {

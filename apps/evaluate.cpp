@@ -303,6 +303,7 @@ ExitCode Evaluate(const Suite& suite, Store& store, const EvaluateOptions& optio
   SayIfAnotherVersionBegan(store);
   store.RemoveOrphans();
   Declare(suite, store);
+  store.AddPlan(PlannedOf(suite));
   std::string why_ended = RunWorlds(suite, options, store);
   if (!IsInterrupted()) RunJudges(suite, store);
   if (why_ended.empty() && IsInterrupted()) why_ended = "interrupted";

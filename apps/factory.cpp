@@ -110,8 +110,8 @@ WorldStep Begun(World& world, const Task& task, const InitialState& initial) try
 }  // namespace
 
 void CheckRubrics(const Suite& suite) {
+  if (suite.recording) return;  // its task's stages are words, which people and models judge by: there is no physics
   for (const Task& task : suite.tasks) {
-    if (task.rubric.stages.empty()) continue;  // a recording's task: people can still judge it
     if (const auto wrong = WhatIsWrong(task.rubric)) throw InvalidInput("{}: field rubric: {}", task.page_path, *wrong);
   }
 }
@@ -124,7 +124,10 @@ void CheckStart(World& world, const Task& task, const InitialState& initial) {
 
 void Declare(const Suite& suite, Store& store) {
   CheckRubrics(suite);
-  for (const Task& task : suite.tasks) store.AddTask(task);
+  for (const Task& task : suite.tasks) {
+    const auto page = suite.page_hashes.find(task.page_path);  // a recording's task has none
+    store.AddTask(task, page == suite.page_hashes.end() ? std::string() : page->second);
+  }
   for (const SuiteWorld& world : suite.worlds) {
     std::string profile_hash = world.profile.empty() ? "" : Config::FromFile(world.profile).ContentHash();
     if (world.evac) {

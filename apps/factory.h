@@ -18,6 +18,7 @@ namespace evac {
 
 /// Suite entries become things: this is where modules meet.
 
+/// Of task pages: a recording's rubric is in words, for people and models.
 /// @throws InvalidInput naming task, stage and condition if the oracle could not judge by a rubric.
 void CheckRubrics(const Suite& suite);
 

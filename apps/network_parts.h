@@ -36,7 +36,8 @@ std::unique_ptr<World> MakeEvacWorld(const SuiteWorld& world, const Suite& suite
 void CheckNetwork(const SuiteWorld& world, const std::vector<Task>& tasks);
 
 /// A recording of a suite with a world of type `evac`, as its network was trained to see one: in steps of the world's
-/// period, by the cameras that the weights say, or by as many as the network has views, the head first.
+/// period, by the cameras that the weights say, or by as many as the network has views, the head first: others are not
+/// looked at, and may be broken.
 /// @throws InvalidInput if its steps are no whole part of that period; if a camera is missing; if two of the suite's
 ///   networks want it otherwise: what each wants.
 Recording ReadAsTrained(const Suite& suite, const std::filesystem::path& folder);

@@ -47,11 +47,15 @@ Voters VotersOf(const StudyStore& study) {
 }
 
 /// The last verdict of a name counts: under another judge's name people's labels would stand for what that one said.
+/// `human:…` is a single rater everywhere: a panel's label of such a name would be one more vote.
 void CheckName(const std::string& judge) {
   const std::string first = judge.substr(0, judge.find(':'));
   const bool is_taken = first == "oracle" || first == "vlm" || first == "classifier";
   if (first.empty() || is_taken || judge.find(',') != std::string::npos)
     throw InvalidInput("--as: found '{}', wanted a name without commas that is none of oracle, vlm and classifier", judge);
+  if (judge.starts_with("human:"))
+    throw InvalidInput("--as: found '{}', wanted one that does not begin with 'human:', as single raters' names do",
+                       judge);
 }
 
 bool HasSomebodysWord(const RatedClip& clip) { return !clip.by_rater.empty() || clip.adjudicated; }

@@ -75,8 +75,9 @@ void PrintRatingStatus(const StudyStore& store, std::int64_t now_ms, bool as_jso
              Percent(all.at("unanimous")), Percent(all.at("dawid_skene")), all.at("undecided").get<int>(),
              Percent(all.at("low")), Percent(all.at("high")));
   const Json& agreement = board.at("agreement");
-  fmt::print("agreement: alpha {}{}, Fleiss kappa {}, raw {}\n", Decimal(agreement.at("alpha")), Dropped(agreement),
-             Decimal(agreement.at("fleiss")), Percent(agreement.at("agreement")));
+  fmt::print("agreement, \"cannot tell\" a third answer: alpha {}{}, Fleiss kappa {}, raw {}\n",
+             Decimal(agreement.at("alpha")), Dropped(agreement), Decimal(agreement.at("fleiss")),
+             Percent(agreement.at("agreement")));
   for (const char* world : {"real", "generated"}) {
     const Json& index = board.at("blinding").at(world);
     if (index.at("guesses").get<int>() == 0) continue;

@@ -9,6 +9,7 @@
 #include <string_view>
 
 #include "apps/network_parts.h"
+#include "apps/warnings.h"
 #include "core/collection.h"
 #include "core/error.h"
 #include "core/geometry.h"
@@ -32,6 +33,7 @@ Recording ReadAt(const Suite& suite, const fs::path& folder) {
 Task TaskOf(const Suite& suite, const Recording& recording) {
   Task task = TaskFromRecording(recording);
   const RecordedTask& said = suite.recorded_task;
+  if (said.name) task.id = *said.name;
   const int steps = task.max_chunks;  // it counts them so, whatever the suite's chunks
   task.max_chunks = said.max_chunks > 0 ? said.max_chunks : (steps + suite.chunk_size - 1) / suite.chunk_size;
   if (steps < suite.chunk_size) task.workspace_m = Task{}.workspace_m;  // a beginning says nothing of where the arms will go
@@ -118,7 +120,7 @@ class RecordedStates {
   void Add(const fs::path& folder, const std::optional<CollectedEpisode>& row, const Recording& recording) {
     if (suite_.tasks.empty()) {
       suite_.tasks = {TaskOf(suite_, recording)};
-      suite_.tasks.front().id = task_;
+      if (!suite_.recorded_task.name) suite_.tasks.front().id = task_;
       if (!suite_.recorded_task.instruction)
         suite_.tasks.front().instruction = fmt::format("Do what was recorded in {}.", task_);
     }
@@ -151,6 +153,7 @@ void FillInSeveral(Suite& suite) {
   suite.initial_states.clear();
   RecordedStates states(suite);
   for (const fs::path& folder : FindRecordings(*suite.recording)) states.Take(folder);
+  SayPassedOver(*suite.recording);
   states.Finish();
 }
 

@@ -17,7 +17,7 @@ Recording RecordingOf(const Suite& suite, const InitialState& initial);
 /// Fills in task, initial states and `recordings` of a suite that begins from recordings; others are left as they are.
 /// Of one: the task is called like it, the state "recording". Of a folder of several: the task is called like the
 /// tree's or collection's task, or like the folder; each state like its recording, or of a collection like the state
-/// that it began from (of several the first). The task's cameras and arms are the first recording's, its workspace and
+/// that it began from (of several the first). Where the suite says what the task is called, it is called so. The task's cameras and arms are the first recording's, its workspace and
 /// its chunks those of all. Those that cannot be read, or not by the same cameras and arms, are left out, and said: also
 /// by cameras that are calibrated otherwise than the first's (CalibrationDifference; the principal point by kSameFocal
 /// of a side), which policies are told of in every state.

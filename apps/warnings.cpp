@@ -6,6 +6,7 @@
 #include <cstdio>
 
 #include "core/file.h"
+#include "core/recording_folders.h"
 #include "core/version.h"
 
 namespace evac {
@@ -28,6 +29,13 @@ void KeepWhoBegan(const std::filesystem::path& file, bool is_begun, const std::s
   std::string began = std::filesystem::exists(file) ? ReadFile(file) : "";
   std::erase(began, '\n');
   SayIfAnotherVersionBegan(what, began);
+}
+
+void SayPassedOver(const std::filesystem::path& recordings) {
+  std::vector<std::string> warnings;
+  for (const std::filesystem::path& folder : PassedOver(recordings))
+    warnings.push_back(fmt::format("{}: no recording lies in it, and none is looked for below it", folder.string()));
+  PrintWarnings(warnings);
 }
 
 }  // namespace evac

@@ -17,4 +17,7 @@ void SayIfAnotherVersionBegan(const std::string& what, const std::string& began)
 /// what stands there. @param is_begun  something of it is there and will stay
 void KeepWhoBegan(const std::filesystem::path& file, bool is_begun, const std::string& what);
 
+/// A warning for each subfolder of a folder of recordings that holds none: what lies deeper is not looked for.
+void SayPassedOver(const std::filesystem::path& recordings);
+
 }  // namespace evac

@@ -47,6 +47,13 @@ bool IsThere(const fs::path& path) {
   return fs::exists(path, ignored);
 }
 
+/// How many of its steps a period is; 0: no whole number of them.
+int StepsIn(double period_s, const Recording& recording) {
+  const double steps = period_s / recording.period_s;
+  const int whole = static_cast<int>(std::lround(steps));
+  return whole >= 1 && std::abs(steps - whole) <= kRateTolerance * whole ? whole : 0;
+}
+
 /// The tree's episode that the folder is, or is the videos of; empty: neither, or a folder that holds all itself.
 fs::path TreeEpisode(const fs::path& folder) {
   if (IsThere(folder / "action.npy") || IsThere(folder / "proprio_stats.h5")) return {};
@@ -54,13 +61,22 @@ fs::path TreeEpisode(const fs::path& folder) {
   return folder.filename() == "videos" && IsTreeEpisode(folder.parent_path()) ? folder.parent_path() : fs::path();
 }
 
+/// One folder that holds all.
+ClipFolders ClipIn(const fs::path& folder) {
+  return {folder.filename().string(), folder, folder, folder / "proprio_stats.h5"};
+}
+
 Recording ReadLayout(const fs::path& folder, const RecordingOptions& options) {
   if (IsFileThere(folder / "action.npy")) return ReadExampleLayout(folder, options);
-  if (IsFileThere(folder / "proprio_stats.h5")) {
-    return ReadClipLayout({folder.filename().string(), folder, folder, folder / "proprio_stats.h5"}, options);
-  }
+  if (IsFileThere(folder / "proprio_stats.h5")) return ReadClipLayout(ClipIn(folder), options);
   if (const fs::path episode = TreeEpisode(folder); !episode.empty())
     return ReadClipLayout(TreeFolders(episode), options);
+  if (const fs::path picture = FirstPictureIn(folder); !picture.empty()) {
+    throw InvalidInput(
+        "{}: found {}, and neither action.npy nor proprio_stats.h5; wanted one of the two: where the arms were",
+        folder.string(), picture.filename().string())
+        .Called("broken_track");
+  }
   throw InvalidInput(
       "{}: no recording; wanted a folder with action.npy, one with proprio_stats.h5, or an episode of an AgiBot World "
       "tree: ROOT/observations/<task>/<episode>",
@@ -80,6 +96,13 @@ Recording ReadRecording(const fs::path& folder, const RecordingOptions& options)
   recording.every_nth = options.every_nth;
   recording.source += fmt::format(", {} steps of {:.4g} s", recording.arms.size(), recording.period_s);
   return recording;
+}
+
+std::vector<std::string> CamerasIn(const fs::path& folder) {
+  const fs::path absolute = Followed(folder);
+  if (IsThere(absolute / "action.npy")) return {"head"};
+  const fs::path episode = TreeEpisode(absolute);
+  return CamerasOfClip(episode.empty() ? ClipIn(absolute) : TreeFolders(episode));
 }
 
 std::string RecordingId(const fs::path& folder) {
@@ -107,10 +130,17 @@ std::vector<fs::path> FoldersOf(const fs::path& folder) {
   return folders;
 }
 
+bool IsReadOfRecording(const std::string& name) {
+  for (const char* whole : {"frame.png", "action.npy", "extrinsics.npy", "intrinsics.npy", "proprio_stats.h5"}) {
+    if (name == whole) return true;
+  }
+  return name.ends_with("_color.mp4") || name.ends_with("_intrinsic_params.json") ||
+         name.ends_with("_extrinsic_params_aligned.json");
+}
+
 Recording Thinned(Recording recording, double period_s) {
-  const double steps = period_s / recording.period_s;
-  const int every_nth = static_cast<int>(std::lround(steps));
-  if (every_nth < 1 || std::abs(steps - every_nth) > kRateTolerance * every_nth)
+  const int every_nth = StepsIn(period_s, recording);
+  if (every_nth == 0)
     throw InvalidInput("{}: wanted steps of {:.4g} s, or of a whole part of it", recording.source, period_s)
         .Called("other_rate");
   recording.period_s = period_s;
@@ -119,6 +149,14 @@ Recording Thinned(Recording recording, double period_s) {
   recording.told = EveryNth(std::move(recording.told), every_nth);
   recording.every_nth *= every_nth;
   recording.source += fmt::format(", one in {} kept", every_nth);
+  return recording;
+}
+
+Recording BegunFrom(Recording recording, double period_s) {
+  const bool is_beginning = !recording.says_period && recording.arms.size() < kBeginning;
+  if (!is_beginning || StepsIn(period_s, recording) > 0) return Thinned(std::move(recording), period_s);
+  recording.period_s = period_s;
+  recording.source += fmt::format(", taken to be {:.4g} s apart", period_s);
   return recording;
 }
 

@@ -35,6 +35,7 @@ struct Recording {
   std::vector<std::filesystem::path> videos;  ///< in the order of `cameras`, or empty: there is only the first frame
   int every_nth = 1;                          ///< step k is frame k * every_nth of a video
   std::vector<std::filesystem::path> files;   ///< all that were read
+  bool says_period = true;  ///< false: no video says how far apart steps are, and `period_s` is the layout's
 };
 
 /// Reads a recording in one of three layouts, recognised by the files that are there:
@@ -45,13 +46,19 @@ struct Recording {
 /// Gripper units become closures (raw 0 open … 120 closed), quaternions rotations.
 /// @throws InvalidInput naming file, field, what was found and what was wanted: a file missing or broken, a video
 /// shorter than
-///   the arms' track, values that are not finite, quaternions that are not unit, distorted intrinsics, a camera that
-///   moves against its mount. `Error::kind` is one word for the reason (docs/formats/recording.md).
+///   the arms' track, values that are not finite, quaternions that are not unit, positions more than 5 m from the base,
+///   an arm that lies at the base's origin at every step (but for an absent left one, unturned and open), distorted
+///   intrinsics, a camera that moves against its mount. `Error::kind` is one word for the reason
+///   (docs/formats/recording.md).
 Recording ReadRecording(const std::filesystem::path& folder, const RecordingOptions& options = {});
 
 /// Where a recording's camera of this name is mounted, as its files do not say: `hand_right` on the right gripper,
 /// `hand_left` on the left one, but on the base where the recording has one arm; any other on the base.
 Mount MountOf(const std::string& camera, std::size_t arms);
+
+/// The cameras that a recording has by the files that are there, the head first: those that ReadRecording reads, or
+/// refuses, where it is asked for none. Nothing is opened.
+std::vector<std::string> CamerasIn(const std::filesystem::path& folder);
 
 /// What ReadRecording calls the recording in a folder, whatever is in it.
 std::string RecordingId(const std::filesystem::path& folder);
@@ -63,6 +70,10 @@ std::vector<Arms> ToldTrack(const Recording& recording);
 /// The folders that hold a recording's files: `folder` alone, or those of an episode in an AgiBot World tree that
 /// exist (of its videos, its cameras' pages, its arms).
 std::vector<std::filesystem::path> FoldersOf(const std::filesystem::path& folder);
+
+/// Whether a file of this name in a recording's folders is one that ReadRecording may read, whatever cameras it is asked
+/// for; all others (depth, tactile) are not looked at.
+bool IsReadOfRecording(const std::string& name);
 
 /// A recording of the head camera alone, in files of any name.
 struct RecordingFiles {
@@ -79,6 +90,12 @@ Recording ReadRecordingFiles(const RecordingFiles& files, const RecordingOptions
 /// of a whole number of them is meant exactly: the period is `period_s` then.
 /// @throws InvalidInput with both periods (kind `other_rate`) for any other.
 Recording Thinned(Recording recording, double period_s);
+
+/// The same of a recording that episodes of steps `period_s` apart begin from. Fewer steps than 16, of which no video
+/// says how far apart they are, are a beginning and no more: where they cannot be thinned they are taken to be that far
+/// apart.
+/// @throws InvalidInput as Thinned for any other.
+Recording BegunFrom(Recording recording, double period_s);
 
 /// One walk through a recording's images, front to back. Each has its own decoders: any number walk at once.
 class RecordedFrames {

@@ -14,7 +14,6 @@ constexpr double kAgibotPeriod_s = 1.0 / 30;
 constexpr double kRateTolerance = 0.02;  // time stamps are rounded to a video's time base
 
 constexpr double kMoreFrames = 1.2;      // of a step each: a video may go on a little longer than the arms' track
-constexpr std::size_t kBeginning = 16;   // steps: fewer are where an episode begins, whatever its video goes on to show
 
 /// What one walk through a video tells.
 struct VideoFacts {
@@ -59,16 +58,12 @@ fs::path ExtrinsicsOf(const ClipFolders& folders, const std::string& camera) {
 /// The cameras asked for, or all that have a video; head always.
 std::vector<std::string> ChooseCameras(const ClipFolders& folders, const RecordingOptions& options) {
   if (!options.cameras.empty()) return options.cameras;
-  const bool has_videos = IsFileThere(VideoOf(folders, "head"));
-  std::vector<std::string> names = {"head"};
-  for (const std::string name : {"hand_left", "hand_right"}) {
-    if (IsFileThere(VideoOf(folders, name))) {
-      names.push_back(name);
-    } else if (has_videos && IsFileThere(IntrinsicsOf(folders, name))) {
-      throw InvalidInput("{}: there is a page for camera {}, but no video {}", folders.pages.string(), name,
-                         VideoOf(folders, name).string())
-          .Called("missing_camera");
-    }
+  std::vector<std::string> names = CamerasOfClip(folders);
+  for (const std::string& name : names) {
+    if (name == "head" || IsFileThere(VideoOf(folders, name))) continue;
+    throw InvalidInput("{}: there is a page for camera {}, but no video {}", folders.pages.string(), name,
+                       VideoOf(folders, name).string())
+        .Called("missing_camera");
   }
   return names;
 }
@@ -144,6 +139,20 @@ void AddStillCamera(const Context& context, const std::vector<std::string>& name
 
 }  // namespace
 
+std::vector<std::string> CamerasOfClip(const ClipFolders& folders) {
+  const auto is_there = [](const fs::path& path) {  // or cannot be known not to be: who reads it says why
+    std::error_code error;
+    return fs::exists(path, error) || error;
+  };
+  const bool has_videos = is_there(VideoOf(folders, "head"));
+  std::vector<std::string> names = {"head"};
+  for (const std::string name : {"hand_left", "hand_right"}) {
+    const bool has_page = has_videos && is_there(IntrinsicsOf(folders, name));
+    if (has_page || is_there(VideoOf(folders, name))) names.push_back(name);
+  }
+  return names;
+}
+
 Mount MountOf(const std::string& camera, std::size_t arms) {
   if (camera == "hand_left") return arms == 2 ? Mount::kLeftGripper : Mount::kBase;
   return camera == "hand_right" ? Mount::kRightGripper : Mount::kBase;
@@ -170,11 +179,12 @@ Recording ReadClipLayout(const ClipFolders& folders, const RecordingOptions& opt
     recording.files.push_back(IntrinsicsOf(folders, name));
     recording.files.push_back(ExtrinsicsOf(folders, name));
   }
+  recording.says_period = options.recorded_period_s > 0 || video_period_s > 0;
   recording.period_s = (options.recorded_period_s > 0 ? options.recorded_period_s : found_period_s) * options.every_nth;
   recording.arms = EveryNth(std::move(arms), options.every_nth);
   recording.told = EveryNth(std::move(told), options.every_nth);
   recording.arm_names = {"left", "right"};
-  DropAbsentLeftArm(recording);
+  DropAbsentLeftArm(recording, folders.proprio.string());
   recording.source = fmt::format("{}: AgiBot World layout, {} cameras{}", folders.images.string(), names.size(),
                                  recording.videos.empty() ? ", first frame" : "");
   return recording;

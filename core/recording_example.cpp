@@ -52,7 +52,8 @@ std::vector<Arms> ReadActions(const fs::path& path) {
     for (const std::size_t arm : {0, 1}) {
       const double* raw = &rows.values[(step * 2 + arm) * kArmColumns];
       const std::string where = fmt::format("{}: row {}, {} arm", path.string(), step, arm == 0 ? "left" : "right");
-      arms.push_back(ArmFromRaw({Eigen::Vector3d(raw), Eigen::Vector4d(raw + 3), raw[7]}, where));
+      arms.push_back({PoseFromRaw(Eigen::Vector3d(raw), Eigen::Vector4d(raw + 3), where),
+                      ClosureFromRaw(raw[7], kClosedGripper, where)});
     }
     steps.push_back(std::move(arms));
   }
@@ -114,12 +115,13 @@ Recording ReadRecordingFiles(const RecordingFiles& files, const RecordingOptions
   recording.arms = EveryNth(arms, options.every_nth);
   if (options.read_told && !npy) recording.told = EveryNth(ReadToldOf(files.actions, arms.size()), options.every_nth);
   const double found_period_s = npy ? kExamplePeriod_s : kAgibotPeriod_s;
+  recording.says_period = options.recorded_period_s > 0;
   recording.period_s = (options.recorded_period_s > 0 ? options.recorded_period_s : found_period_s) * options.every_nth;
   recording.source = fmt::format("{}, {}", files.frame.string(), files.actions.string());
   recording.every_nth = options.every_nth;
   recording.files = {files.frame, files.actions, files.extrinsics, files.intrinsics};
   recording.arm_names = {"left", "right"};
-  DropAbsentLeftArm(recording);
+  DropAbsentLeftArm(recording, files.actions.string());
   return recording;
 }
 

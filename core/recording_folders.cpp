@@ -34,7 +34,25 @@ bool LooksLikeRecording(const fs::path& folder) {
   return IsThere(folder / "action.npy") || IsThere(folder / "proprio_stats.h5") || PlaceOf(folder).has_value();
 }
 
+/// Whole or broken.
+bool IsMeantAsRecording(const fs::path& folder) {
+  return LooksLikeRecording(folder) || !FirstPictureIn(folder).empty();
+}
+
+bool IsHidden(const fs::path& folder) { return folder.filename().string().starts_with("."); }
+
 }  // namespace
+
+fs::path FirstPictureIn(const fs::path& folder) {
+  fs::path first;
+  std::error_code error;
+  for (fs::directory_iterator at(folder, error), end; !error && at != end; at.increment(error)) {
+    const std::string name = at->path().filename().string();
+    if (name != "frame.png" && !name.ends_with("_color.mp4")) continue;
+    if (first.empty() || at->path() < first) first = at->path();
+  }
+  return first;
+}
 
 bool IsRecording(const fs::path& folder) {
   std::error_code error;
@@ -56,14 +74,28 @@ std::vector<fs::path> FindRecordings(const fs::path& input) {
     found.push_back(root);
   } else {
     for (const fs::path& folder : SubFolders(root)) {
-      if (LooksLikeRecording(folder)) found.push_back(folder);
+      if (IsMeantAsRecording(folder)) found.push_back(folder);
     }
+    if (found.empty() && IsMeantAsRecording(root)) found.push_back(root);
   }
   if (!found.empty()) return found;
   throw InvalidInput(
       "{}: no recordings; wanted an AgiBot World tree (observations/<task>/<episode>), a recording, or a folder of "
       "recordings (docs/formats/recording.md)",
       input.string());
+}
+
+std::vector<fs::path> PassedOver(const fs::path& input) {
+  std::error_code error;
+  const fs::path root = fs::canonical(input, error);
+  if (fs::is_directory(root / "observations", error)) return {};
+  const std::vector<fs::path> found = FindRecordings(input);
+  if (found.front() == root) return {};
+  std::vector<fs::path> others;
+  for (const fs::path& folder : SubFolders(root)) {
+    if (!IsHidden(folder) && !std::ranges::binary_search(found, folder)) others.push_back(folder);
+  }
+  return others;
 }
 
 std::string TaskNameOf(const fs::path& folder, const std::optional<CollectedEpisode>& row, const fs::path& all) {

@@ -13,8 +13,8 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr double kClosedGripper = 120;                         // AgiBot's raw reading of a closed gripper
-constexpr double kLowestGripper = -10, kHighestGripper = 140;  // beyond these it is another unit
+constexpr double kLowestGripper = -10, kHighestGripper = 140;  // of 120; beyond these it is another unit
+constexpr double kFarthest_m = 5;                              // no arm on a base reaches there
 constexpr double kUnitTolerance = 1e-3;
 constexpr unsigned kMaxSide_px = 8192;
 /// Parts of a side: lenses are not off by more, and intrinsics of pictures twice as large or half as large are.
@@ -29,18 +29,30 @@ unsigned PngSide(const std::string& bytes, std::size_t at) {
 
 }  // namespace
 
-ArmState ArmFromRaw(const RawArm& raw, const std::string& where) {
-  if (!raw.xyz_m.allFinite() || !raw.quat_xyzw.allFinite()) throw InvalidInput("{}: the pose is not finite", where).Called("not_finite");
-  const double length = raw.quat_xyzw.norm();
+Eigen::Isometry3d PoseFromRaw(const Eigen::Vector3d& xyz_m, const Eigen::Vector4d& quat_xyzw,
+                              const std::string& where) {
+  if (!xyz_m.allFinite() || !quat_xyzw.allFinite())
+    throw InvalidInput("{}: the pose is not finite", where).Called("not_finite");
+  if (xyz_m.norm() > kFarthest_m) {
+    throw InvalidInput("{}: the gripper is {:.4g} m from the base's origin, wanted at most {}: another unit?", where,
+                       xyz_m.norm(), kFarthest_m)
+        .Called("position_unit");
+  }
+  const double length = quat_xyzw.norm();
   if (std::abs(length - 1) > kUnitTolerance) {
     throw InvalidInput("{}: the quaternion has length {:.4f}, wanted 1 within {}", where, length, kUnitTolerance)
         .Called("no_rotation");
   }
-  if (!(raw.gripper >= kLowestGripper && raw.gripper <= kHighestGripper)) {
-    throw InvalidInput("{}: the gripper reads {}, wanted 0 (open) … {} (closed)", where, raw.gripper, kClosedGripper)
+  return FromXyzQuat(xyz_m, quat_xyzw);
+}
+
+double ClosureFromRaw(double gripper, double closed, const std::string& where) {
+  const double of_120 = kClosedGripper / closed * gripper;
+  if (!(of_120 >= kLowestGripper && of_120 <= kHighestGripper)) {
+    throw InvalidInput("{}: the gripper reads {}, wanted 0 (open) … {} (closed)", where, gripper, closed)
         .Called("gripper_unit");
   }
-  return {FromXyzQuat(raw.xyz_m, raw.quat_xyzw), std::clamp(raw.gripper / kClosedGripper, 0.0, 1.0)};
+  return std::clamp(of_120 / kClosedGripper, 0.0, 1.0);
 }
 
 Eigen::Isometry3d RigidOrThrow(const Eigen::Matrix3d& rotation, const Eigen::Vector3d& translation_m,

@@ -16,17 +16,20 @@ namespace evac {
 
 inline constexpr std::size_t kMaxRecordedSteps = 1'000'000;  ///< nine hours at 30 Hz
 
-/// One arm at one step as AgiBot's files hold it.
-struct RawArm {
-  Eigen::Vector3d xyz_m;
-  Eigen::Vector4d quat_xyzw;
-  double gripper = 0;  ///< 0 open … 120 closed; readings a little outside are clamped
-};
+inline constexpr std::size_t kBeginning = 16;  ///< steps: fewer are where an episode begins, whatever is shown later
 
-/// @param where  "FILE: step 17, left arm", for messages.
-/// @throws InvalidInput if a value is not finite, |quaternion| is not 1 within 1e-3, or the gripper reads outside -10 …
-/// 140.
-ArmState ArmFromRaw(const RawArm& raw, const std::string& where);
+inline constexpr double kClosedGripper = 120;  ///< AgiBot's reading of a closed gripper; in `action` it is 1
+
+/// A gripper's pose as AgiBot's files hold it.
+/// @param where  "FILE: state/end: step 17, left arm", for messages.
+/// @throws InvalidInput if a value is not finite, the position is more than 5 m from the base's origin, or |quaternion|
+///   is not 1 within 1e-3.
+Eigen::Isometry3d PoseFromRaw(const Eigen::Vector3d& xyz_m, const Eigen::Vector4d& quat_xyzw, const std::string& where);
+
+/// A gripper's closure from its reading, 0 open; readings a little outside are clamped.
+/// @param closed  what it reads when closed
+/// @throws InvalidInput if it reads outside -1/12 … 7/6 of that (of 120: -10 … 140).
+double ClosureFromRaw(double gripper, double closed, const std::string& where);
 
 /// @throws InvalidInput unless finite and a rotation within 1e-3; it comes back orthonormal.
 Eigen::Isometry3d RigidOrThrow(const Eigen::Matrix3d& rotation, const Eigen::Vector3d& translation_m,
@@ -60,9 +63,12 @@ std::vector<Arms> ReadTold(const std::filesystem::path& path);
 std::vector<Arms> ReadToldOf(const std::filesystem::path& path, std::size_t steps);
 /// HDF5 keeps state of its own, for the whole process: whoever calls it holds this.
 std::unique_lock<std::mutex> LockHdf5();
-/// A robot without a left arm: it lies at the base's origin, unturned, at every step, where no gripper can be. A camera
-/// that was mounted on it is mounted on the base.
-void DropAbsentLeftArm(Recording& recording);
+/// A robot without a left arm: it lies at the base's origin, unturned and open, at every step, where no gripper can be.
+/// A camera that was mounted on it is mounted on the base.
+/// @param file  of the arms, for messages
+/// @throws InvalidInput called absent_arm for an arm that lies there otherwise: a left one turned or closed (its
+///   quaternion w first, say), and the right one, which every recording has.
+void DropAbsentLeftArm(Recording& recording, const std::string& file);
 
 /// The bytes of `proprio_stats.h5`: `arms` as state, `told` (unless empty) as action; a missing left arm at the base's
 /// origin. The same arms give the same bytes.
@@ -105,5 +111,7 @@ struct ClipFolders {
   std::filesystem::path proprio;        ///< the h5 file
 };
 Recording ReadClipLayout(const ClipFolders& folders, const RecordingOptions& options);
+/// The head, and the wrist cameras that have a video, or beside a head's video a page.
+std::vector<std::string> CamerasOfClip(const ClipFolders& folders);
 
 }  // namespace evac

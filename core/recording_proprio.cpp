@@ -18,7 +18,7 @@ namespace fs = std::filesystem;
 constexpr std::size_t kMaxNumberBytes = 8;
 constexpr hsize_t kMaxChunkNumbers = hsize_t{1} << 24;  // the library allocates whole chunks
 constexpr int kArms = 2;
-constexpr double kClosedGripper = 120;  // raw; in the action half a closed gripper is 1
+constexpr double kClosedAction = 1;  // what a closed gripper is told; measured it reads 120
 
 /// Owns an identifier of the HDF5 library.
 class Handle {
@@ -126,8 +126,8 @@ Handle OpenH5(const fs::path& path) {
 }
 
 /// The arms of one of the file's two halves: `state` or `action`.
-/// @param gripper_unit  raw units per unit of the half's gripper
-std::vector<Arms> ReadHalf(const Handle& file, const std::string& half, double gripper_unit, const fs::path& path) {
+/// @param closed  what the half's gripper is when closed
+std::vector<Arms> ReadHalf(const Handle& file, const std::string& half, double closed, const fs::path& path) {
   const Track gripper = ReadTrack(file, (half + "/effector/position").c_str(), 1, path.string());
   const Track position = ReadTrack(file, (half + "/end/position").c_str(), 3, path.string());
   const Track orientation = ReadTrack(file, (half + "/end/orientation").c_str(), 4, path.string());
@@ -141,10 +141,13 @@ std::vector<Arms> ReadHalf(const Handle& file, const std::string& half, double g
   for (hsize_t step = 0; step < gripper.steps; ++step) {
     Arms both;
     for (int arm = 0; arm < kArms; ++arm) {
-      const RawArm raw{Eigen::Vector3d(position.At(step, arm)), Eigen::Vector4d(orientation.At(step, arm)),
-                       gripper_unit * *gripper.At(step, arm)};
-      both.push_back(
-          ArmFromRaw(raw, fmt::format("{}: step {}, {} arm", path.string(), step, arm == 0 ? "left" : "right")));
+      const auto in = [&](const char* set) {
+        return fmt::format("{}: {}/{}: step {}, {} arm", path.string(), half, set, step, arm == 0 ? "left" : "right");
+      };
+      const Eigen::Vector3d xyz_m(position.At(step, arm));
+      const Eigen::Vector4d quat_xyzw(orientation.At(step, arm));
+      both.push_back({PoseFromRaw(xyz_m, quat_xyzw, in("end")),
+                      ClosureFromRaw(*gripper.At(step, arm), closed, in("effector/position"))});
     }
     arms.push_back(std::move(both));
   }
@@ -190,7 +193,7 @@ std::unique_lock<std::mutex> LockHdf5() {
 }
 
 std::vector<Arms> ReadProprio(const fs::path& path) {
-  return Guarded(path, [&] { return ReadHalf(OpenH5(path), "state", 1, path); });
+  return Guarded(path, [&] { return ReadHalf(OpenH5(path), "state", kClosedGripper, path); });
 }
 
 std::vector<Arms> ReadTold(const fs::path& path) {
@@ -199,7 +202,7 @@ std::vector<Arms> ReadTold(const fs::path& path) {
     for (const char* part : {"action", "action/end", "action/end/position", "action/effector"}) {
       if (H5Lexists(file.id(), part, H5P_DEFAULT) <= 0) return {};
     }
-    return ReadHalf(file, "action", kClosedGripper, path);
+    return ReadHalf(file, "action", kClosedAction, path);
   });
 }
 

@@ -1,12 +1,13 @@
 #include <hdf5.h>
 
+#include <algorithm>
+
 #include "core/error.h"
 #include "core/recording_parts.h"
 
 namespace evac {
 namespace {
 
-constexpr double kClosedGripper = 120;  // AgiBot's raw reading of a closed gripper, in `state`; in `action` it is 1
 constexpr std::size_t kGrowth_bytes = 1 << 20;
 
 hid_t Demand(hid_t id, const char* step) {
@@ -76,6 +77,12 @@ void AddHalf(MemoryH5& file, const std::string& half, const std::vector<Arms>& t
   file.Add(half + "/end/orientation", {steps, 2, 4}, quaternions_xyzw);
 }
 
+/// Whether the arm is at the base's origin at every step, where no gripper can be.
+bool LiesAtOrigin(const std::vector<Arms>& track, std::size_t arm) {
+  const auto is_there = [&](const Arms& arms) { return !arms[arm].base_from_gripper.translation().isZero(0); };
+  return std::ranges::none_of(track, is_there);
+}
+
 }  // namespace
 
 std::string ProprioBytes(const std::vector<Arms>& arms, const std::vector<Arms>& told) {
@@ -85,12 +92,22 @@ std::string ProprioBytes(const std::vector<Arms>& arms, const std::vector<Arms>&
   return file.Bytes();
 }
 
-void DropAbsentLeftArm(Recording& recording) {
-  const auto is_absent = [](const Arms& arms) {
-    return arms.size() == 2 && arms.front().closure == 0 && arms.front().base_from_gripper.matrix().isIdentity(0);
+void DropAbsentLeftArm(Recording& recording, const std::string& file) {
+  if (LiesAtOrigin(recording.arms, 1)) {
+    throw InvalidInput("{}: the right arm lies at the base's origin at every step, where no gripper can be; wanted the "
+                       "only arm of a robot as the right one, its camera as hand_right",
+                       file)
+        .Called("absent_arm");
+  }
+  if (!LiesAtOrigin(recording.arms, 0)) return;
+  const auto is_unturned_and_open = [](const Arms& arms) {
+    return arms.front().closure == 0 && arms.front().base_from_gripper.matrix().isIdentity(0);
   };
-  for (const Arms& arms : recording.arms) {
-    if (!is_absent(arms)) return;
+  if (!std::ranges::all_of(recording.arms, is_unturned_and_open)) {
+    throw InvalidInput("{}: the left arm lies at the base's origin at every step, turned or not open; wanted of a "
+                       "robot without one the quaternion 0 0 0 1 (x y z w, not w first) and a gripper of 0",
+                       file)
+        .Called("absent_arm");
   }
   for (std::vector<Arms>* track : {&recording.arms, &recording.told}) {
     for (Arms& arms : *track) arms.erase(arms.begin());

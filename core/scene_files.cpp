@@ -1,7 +1,9 @@
 #include "core/scene_files.h"
 
+#include <fstream>
 #include <set>
 #include <string>
+#include <string_view>
 
 #include "core/file.h"
 
@@ -35,6 +37,16 @@ std::vector<Attribute> AttributesIn(const std::string& xml) {
   return attributes;
 }
 
+/// By its content, as MuJoCo takes it: what a scene includes may be called robot.mjcf, or robot.
+bool IsXml(const fs::path& file) {
+  static constexpr std::string_view kBefore = " \t\r\n\xEF\xBB\xBF";  // blanks, a byte order mark
+  std::ifstream bytes(file, std::ios::binary);
+  char byte = 0;
+  while (bytes.get(byte) && kBefore.find(byte) != std::string_view::npos) {
+  }
+  return bytes && byte == '<';
+}
+
 /// Of one scene: paths count from its folder, whichever file names them.
 class SceneFiles {
  public:
@@ -43,18 +55,22 @@ class SceneFiles {
   void Read(const fs::path& xml) {
     for (const auto& [attribute, value] : AttributesIn(ReadFile(xml))) {
       if (attribute == "meshdir" || attribute == "texturedir" || attribute == "assetdir") folders_.insert(folder_ / value);
+      if (attribute == "strippath" && value == "true") strips_paths_ = true;
       if (!attribute.starts_with("file")) continue;
       names_.insert(value);
       const fs::path named = folder_ / value;
       std::error_code ignored;
-      if (named.extension() == ".xml" && fs::is_regular_file(named, ignored) && read_.insert(named).second) Read(named);
+      if (!fs::is_regular_file(named, ignored) || read_.contains(named)) continue;
+      if (named.extension() != ".xml" && !IsXml(named)) continue;
+      read_.insert(named);
+      Read(named);
     }
   }
 
   std::vector<fs::path> Found() const {
     std::set<fs::path> found;
     std::error_code ignored;
-    for (const std::string& name : names_) {
+    for (const std::string& name : Names()) {
       for (const fs::path& folder : folders_) {
         const fs::path file = (folder / name).lexically_normal();
         if (fs::is_regular_file(file, ignored)) found.insert(file);
@@ -64,9 +80,18 @@ class SceneFiles {
   }
 
  private:
+  /// With `strippath` a mesh "parts/hand.stl" is looked for as "hand.stl".
+  std::set<std::string> Names() const {
+    std::set<std::string> names = names_;
+    if (!strips_paths_) return names;
+    for (const std::string& name : names_) names.insert(name.substr(name.find_last_of("/\\") + 1));
+    return names;
+  }
+
   fs::path folder_;
   std::set<fs::path> folders_, read_;
   std::set<std::string> names_;
+  bool strips_paths_ = false;
 };
 
 }  // namespace

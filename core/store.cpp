@@ -139,8 +139,11 @@ RunInfo Store::run() const {
   return database_->Read([](auto& connection) { return rows::SelectRun(connection).value(); });
 }
 
-void Store::AddTask(const Task& task) {
-  database_->Write([&](auto& connection) { rows::DeclareTask(connection, task); });
+void Store::AddTask(const Task& task, const std::string& page_hash) {
+  database_->Write([&](auto& connection) {
+    rows::DeclareTask(connection, task);
+    if (!page_hash.empty()) rows::DeclarePageHash(connection, task.id, page_hash);
+  });
 }
 
 void Store::AddWorld(const WorldInfo& world) {
@@ -154,6 +157,15 @@ void Store::AddPolicy(const PolicyInfo& policy) {
 std::vector<Task> Store::Tasks() const { return database_->Read(rows::SelectTasks); }
 std::vector<WorldInfo> Store::Worlds() const { return database_->Read(rows::SelectWorlds); }
 std::vector<PolicyInfo> Store::Policies() const { return database_->Read(rows::SelectPolicies); }
+std::map<std::string, std::string> Store::PageHashes() const { return database_->Read(rows::SelectPageHashes); }
+
+void Store::AddPlan(const std::vector<PlannedEpisodes>& plan) {
+  database_->Write([&](auto& connection) {
+    for (const PlannedEpisodes& planned : plan) rows::UpsertPlanned(connection, planned);
+  });
+}
+
+std::vector<PlannedEpisodes> Store::Plan() const { return database_->Read(rows::SelectPlan); }
 
 void Store::Add(const EpisodeRecord& record) { AddAll({&record, 1}); }
 

@@ -38,6 +38,13 @@ struct PolicyInfo {
   std::string declaration;  ///< the spec it declared at the handshake, JSON
 };
 
+/// How many episodes the suite asks for of one policy on one task in one world, whatever is there of them.
+struct PlannedEpisodes {
+  std::string task, world, policy, checkpoint;
+  std::int64_t episodes = 0;
+  bool operator==(const PlannedEpisodes&) const = default;
+};
+
 /// Everything that is written when an episode ends.
 struct EpisodeRecord {
   Episode episode;
@@ -116,12 +123,22 @@ class Store {
   RunInfo run() const;
 
   /// Declarations: adding the same again changes nothing; adding something else under a known name throws.
-  void AddTask(const Task& task);
+  /// @param page_hash  of its page with all files that this names, as the suite's hash has it; empty: it has none
+  void AddTask(const Task& task, const std::string& page_hash = "");
   void AddWorld(const WorldInfo& world);
   void AddPolicy(const PolicyInfo& policy);
   std::vector<Task> Tasks() const;
   std::vector<WorldInfo> Worlds() const;
   std::vector<PolicyInfo> Policies() const;
+  /// By task; without those that have none, or that an earlier evac declared.
+  std::map<std::string, std::string> PageHashes() const;
+
+  /// Of the whole suite, also where this run is one shard of it: what there is to be in the end. Of what is known
+  /// already the larger number stays (another machine could read more of the recordings). Tasks and worlds must have
+  /// been added before.
+  void AddPlan(const std::vector<PlannedEpisodes>& plan);
+  /// By task, world, policy and checkpoint. Empty: an earlier evac began the run, and did not say.
+  std::vector<PlannedEpisodes> Plan() const;
 
   /// One transaction: the episode's row, its steps, privileged track, video path and hash are there, or nothing is.
   /// Its task, world and policy must have been added before.

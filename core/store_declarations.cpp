@@ -20,6 +20,10 @@ std::string Shown(const WorldInfo& world) {
 
 }  // namespace
 
+bool HasTable(sqlite::Connection& connection, const char* name) {
+  return connection.Query("SELECT 1 FROM sqlite_schema WHERE type = 'table' AND name = ?", name).Step();
+}
+
 void InsertRun(sqlite::Connection& connection, const RunInfo& run) {
   connection.Run("INSERT INTO run (id, suite_text, suite_hash, suite_path, evac_version) VALUES (1, ?, ?, ?, ?)",
                  run.suite_text, run.suite_hash, run.suite_path, run.evac_version);
@@ -41,7 +45,8 @@ bool IsWithoutResults(sqlite::Connection& connection) {
 
 void DeleteBeginning(sqlite::Connection& connection) {
   for (const char* sql : {"DELETE FROM initial_scenes", "DELETE FROM counters", "DELETE FROM policies",
-                          "DELETE FROM worlds", "DELETE FROM tasks", "DELETE FROM run"})
+                          "DELETE FROM planned_episodes", "DELETE FROM page_hashes", "DELETE FROM worlds",
+                          "DELETE FROM tasks", "DELETE FROM run"})
     connection.Run(sql);
 }
 
@@ -57,6 +62,16 @@ void DeclareTask(sqlite::Connection& connection, const Task& task) {
   if (row.Text(1) != task.page && Meaning(row.Text(1)) != Meaning(task.page)) {
     ThrowOther("the page of task '" + task.id + "'", "\n" + row.Text(1), "\n" + task.page);
   }
+}
+
+void DeclarePageHash(sqlite::Connection& connection, const std::string& task, const std::string& page_hash) {
+  auto row = connection.Query("SELECT sha256 FROM page_hashes WHERE task = ?", task);
+  if (!row.Step()) {
+    connection.Run("INSERT INTO page_hashes (task, sha256) VALUES (?, ?)", task, page_hash);
+    return;
+  }
+  if (row.Text(0) != page_hash)
+    ThrowOther("the page of task '" + task + "', with the files that it names,", row.Text(0), page_hash);
 }
 
 void DeclareWorld(sqlite::Connection& connection, const WorldInfo& world) {
@@ -90,6 +105,35 @@ std::vector<Task> SelectTasks(sqlite::Connection& connection) {
     task.page_path = row.Text(2);
   }
   return tasks;
+}
+
+std::map<std::string, std::string> SelectPageHashes(sqlite::Connection& connection) {
+  std::map<std::string, std::string> hashes;
+  if (!HasTable(connection, "page_hashes")) return hashes;
+  for (auto row = connection.Query("SELECT task, sha256 FROM page_hashes"); row.Step();)
+    hashes.emplace(row.Text(0), row.Text(1));
+  return hashes;
+}
+
+void UpsertPlanned(sqlite::Connection& connection, const PlannedEpisodes& planned) {
+  connection.Run(
+      "INSERT INTO planned_episodes (task, world, policy, checkpoint, episodes) VALUES (?, ?, ?, ?, ?) "
+      "ON CONFLICT (task, world, policy, checkpoint) DO UPDATE SET episodes = max(episodes, excluded.episodes)",
+      planned.task, planned.world, planned.policy, planned.checkpoint, planned.episodes);
+}
+
+std::vector<PlannedEpisodes> SelectPlan(sqlite::Connection& connection) {
+  constexpr std::int64_t kMost = std::int64_t{1} << 40;  // their sum is counted
+  std::vector<PlannedEpisodes> plan;
+  if (!HasTable(connection, "planned_episodes")) return plan;
+  for (auto row = connection.Query("SELECT task, world, policy, checkpoint, episodes FROM planned_episodes "
+                                   "ORDER BY task, world, policy, checkpoint");
+       row.Step();) {
+    plan.push_back({row.Text(0), row.Text(1), row.Text(2), row.Text(3), row.Integer(4)});
+    if (plan.back().episodes < 0 || plan.back().episodes > kMost)
+      throw InternalError("the store is damaged: {} is no number of episodes", plan.back().episodes);
+  }
+  return plan;
 }
 
 std::vector<WorldInfo> SelectWorlds(sqlite::Connection& connection) {

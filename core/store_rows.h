@@ -14,6 +14,9 @@
 /// The store's tables as nouns: what one row means, and the SQL for it. Each write is part of the caller's transaction.
 namespace evac::rows {
 
+/// A run that is only read may be of an older schema.
+bool HasTable(sqlite::Connection& connection, const char* name);
+
 void InsertRun(sqlite::Connection& connection, const RunInfo& run);
 std::optional<RunInfo> SelectRun(sqlite::Connection& connection);
 /// False while there is an episode, a real trial, a look or a gate's decision: nothing is lost if another run begins here.
@@ -28,6 +31,13 @@ void DeclarePolicy(sqlite::Connection& connection, const PolicyInfo& policy);
 std::vector<Task> SelectTasks(sqlite::Connection& connection);
 std::vector<WorldInfo> SelectWorlds(sqlite::Connection& connection);
 std::vector<PolicyInfo> SelectPolicies(sqlite::Connection& connection);
+/// @throws InvalidInput if another is stored for the task.
+void DeclarePageHash(sqlite::Connection& connection, const std::string& task, const std::string& page_hash);
+/// Empty, as is the plan, where the run is of a schema from before there were any.
+std::map<std::string, std::string> SelectPageHashes(sqlite::Connection& connection);
+/// Of what is there already the larger number stays.
+void UpsertPlanned(sqlite::Connection& connection, const PlannedEpisodes& planned);
+std::vector<PlannedEpisodes> SelectPlan(sqlite::Connection& connection);
 
 void InsertEpisode(sqlite::Connection& connection, const Episode& episode);
 void InsertSteps(sqlite::Connection& connection, const Episode& episode);

@@ -125,7 +125,17 @@ CREATE TRIGGER gate_decisions_stay BEFORE DELETE ON gate_decisions
 BEGIN SELECT RAISE(ABORT, 'gate decisions are never deleted'); END;
 )sql";
 
-constexpr const char* kSteps[] = {kVersion1, kVersion2, kVersion3, kVersion4};
+/// What tasks were made of, and how many episodes there are to be: how far a run is, and what it may be held against.
+constexpr const char* kVersion5 = R"sql(
+CREATE TABLE page_hashes (task TEXT PRIMARY KEY REFERENCES tasks (id), sha256 TEXT NOT NULL);
+
+CREATE TABLE planned_episodes (
+  task TEXT NOT NULL REFERENCES tasks (id), world TEXT NOT NULL REFERENCES worlds (name),
+  policy TEXT NOT NULL, checkpoint TEXT NOT NULL, episodes INTEGER NOT NULL CHECK (episodes >= 0),
+  PRIMARY KEY (task, world, policy, checkpoint));
+)sql";
+
+constexpr const char* kSteps[] = {kVersion1, kVersion2, kVersion3, kVersion4, kVersion5};
 
 std::int64_t Pragma(sqlite::Connection& connection, const char* sql) {
   sqlite::Statement statement = connection.Query(sql);

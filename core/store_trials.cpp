@@ -1,14 +1,6 @@
 #include "core/store_rows.h"
 
 namespace evac::rows {
-namespace {
-
-/// A run that is only read may be of an older schema.
-bool HasTable(sqlite::Connection& connection, const char* name) {
-  return connection.Query("SELECT 1 FROM sqlite_schema WHERE type = 'table' AND name = ?", name).Step();
-}
-
-}  // namespace
 
 void InsertRealTrial(sqlite::Connection& connection, const RealTrial& trial) {
   const auto video = trial.video.empty() ? std::nullopt : std::optional(trial.video);

@@ -13,6 +13,7 @@
 #include "core/error.h"
 #include "core/file.h"
 #include "core/hash.h"
+#include "core/run_extent.h"
 #include "core/store.h"
 #include "core/store_calls.h"
 #include "core/store_lock.h"
@@ -102,9 +103,11 @@ Choice Choose(const std::vector<Store>& stores, const std::vector<fs::path>& sha
 }
 
 void CopyDeclarations(const Store& from, Store& to) {
-  for (const Task& task : from.Tasks()) to.AddTask(task);
+  std::map<std::string, std::string> pages = from.PageHashes();
+  for (const Task& task : from.Tasks()) to.AddTask(task, pages[task.id]);
   for (const WorldInfo& world : from.Worlds()) to.AddWorld(world);
   for (const PolicyInfo& policy : from.Policies()) to.AddPolicy(policy);
+  to.AddPlan(from.Plan());
   for (const PairKey& pair : from.InitialScenes())
     to.AddInitialScene(pair, from.LoadInitialScene(pair.task, pair.initial_state).value());
   for (const auto& [policy, counters] : from.CountersByPolicy()) to.Count(policy, counters);
@@ -313,8 +316,8 @@ std::vector<std::string> NotesOn(const std::vector<Store>& stores) {
   return notes;
 }
 
-/// What was chosen of all, in the folder where it is made.
-void Fill(const fs::path& part, const std::vector<Store>& stores, const Choice& choice) {
+/// What was chosen of all, in the folder where it is made. @returns how much of the suite that is
+RunExtent Fill(const fs::path& part, const std::vector<Store>& stores, const Choice& choice) {
   RunInfo run = stores.front().run();
   run.evac_version = fmt::format("{}", fmt::join(VersionsOf(stores), ", "));
   Store merged = Store::CreateOrContinue(part, run);
@@ -324,6 +327,7 @@ void Fill(const fs::path& part, const std::vector<Store>& stores, const Choice& 
     CopyRealTrials(stores[s], merged);
   }
   for (std::size_t s = 0; s < stores.size(); ++s) AddWhatWasNotSaid(stores[s], choice.judged[s], merged);
+  return ExtentOf(merged.Plan(), merged.Episodes());
 }
 
 }  // namespace
@@ -343,12 +347,17 @@ MergeSummary MergeRuns(const std::vector<fs::path>& shards, const fs::path& want
   RequireRoom(part, out, shards);
   MakeFolders(part / kMark);
   Empty(part);
-  Fill(part, stores, choice);
+  const RunExtent extent = Fill(part, stores, choice);
   SyncAndRename(part, out);
   fs::remove(out / kMark);
   std::size_t count = 0;
   for (const std::vector<Episode>& taken : choice.episodes) count += taken.size();
-  return {.episodes = static_cast<int>(count), .duplicates = choice.duplicates, .notes = NotesOn(stores)};
+  MergeSummary summary{static_cast<int>(count), choice.duplicates, NotesOn(stores)};
+  if (extent.missing > 0)
+    summary.notes.push_back(fmt::format("{} of the suite's {} episodes are there: a shard was broken off, or is none "
+                                        "of these; evac resume {} runs the others",
+                                        extent.planned - extent.missing, extent.planned, out.string()));
+  return summary;
 }
 
 int TakeEpisodes(const Store& from, const std::function<bool(const EpisodeKey&)>& wanted, Store& to) {

@@ -24,6 +24,18 @@ std::vector<Job> AllJobs(const Suite& suite, const SuiteWorld& world, const Suit
   return jobs;
 }
 
+std::vector<PlannedEpisodes> PlannedOf(const Suite& suite) {
+  std::vector<PlannedEpisodes> plan;
+  for (const SuiteWorld& world : suite.worlds) {
+    const auto of_each = std::ssize(StatesOf(suite, world)) * std::ssize(suite.seeds);
+    for (const SuitePolicy& policy : suite.policies) {
+      for (const Task& task : suite.tasks)
+        plan.push_back({task.id, world.name, policy.name, policy.checkpoint, of_each});
+    }
+  }
+  return plan;
+}
+
 std::vector<Job> MissingJobs(std::vector<Job> jobs, const Store& store) {
   std::erase_if(jobs, [&](const Job& job) { return store.Has(job.key); });
   return jobs;

@@ -15,6 +15,9 @@ InitialState StateOn(const Task& task, const InitialState& state);
 /// `suite.tasks`.
 std::vector<Job> AllJobs(const Suite& suite, const SuiteWorld& world, const SuitePolicy& policy);
 
+/// How many these are, of each task, world and policy of the suite.
+std::vector<PlannedEpisodes> PlannedOf(const Suite& suite);
+
 /// Those that the store does not have yet: what `resume` runs.
 std::vector<Job> MissingJobs(std::vector<Job> jobs, const Store& store);
 

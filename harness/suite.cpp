@@ -263,6 +263,7 @@ void CheckWhole(const Suite& suite, const Config& page) {
 
 RecordedTask ReadRecordedTask(const Config& page) {
   RecordedTask task;
+  if (page.Has("task")) task.name = NameField(page, "task");
   if (page.Has("instruction")) task.instruction = page.Get<std::string>("instruction");
   page.Require(!task.instruction || !task.instruction->empty(), "instruction", "what is to be done, in words");
   if (page.Has("rubric")) task.rubric = ReadRubricInWords(page.Section("rubric"));
@@ -275,8 +276,8 @@ RecordedTask ReadRecordedTask(const Config& page) {
 
 Suite Build(const Config& page) {
   page.AllowOnly({"suite", "description", "recording", "worlds", "tasks", "policies", "seeds", "initial_states",
-                  "chunk_size", "lanes", "threads", "error_budget", "image", "still", "max_chunks", "instruction", "rubric",
-                  "workspace_m", "judges", "video", "transport", "policy"});
+                  "chunk_size", "lanes", "threads", "error_budget", "image", "still", "max_chunks", "task",
+                  "instruction", "rubric", "workspace_m", "judges", "video", "transport", "policy"});
   Suite suite;
   suite.name = NameField(page, "suite");
   suite.path = page.file();
@@ -288,7 +289,7 @@ Suite Build(const Config& page) {
     page.Require(!page.Has("image"), "image", "none beside a `recording`: its pictures are of its videos' size");
     suite.recorded_task = ReadRecordedTask(page);
   }
-  for (const char* field : {"max_chunks", "instruction", "rubric", "workspace_m"})
+  for (const char* field : {"max_chunks", "task", "instruction", "rubric", "workspace_m"})
     page.Require(suite.recording || !page.Has(field), field, "none but beside a `recording`: a task page says its own");
   suite.tasks = ReadTasks(page);
   suite.seeds = page.Get<std::vector<std::uint64_t>>("seeds", {1});

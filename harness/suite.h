@@ -45,6 +45,7 @@ enum class StartProbe { kRefuse, kWarn, kOff };
 
 /// What a suite says of the task of its recordings; what it leaves out is made up from these.
 struct RecordedTask {
+  std::optional<std::string> name;                 ///< what seeds are drawn from, judges and comparisons go by
   std::optional<std::string> instruction;          ///< what policies, raters and judges are told
   std::optional<Rubric> rubric;                    ///< in words
   std::optional<Eigen::AlignedBox3d> workspace_m;  ///< base frame

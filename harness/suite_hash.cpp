@@ -46,13 +46,37 @@ bool IsFolder(const fs::path& path) {
   return fs::is_directory(path, ignored);
 }
 
+/// Which files below a folder are none of its own.
+struct LeftAside {
+  std::string file = {};               ///< one by its name in the folder
+  std::set<fs::path> recordings = {};  ///< folders; of what lies below them all that no recording is read from
+};
+
+/// Whether a folder is one of these, or lies in one.
+bool LiesInOneOf(const std::set<fs::path>& folders, fs::path folder) {
+  while (!folders.contains(folder)) {
+    if (folder == folder.parent_path()) return false;
+    folder = folder.parent_path();
+  }
+  return true;
+}
+
 /// The files below a folder; or the one file, which has no name in it.
-/// @param but  a file of the folder that is none of them
-std::vector<NamedFile> FilesOfTree(const fs::path& path, const std::string& but) {
+std::vector<NamedFile> FilesOfTree(const fs::path& path, const LeftAside& aside) {
   if (!IsFolder(path)) return {{"", path}};
   std::vector<NamedFile> files;
   AddFilesBelow(path, "", {}, files);
-  std::erase_if(files, [&](const NamedFile& file) { return file.name == but; });
+  fs::path last;  // of one folder there may be thousands
+  bool is_recording = false;
+  std::erase_if(files, [&](const NamedFile& file) {
+    if (file.name == aside.file) return true;
+    if (aside.recordings.empty() || IsReadOfRecording(file.path.filename().string())) return false;
+    if (const fs::path folder = file.path.parent_path(); folder != last) {
+      is_recording = LiesInOneOf(aside.recordings, folder);
+      last = folder;
+    }
+    return is_recording;
+  });
   return files;
 }
 
@@ -65,10 +89,11 @@ std::string HashOfFile(const fs::path& file, const HashedFiles& known) {
 }
 
 /// The files below a folder by name and content, in name order; or the one file.
-std::string HashOfTree(const fs::path& path, const HashedFiles& known, const std::string& but = "") {
+std::string HashOfTree(const fs::path& path, const HashedFiles& known, const LeftAside& aside = {}) {
   if (!IsFolder(path)) return HashOfFile(path, known);
   std::vector<std::string> lines;
-  for (const NamedFile& file : FilesOfTree(path, but)) lines.push_back(file.name + " " + HashOfFile(file.path, known));
+  for (const NamedFile& file : FilesOfTree(path, aside))
+    lines.push_back(file.name + " " + HashOfFile(file.path, known));
   std::sort(lines.begin(), lines.end());
   std::string text;
   for (const std::string& line : lines) text += line + "\n";
@@ -84,6 +109,11 @@ bool IsOfModel(const std::string& line, const Suite& suite) {
 }
 
 bool IsOfPolicies(const std::string& line) { return line.starts_with(".policies."); }
+
+/// ".policies.0.files.1=…": what lies there is hashed, by its place in the list (FilesOf), wherever it lies.
+bool NamesAFile(const std::string& line) {
+  return IsOfPolicies(line) && line.substr(0, line.find('=')).find(".files.") != std::string::npos;
+}
 
 /// An initial state is named by its seed and its number: how many there are changes none of them.
 bool SaysHowManyStates(const std::string& line) { return line.starts_with(".initial_states.count="); }
@@ -107,6 +137,29 @@ std::vector<fs::path> PlacesOf(const fs::path& recording) {
 
 /// A collection's says which process wrote it last.
 constexpr const char* kLock = "lock";
+
+bool IsToldTheRecording(const SuitePolicy& policy) {
+  return std::ranges::any_of(policy.command,
+                             [](const std::string& word) { return word.find("${recording}") != std::string::npos; });
+}
+
+/// What of the recordings' places changes nothing. A policy that is told where the recording lies may read all of it;
+/// of a folder of several none is told.
+LeftAside LeftAsideOf(const Suite& suite) {
+  LeftAside aside{.file = kLock};
+  if (IsRecording(*suite.recording)) {
+    if (std::ranges::any_of(suite.policies, IsToldTheRecording)) return aside;
+    const std::vector<fs::path> folders = FoldersOf(*suite.recording);
+    aside.recordings.insert(folders.begin(), folders.end());
+    return aside;
+  }
+  for (const fs::path& one : FindRecordings(*suite.recording)) {
+    const std::vector<fs::path> folders = FoldersOf(one);
+    aside.recordings.insert(folders.begin(), folders.end());
+    aside.recordings.insert(one);  // which may be a link
+  }
+  return aside;
+}
 
 std::string FilesOf(const SuitePolicy& policy, const HashedFiles& known = {}) {
   std::ostringstream text;
@@ -149,7 +202,8 @@ std::string HashOf(const Config& page, const Suite& suite, bool whole) {
   std::istringstream lines(page.Canonical());
   for (std::string line; std::getline(lines, line);) {
     if (!whole && (IsOfModel(line, suite) || IsOfPolicies(line) || SaysHowManyStates(line))) continue;
-    const bool by_content = StartsWithAny(line, {".recording=", ".tasks."}) || IsHashedByContent(line);
+    const bool by_content =
+        StartsWithAny(line, {".recording=", ".tasks."}) || NamesAFile(line) || IsHashedByContent(line);
     if (!by_content &&
         !StartsWithAny(line, {".lanes=", ".threads=", ".error_budget=", ".description=", ".transport.deadline_s=",
                               ".transport.repeat_after_s=", ".transport.start_s=", ".policy.start_probe="}))
@@ -167,9 +221,11 @@ std::string HashOf(const Config& page, const Suite& suite, bool whole) {
     if (whole) text << FilesOf(policy, suite.hashed_files);
   }
   if (suite.recording) {
-    text << "recorded task " << RecordedTaskName(*suite.recording) << "\n";  // it is filled in later
+    const auto& said = suite.recorded_task.name;
+    text << "recorded task " << (said ? *said : RecordedTaskName(*suite.recording)) << "\n";  // it is filled in later
+    const LeftAside aside = LeftAsideOf(suite);
     for (const fs::path& place : PlacesOf(*suite.recording))
-      text << "recording " << HashOfTree(place, suite.hashed_files, kLock) << "\n";
+      text << "recording " << HashOfTree(place, suite.hashed_files, aside) << "\n";
   }
   return Sha256Hex(text.str());
 }
@@ -201,10 +257,12 @@ std::string PageHash(const fs::path& path) {
     const std::string value = line.substr(line.find('=') + 1);
     const fs::path named = path.parent_path() / value;
     std::error_code ignored;
-    if (value.find('.') == std::string::npos || !fs::is_regular_file(named, ignored)) continue;
+    const bool is_scene = line.starts_with(".mujoco.scene=");  // MuJoCo reads it under any name
+    const bool may_be_file = is_scene || value.find('.') != std::string::npos;
+    if (!may_be_file || !fs::is_regular_file(named, ignored)) continue;
     text += value + " " + Sha256HexOfFile(named) + "\n";
     known.insert(fs::canonical(named));
-    if (named.extension() == ".xml") scenes.insert(named);
+    if (is_scene || named.extension() == ".xml") scenes.insert(named);
   }
   for (const fs::path& scene : scenes) {
     for (const fs::path& file : FilesOfScene(scene)) {
@@ -235,8 +293,7 @@ void DemandUnchanged(const Suite& suite, const SuiteWorld& world) {
 
 void DemandUnchanged(const Suite& suite, const SuitePolicy& policy) {
   for (const std::string& file : policy.files) DemandAsHashed(suite.hashed_files, file);
-  const auto names_it = [](const std::string& word) { return word.find("${recording}") != std::string::npos; };
-  if (suite.recording && std::ranges::any_of(policy.command, names_it)) DemandRecordingUnchanged(suite, *suite.recording);
+  if (suite.recording && IsToldTheRecording(policy)) DemandRecordingUnchanged(suite, *suite.recording);
 }
 
 void DemandRecordingUnchanged(const Suite& suite, const fs::path& recording) {
@@ -245,18 +302,19 @@ void DemandRecordingUnchanged(const Suite& suite, const fs::path& recording) {
 
 std::map<fs::path, HashedFile> HashFiles(const Suite& suite) {
   HashedFiles hashed;
-  const auto add = [&](const fs::path& place, const std::string& but) {
-    for (const NamedFile& file : FilesOfTree(place, but)) {
+  const auto add = [&](const fs::path& place, const LeftAside& aside) {
+    for (const NamedFile& file : FilesOfTree(place, aside)) {
       HashedFile now = LookAt(file.path);  // before it is read: what is written to it meanwhile is noticed
       now.sha256 = Sha256HexOfFile(file.path);
       hashed.insert_or_assign(KeyOf(file.path), std::move(now));
     }
   };
   for (const SuitePolicy& policy : suite.policies) {
-    for (const std::string& file : policy.files) add(file, "");
+    for (const std::string& file : policy.files) add(file, {});
   }
   if (suite.recording) {
-    for (const fs::path& place : PlacesOf(*suite.recording)) add(place, kLock);
+    const LeftAside aside = LeftAsideOf(suite);
+    for (const fs::path& place : PlacesOf(*suite.recording)) add(place, aside);
   }
   return hashed;
 }

@@ -9,7 +9,8 @@
 
 namespace evac {
 
-/// SHA-256 of what a page says, and of every file that a scalar in it names (the scene's XML), and that those name.
+/// SHA-256 of what a page says, and of every file that a scalar in it names (the scene, whatever it is called), and of
+/// what those are made of (core/scene_files.h).
 std::string PageHash(const std::filesystem::path& page);
 
 /// Between the reading of a suite and a world's turn lie hours: what the world was made of is to be what the suite's
@@ -32,13 +33,15 @@ void DemandUnchanged(const Suite& suite, const SuitePolicy& policy);
 /// The same of one of the suite's recordings, whenever it was read.
 void DemandRecordingUnchanged(const Suite& suite, const std::filesystem::path& recording);
 
-/// All files of the policies and of the recording, as they are now.
+/// All files of the policies and of the recording that the suite's hash covers, as they are now.
 /// @throws InvalidInput naming what cannot be read
 std::map<std::filesystem::path, HashedFile> HashFiles(const Suite& suite);
 
 /// SHA-256 of everything in a suite that can change a result, wherever its files lie: fields by value, files by
-/// content, a recording also by what its task is called, from which seeds are drawn. Left out: lanes, threads,
-/// error_budget and the transport's times, which change how fast and how patiently, not what; a collection's `lock`.
+/// content, a recording also by what its task is called, from which seeds are drawn. In a recording's own folders those
+/// files count that ReadRecording may read (IsReadOfRecording), all of them if a policy is told where it lies. Left out:
+/// lanes, threads, error_budget and the transport's times, which change how fast and how patiently, not what; a
+/// collection's `lock`.
 std::string SuiteHash(const Config& page, const Suite& suite);
 
 /// The same without the worlds of type evac, the policies and how many initial states there are: suites that differ in

@@ -22,16 +22,8 @@ struct Badge {
   const char* colour = kGrey;
 };
 
-/// Fail before inconclusive before pass; a pass of older data is none of these.
-int Weight(const ShownGate& gate) {
-  const GateOutcome outcome = gate.decision.outcome;
-  if (outcome == GateOutcome::kFail) return gate.is_current ? 4 : 3;
-  if (outcome == GateOutcome::kInconclusive) return 2;
-  return gate.is_current ? 0 : 1;
-}
-
 Badge OfGates(const std::vector<ShownGate>& gates) {
-  const auto worst = std::ranges::max_element(gates, {}, Weight);
+  const auto worst = std::ranges::max_element(gates, {}, GravityOf);
   Badge badge{Name(worst->decision.outcome), kGrey};
   const auto& rules = worst->decision.rules;
   const auto rule = std::ranges::find_if(rules, [&](const RuleDecision& one) {
@@ -49,7 +41,8 @@ Badge OfGates(const std::vector<ShownGate>& gates) {
 }
 
 Badge OfRun(const RunSummary& summary) {
-  if (summary.policies.size() != 1)
+  const bool has_no_one_rate = summary.data.worlds.size() > 1 && summary.reference.empty();
+  if (summary.policies.size() != 1 || has_no_one_rate)
     return {Counted(static_cast<std::int64_t>(summary.policies.size()), "policy", "policies") + ", " +
                 Counted(static_cast<std::int64_t>(summary.episodes.size()), "episode"),
             kGrey};

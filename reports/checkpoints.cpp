@@ -5,13 +5,14 @@
 #include <algorithm>
 #include <charconv>
 #include <map>
+#include <string_view>
 
 #include "reports/wording.h"
 
 namespace evac {
 namespace {
 
-/// Checkpoints by policy name, both in the order declared.
+/// Checkpoints by policy name.
 std::vector<std::pair<std::string, std::vector<std::string>>> FamiliesOf(const RunSummary& summary) {
   std::vector<std::pair<std::string, std::vector<std::string>>> families;
   for (const PolicyInfo& policy : summary.data.policies) {
@@ -23,8 +24,75 @@ std::vector<std::pair<std::string, std::vector<std::string>>> FamiliesOf(const R
   return families;
 }
 
-std::vector<CheckpointPoint> PointsInOrder(const std::vector<std::string>& checkpoints, bool& has_steps) {
-  has_steps = std::ranges::all_of(checkpoints, [](const std::string& name) { return StepOf(name).has_value(); });
+bool IsDigit(char c) { return c >= '0' && c <= '9'; }
+
+/// The number that a name ends with, and what stands before it.
+struct Ending {
+  std::string_view before;
+  double step = 0;
+};
+
+/// Where the digits begin that end before `end`; `end` where there are none.
+std::size_t DigitsBefore(const std::string& name, std::size_t end) {
+  while (end > 0 && IsDigit(name[end - 1])) --end;
+  return end;
+}
+
+std::optional<Ending> EndingOf(const std::string& checkpoint) {
+  std::size_t end = checkpoint.size();
+  double unit = 1;
+  if (end > 0 && (checkpoint[end - 1] == 'k' || checkpoint[end - 1] == 'M')) {
+    unit = checkpoint[end - 1] == 'k' ? 1e3 : 1e6;
+    --end;
+  }
+  std::size_t begin = DigitsBefore(checkpoint, end);
+  if (unit > 1 && begin > 0 && begin < end && checkpoint[begin - 1] == '.') {
+    const std::size_t whole = DigitsBefore(checkpoint, begin - 1);
+    if (whole < begin - 1) begin = whole;
+  }
+  double step = 0;
+  const auto [stop, error] = std::from_chars(checkpoint.data() + begin, checkpoint.data() + end, step);
+  if (begin == end || error != std::errc() || stop != checkpoint.data() + end) return std::nullopt;
+  return Ending{std::string_view(checkpoint).substr(0, begin), step * unit};
+}
+
+/// Of a date or a version the last number alone says nothing: 2026-02-01 is after 2026-01-31.
+bool DifferInTheirLastNumberAlone(const std::vector<std::string>& checkpoints) {
+  const std::optional<Ending> first = EndingOf(checkpoints.front());
+  return first && std::ranges::all_of(checkpoints, [&](const std::string& name) {
+           const std::optional<Ending> ending = EndingOf(name);
+           return ending && ending->before == first->before;
+         });
+}
+
+/// Takes the digits that `text` begins with off it. @returns them without leading zeros
+std::string_view TakeNumber(std::string_view& text) {
+  const auto end = static_cast<std::size_t>(std::ranges::find_if_not(text, IsDigit) - text.begin());
+  std::string_view number = text.substr(0, end);
+  text.remove_prefix(end);
+  number.remove_prefix(std::min(number.find_first_not_of('0'), number.size()));
+  return number;
+}
+
+/// By their bytes, but for numbers, which are compared as such: v1.9, v1.10, v2.0.
+bool IsBefore(std::string_view a, std::string_view b) {
+  while (!a.empty() && !b.empty()) {
+    if (IsDigit(a.front()) && IsDigit(b.front())) {
+      const std::string_view one = TakeNumber(a), two = TakeNumber(b);
+      if (one != two) return one.size() == two.size() ? one < two : one.size() < two.size();
+    } else if (a.front() != b.front()) {
+      return static_cast<unsigned char>(a.front()) < static_cast<unsigned char>(b.front());
+    } else {
+      a.remove_prefix(1);
+      b.remove_prefix(1);
+    }
+  }
+  return a.empty() && !b.empty();
+}
+
+std::vector<CheckpointPoint> PointsInOrder(std::vector<std::string> checkpoints, bool& has_steps) {
+  has_steps = DifferInTheirLastNumberAlone(checkpoints);
+  if (!has_steps) std::ranges::stable_sort(checkpoints, IsBefore);
   std::vector<CheckpointPoint> points;
   for (const std::string& checkpoint : checkpoints) {
     points.push_back({checkpoint, has_steps ? *StepOf(checkpoint) : static_cast<double>(points.size()), {}});
@@ -60,6 +128,8 @@ void AddRates(const RunSummary& summary, CheckpointCurve& curve) {
       });
       Estimate none;
       none.value = Undefined{"no episode"};
+      none.interval = Undefined{"no episode"};
+      none.method = "none";
       point.rate.push_back(cell == summary.rates.end() ? none : cell->rate);
     }
   }
@@ -90,30 +160,11 @@ std::string RisesInWords(const CheckpointCurve& curve, std::size_t world) {
   return steps == 0 ? "no two neighbours are judged" : fmt::format("{} of {} rise", rises, Counted(steps, "step"));
 }
 
-/// Where the digits begin that end before `end`; `end` where there are none.
-std::size_t DigitsBefore(const std::string& name, std::size_t end) {
-  while (end > 0 && name[end - 1] >= '0' && name[end - 1] <= '9') --end;
-  return end;
-}
-
 }  // namespace
 
 std::optional<double> StepOf(const std::string& checkpoint) {
-  std::size_t end = checkpoint.size();
-  double unit = 1;
-  if (end > 0 && (checkpoint[end - 1] == 'k' || checkpoint[end - 1] == 'M')) {
-    unit = checkpoint[end - 1] == 'k' ? 1e3 : 1e6;
-    --end;
-  }
-  std::size_t begin = DigitsBefore(checkpoint, end);
-  if (unit > 1 && begin > 0 && begin < end && checkpoint[begin - 1] == '.') {
-    const std::size_t whole = DigitsBefore(checkpoint, begin - 1);
-    if (whole < begin - 1) begin = whole;
-  }
-  double step = 0;
-  const auto [stop, error] = std::from_chars(checkpoint.data() + begin, checkpoint.data() + end, step);
-  if (begin == end || error != std::errc() || stop != checkpoint.data() + end) return std::nullopt;
-  return step * unit;
+  const std::optional<Ending> ending = EndingOf(checkpoint);
+  return ending ? std::optional(ending->step) : std::nullopt;
 }
 
 std::vector<CheckpointCurve> CheckpointsOf(const RunSummary& summary) {

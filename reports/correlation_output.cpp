@@ -119,11 +119,16 @@ std::string GroupTable(const std::vector<CorrelationGroup>& groups) {
   return table.Text();
 }
 
-/// The points of every group that has counts; groups of one task repeat those of their world and are not shown.
+/// Of a run, a group of one task: its points are those of its world's group.
+bool RepeatsItsWorld(const CorrelationGroup& group) {
+  return IsBootstrapped(group) && group.group.find('/') != std::string::npos;
+}
+
+/// The points of every group that has counts, each once.
 std::string PointTable(const std::vector<CorrelationGroup>& groups) {
   std::string text;
   for (const CorrelationGroup& group : groups) {
-    if (!IsBootstrapped(group) || group.group.find('/') != std::string::npos) continue;
+    if (!IsBootstrapped(group) || RepeatsItsWorld(group)) continue;
     TextTable points;
     points.Add({"task", "policy", "real", group.group});
     for (const CorrelationPoint& point : group.points) {
@@ -159,7 +164,7 @@ std::string Footnotes(const std::vector<CorrelationGroup>& groups) {
   Notes notes;
   std::int64_t ties = 0;
   for (const CorrelationGroup& group : groups) {
-    ties += group.ranks.ties;
+    if (!RepeatsItsWorld(group)) ties += group.ranks.ties;
     NoteEstimate(group.group, "Pearson", group.pearson, notes);
     NoteEstimate(group.group, "Spearman", group.spearman, notes);
     NoteEstimate(group.group, "MMRV", group.mmrv, notes);

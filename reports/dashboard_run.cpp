@@ -52,7 +52,7 @@ WatchedRun::Content WatchedRun::Count(const std::string& stamp) const {
   const PageOptions page{"files", program_, "../../events", index_, stamp};
   try {
     const ReportData report = ReportDataOf(Summarise(ReadRun(Store::Open(folder_, Store::Mode::kReadOnly)), options_));
-    return {ReportPage(report, page), ReportJson(report.summary, program_), DashboardRunOf(folder_.string(), report)};
+    return {ReportPage(report, page), ReportJson(report, program_), DashboardRunOf(folder_.string(), report)};
   } catch (const Error& error) {  // not begun yet, or being made: said where it would stand
     Content content;
     content.summary.name = folder_.string();

@@ -21,7 +21,7 @@ struct Finding {
 
 /// Pearson's interval must lie above this before a world is said to follow the real one closely.
 inline constexpr double kCloseCorrelation = 0.7;
-/// Exact tests decide below this.
+/// Exact tests decide below this; which policy is best, what the letters rest on (letters.h).
 inline constexpr double kAlpha = 0.05;
 
 /// The sentences at the top of the page, most important first. The wording follows the intervals: wide or undefined

@@ -8,6 +8,7 @@
 #include "core/statistics/planning.h"
 #include "core/statistics/sequential_planning.h"
 #include "reports/gate_evidence.h"
+#include "reports/gate_sides.h"
 #include "reports/wording.h"
 
 namespace evac {
@@ -38,8 +39,8 @@ void Correct(GateCorrection correction, std::vector<Evidence>& evidences) {
 }
 
 GateOutcome OutcomeOf(const GateRule& rule, const Evidence& evidence) {
-  if (evidence.counted) return *evidence.counted;
   if (!evidence.blocked.empty()) return GateOutcome::kInconclusive;
+  if (evidence.counted) return *evidence.counted;
   if (evidence.decision.p_adjusted && *evidence.decision.p_adjusted <= rule.alpha) return GateOutcome::kFail;
   return evidence.shows_good ? GateOutcome::kPass : GateOutcome::kInconclusive;
 }
@@ -76,8 +77,10 @@ GateOutcome WorstOf(const std::vector<RuleDecision>& rules) {
 double BaselineRate(const GateRule& rule, const PinnedResult* baseline) {
   double successes = 0, trials = 0;
   if (!baseline) return kSupposedRate;
+  const std::vector<std::string> known = baseline->Policies();
+  std::string policy = rule.baseline_policy.empty() ? rule.policy : rule.baseline_policy;
+  if (std::ranges::find(known, policy) == known.end()) policy.clear();  // its only one is meant
   for (const PinnedCell& cell : baseline->cells) {
-    const std::string& policy = rule.baseline_policy.empty() ? rule.policy : rule.baseline_policy;
     if ((!rule.task.empty() && cell.task != rule.task) || (!rule.world.empty() && cell.world != rule.world)) continue;
     if (!policy.empty() && cell.policy != policy) continue;
     for (const PinnedOutcome& one : cell.outcomes) {
@@ -106,6 +109,12 @@ std::string SizeOf(const GateRule& rule, double rate) {
 }
 
 }  // namespace
+
+void DemandBaseline(const GateRules& rules, const PinnedResult& baseline) {
+  for (const GateRule& rule : rules.rules) {
+    if (rule.Compares()) DemandSideOf(rule, rules.judge, baseline);
+  }
+}
 
 std::vector<std::string> SizesOf(const GateRules& rules, const PinnedResult* baseline) {
   std::vector<std::string> sizes;

@@ -34,6 +34,10 @@ struct GateResult {
 /// @throws InvalidInput for a rule that cannot be held against these data (gate_sides.h).
 GateResult Decide(const GateRules& rules, const GateCandidate& candidate, const PinnedResult* baseline);
 
+/// What is known before the candidate's run of whether its rules can be held against this baseline.
+/// @throws InvalidInput naming the rule, for what Decide would refuse whatever the candidate is (gate_sides.h).
+void DemandBaseline(const GateRules& rules, const PinnedResult& baseline);
+
 /// How many episodes each rule that compares needs, a sentence each: what is known before the run.
 /// @param baseline  null: rates of 70 % are assumed.
 std::vector<std::string> SizesOf(const GateRules& rules, const PinnedResult* baseline);

@@ -1,6 +1,9 @@
 #include "reports/gate_baseline.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
+#include <cstdlib>
 #include <nlohmann/json.hpp>
 #include <set>
 #include <tuple>
@@ -8,6 +11,7 @@
 #include "core/config.h"
 #include "core/hash.h"
 #include "core/parse_json.h"
+#include "core/store_codec.h"
 #include "reports/gate_data.h"
 
 namespace evac {
@@ -26,8 +30,12 @@ Json BodyOf(const PinnedResult& pinned) {
                {"store_hash", pinned.store_hash},
                {"judge", pinned.judge},
                {"tasks", pinned.tasks},
-               {"worlds", pinned.worlds},
-               {"cells", Json::array()}};
+               {"worlds", pinned.worlds}};
+  for (const auto& [key, map] : {std::pair("scenes", &pinned.scenes), std::pair("definitions", &pinned.definitions),
+                                 std::pair("settings", &pinned.settings)}) {
+    if (!map->empty()) json[key] = *map;
+  }
+  json["cells"] = Json::array();
   for (const PinnedCell& cell : pinned.cells) {
     Json outcomes = Json::array();
     for (const PinnedOutcome& one : cell.outcomes)
@@ -50,6 +58,35 @@ std::string Dump(const Json& json, int indent = -1) {
 std::string HashOf(const Task& task) {
   if (task.page.empty()) return Sha256Hex(task.id + "\n" + task.instruction + "\n" + task.rubric.version);
   return Config::FromText(task.page, task.id).ContentHash();
+}
+
+/// Of recordings, what depends on which of them there are is left out: their states are compared as states.
+std::string HashOfDefinition(Task task) {
+  if (task.page.empty()) {
+    task.max_chunks = 0;
+    task.workspace_m = Task{}.workspace_m;
+    for (Camera& camera : task.cameras)
+      camera = {.name = camera.name, .width_px = camera.width_px, .height_px = camera.height_px};
+  }
+  return Sha256Hex(codec::EncodeTask(task));
+}
+
+/// "0.1" and "0.10" are one latency.
+std::string LatencyIn(const Config& suite) {
+  const std::string text = suite.Has("policy") ? suite.Section("policy").Get<std::string>("latency", "off") : "off";
+  char* end = nullptr;
+  const double seconds = std::strtod(text.c_str(), &end);
+  return text.empty() || *end != '\0' ? text : fmt::format("{} s", seconds);
+}
+
+/// What the suite says for all its tasks and policies alike. Of one that cannot be read nothing is known.
+std::map<std::string, std::string> SettingsOf(const std::string& suite_text) try {
+  const Config suite = Config::FromText(suite_text, "suite");
+  return {{"chunk_size", std::to_string(suite.Get<int>("chunk_size", 8))},
+          {"max_chunks", suite.Get<std::string>("max_chunks", "not said")},
+          {"policy.latency", LatencyIn(suite)}};
+} catch (const Error&) {
+  return {};
 }
 
 /// A JSON value that knows where it stands, so that every complaint names the field.
@@ -81,6 +118,11 @@ class Field {
     std::map<std::string, std::string> texts;
     for (const auto& [key, value] : json_.items()) texts[key] = Child(key, value).Text();
     return texts;
+  }
+  /// Of a field that a file may lack.
+  std::map<std::string, std::string> TextsOf(const std::string& key) const {
+    if (!json_.is_object() || !json_.contains(key)) return {};
+    return At(key).Texts();
   }
   void Require(bool holds, const std::string& wanted) const {
     if (!holds) Complain(wanted);
@@ -152,7 +194,12 @@ PinnedResult Pin(const RunSummary& summary, const std::string& run) {
   pinned.suite_hash = summary.data.run.suite_hash;
   pinned.store_hash = DataHash(summary.data);
   pinned.judge = summary.options.judge;
-  for (const Task& task : summary.data.tasks) pinned.tasks[task.id] = HashOf(task);
+  for (const Task& task : summary.data.tasks) {
+    pinned.tasks[task.id] = HashOf(task);
+    pinned.definitions[task.id] = HashOfDefinition(task);
+  }
+  pinned.scenes = summary.data.page_hashes;
+  pinned.settings = SettingsOf(summary.data.run.suite_text);
   for (const WorldInfo& world : summary.data.worlds) pinned.worlds[world.name] = world.profile_hash;
   std::map<std::tuple<std::string, std::string, std::string>, std::vector<PinnedOutcome>> cells;
   for (const JudgedEpisode& judged : summary.episodes) {
@@ -187,6 +234,9 @@ PinnedResult ReadPinned(const std::string& text, const std::string& file) {
   pinned.judge = page.At("judge").Text();
   pinned.tasks = page.At("tasks").Texts();
   pinned.worlds = page.At("worlds").Texts();
+  pinned.scenes = page.TextsOf("scenes");
+  pinned.definitions = page.TextsOf("definitions");
+  pinned.settings = page.TextsOf("settings");
   for (const Field& cell : page.At("cells").Items()) pinned.cells.push_back(CellOf(cell));
   pinned.sha256 = page.At("sha256").Text();
   json.erase("sha256");

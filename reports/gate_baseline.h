@@ -33,6 +33,10 @@ struct PinnedResult {
   std::string suite_hash, store_hash, judge;  ///< store_hash: DataHash
   std::map<std::string, std::string> tasks;   ///< id → SHA-256 of what the task's page says
   std::map<std::string, std::string> worlds;  ///< name → profile hash
+  // What else decides outcomes; empty in a file of an earlier evac, which is compared without.
+  std::map<std::string, std::string> scenes;       ///< id → SHA-256 of the task's page with all files that it names
+  std::map<std::string, std::string> definitions;  ///< id → SHA-256 of its cameras, stop rule and limits
+  std::map<std::string, std::string> settings;     ///< of the suite: "chunk_size" → "8", "policy.latency" → "off"
   std::vector<PinnedCell> cells;              ///< in the order of (task, world, policy)
   std::string sha256;                         ///< of everything above
 

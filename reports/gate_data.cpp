@@ -1,6 +1,7 @@
 #include "reports/gate_data.h"
 
 #include "core/hash.h"
+#include "core/run_extent.h"
 
 namespace evac {
 
@@ -14,6 +15,9 @@ std::string DataHash(const RunData& data) {
     }
     text += "\n";
   }
+  // What was decided of a part without knowing it (by an earlier evac, say) does not stand for what is known to be one.
+  if (const RunExtent extent = ExtentOf(data.plan, data.episodes); extent.missing > 0)
+    text += "of " + std::to_string(extent.planned) + "\n";
   return Sha256Hex(text);
 }
 

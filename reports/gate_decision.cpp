@@ -106,6 +106,13 @@ const char* Name(GateOutcome outcome) {
 
 std::string GateDecision::Key() const { return Sha256Hex(rules_hash + "\n" + baseline_hash + "\n" + data_hash); }
 
+int GravityOf(const ShownGate& gate) {
+  const GateOutcome outcome = gate.decision.outcome;
+  if (outcome == GateOutcome::kFail) return gate.is_current ? 4 : 3;
+  if (outcome == GateOutcome::kInconclusive) return 2;
+  return gate.is_current ? 0 : 1;
+}
+
 std::vector<ShownGate> LastGates(const std::vector<GateRecord>& records, const std::string& data_hash) {
   std::map<std::string, const GateRecord*> last;
   for (const GateRecord& record : records) last[record.gate] = &record;

@@ -62,6 +62,10 @@ struct ShownGate {
   GateDecision decision;
   bool is_current = false;  ///< false: the run has changed since, and the decision speaks of older data
 };
+/// The graver, the sooner a reader must hear of it: fail, inconclusive, pass of older data, pass; of fails those of older
+/// data come second.
+int GravityOf(const ShownGate& gate);
+
 /// The last decision of each gate, in the order of their names. @param data_hash  of the run as it is.
 std::vector<ShownGate> LastGates(const std::vector<GateRecord>& records, const std::string& data_hash);
 

@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "core/error.h"
+#include "core/run_extent.h"
 #include "core/statistics/inverted_interval.h"
 #include "core/statistics/planning.h"
 #include "core/statistics/sequential.h"
@@ -203,11 +204,34 @@ void CompareUnpaired(const GateRule& rule, const GateSides& sides, Evidence& evi
   evidence.more = MoreTrials(rule, here, there);
 }
 
+/// Of what the suite asks for, the part that the rule is about.
+RunExtent ExtentOfRule(const GateRule& rule, const RunSummary& run, const std::string& world) {
+  return ExtentOf(run.data.plan, run.data.episodes, [&](const PlannedEpisodes& one) {
+    const bool is_meant = one.world == world || (rule.test == GateTest::kCorrelation && one.world == run.reference);
+    return is_meant && (rule.task.empty() || one.task == rule.task) &&
+           (rule.policy.empty() || PolicyLabel(one.policy, one.checkpoint) == rule.policy);
+  });
+}
+
+/// A run that is not whole is no sample of itself: tasks, worlds and policies have their turns one after another. A bet
+/// may be looked at while it runs; of errors there may be too many already, whatever comes.
+void BlockPart(const GateRule& rule, const GateInput& input, const GateSides& sides, Evidence& evidence) {
+  if (rule.test == GateTest::kSavi) return;
+  const RunExtent extent = ExtentOfRule(rule, input.run, sides.world);
+  if (extent.missing == 0) return;
+  const double errors = static_cast<double>(sides.candidate.errors), planned = static_cast<double>(extent.planned);
+  if (evidence.counted == GateOutcome::kFail && errors > *rule.at_most * planned) return;
+  evidence.counted.reset();
+  evidence.blocked =
+      fmt::format("{} of {} are there", extent.planned - extent.missing, Counted(extent.planned, "episode"));
+  evidence.more = "The run is not whole: evac resume runs the others, evac merge adds those of other shards.";
+}
+
 /// What stands before any test.
 void Block(const GateRule& rule, const GateSides& sides, Evidence& evidence) {
   const GateSide& side = sides.candidate;
   const double share = side.episodes > 0 ? static_cast<double>(side.errors) / static_cast<double>(side.episodes) : 0;
-  if (share > rule.max_error_share) {
+  if (!evidence.counted && share > rule.max_error_share) {
     evidence.blocked = fmt::format("{} of {} episodes ({}) could not go on, more than {}", side.errors, side.episodes,
                                    Percent(share), Percent(rule.max_error_share));
     evidence.more = "Mend what failed and run those again (evac resume --retry-failed).";
@@ -238,7 +262,8 @@ Evidence Examine(const GateRule& rule, const GateInput& input) {
   } else {
     ExamineQuality(rule, input.run, sides, evidence);
   }
-  if (!evidence.counted) Block(rule, sides, evidence);
+  BlockPart(rule, input, sides, evidence);
+  if (evidence.blocked.empty()) Block(rule, sides, evidence);
   return evidence;
 }
 

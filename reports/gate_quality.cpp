@@ -5,6 +5,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
+#include <set>
+#include <utility>
 
 #include "core/error.h"
 #include "core/statistics/confusion.h"
@@ -27,18 +30,20 @@ struct Held {
   bool is_ceiling = false;  ///< good is below
   const char* unit = "episodes";
   double least_p = 0;  ///< less cannot be shown, however far the interval is
+  std::optional<std::int64_t> units = {};  ///< how many of `unit` the interval rests on; none: as many as the value
 };
 
 /// From how many on the interval would clear the threshold with power, if the value stays.
 std::string MoreOf(const Held& held, double alpha) {
-  if (!held.value.value || !held.value.interval || held.value.n == 0) return "";
+  const std::int64_t units = held.units.value_or(held.value.n);
+  if (!held.value.value || !held.value.interval || units == 0) return "";
   const double value = *held.value.value, distance = std::abs(value - held.threshold);
   if (distance < kTooNear) return "The value is at the threshold: no number of episodes decides.";
   const bool is_good = held.is_ceiling ? value < held.threshold : value > held.threshold;
   const double width =
       is_good == held.is_ceiling ? held.value.interval->high - value : value - held.value.interval->low;
   const double ratio = width / distance * (1 + NormalQuantile(kPower) / NormalQuantile(1 - alpha));
-  const double more = std::ceil(static_cast<double>(held.value.n) * (ratio * ratio - 1));
+  const double more = std::ceil(static_cast<double>(units) * (ratio * ratio - 1));
   return fmt::format("If the value stays as seen: about {} more {}.", std::max(1.0, more), held.unit);
 }
 
@@ -116,8 +121,8 @@ void HoldCorrelation(const GateRule& rule, const RunSummary& run, const GateSide
             : rule.metric == "spearman" ? group.spearman
                                         : group.mmrv,
             [](double) -> Defined<Interval> { return Undefined{"not resampled"}; },
-            rule.at_most.value_or(rule.at_least.value_or(0)), rule.metric == "mmrv",
-            "(task, policy) points or initial states"};
+            rule.at_most.value_or(rule.at_least.value_or(0)), rule.metric == "mmrv", "initial states"};
+  held.units = evidence.initial_states = InitialStatesOf(by_state);  // what is resampled
   std::string dropped;
   if (held.value.value) {  // the same draws as the report's, at the confidence that is asked
     const PairedBootstrap bootstrap = PairedStateBootstrap(by_state, group.options.convention, group.options.bootstrap);
@@ -135,7 +140,6 @@ void HoldCorrelation(const GateRule& rule, const RunSummary& run, const GateSide
   held.value.interval = held.interval(held.value.confidence);
   if (!held.value.interval) dropped.clear();  // its reason says it
   RuleDecision& decision = evidence.decision;
-  evidence.initial_states = InitialStatesOf(by_state);
   for (const PairTable& table : comparison.tables) {
     if (rule.task.empty() || table.task == rule.task) decision.states += table.Counted();
   }
@@ -184,9 +188,13 @@ std::string JudgeAgainst(const GateRule& rule, const RunSummary& run) {
   } catch (const Error& error) {
     throw InvalidInput("gate rule '{}': against: {}", rule.name, error.what());
   }
-  if (std::ranges::find(run.judges, full) != run.judges.end()) return full;
-  throw InvalidInput("gate rule '{}': against: found '{}', wanted a judge of the run: {}", rule.name, rule.against,
-                     fmt::join(run.judges, ", "));
+  if (std::ranges::find(run.judges, full) == run.judges.end())
+    throw InvalidInput("gate rule '{}': against: found '{}', wanted a judge of the run: {}", rule.name, rule.against,
+                       fmt::join(run.judges, ", "));
+  if (IsCounted(full, run.options.judge))
+    throw InvalidInput("gate rule '{}': against: found '{}', wanted another than the rules' own judge, {}", rule.name,
+                       full, run.options.judge);
+  return full;
 }
 
 void HoldKappa(const GateRule& rule, const RunSummary& run, const GateSides& sides, Evidence& evidence) {
@@ -223,15 +231,26 @@ void HoldKappa(const GateRule& rule, const RunSummary& run, const GateSides& sid
       against);
 }
 
+/// Each (task, initial state) once that was tried, whatever became of it.
+std::int64_t StatesTried(const GateSide& side) {
+  std::set<std::pair<std::string, std::string>> states;
+  for (const PinnedCell* cell : side.cells) {
+    for (const PinnedOutcome& one : cell->outcomes) states.insert({cell->task, one.initial_state});
+  }
+  return std::ssize(states);
+}
+
 /// A fact of this run, not a sample of others: no test.
 void CountErrors(const GateRule& rule, const GateSides& sides, Evidence& evidence) {
   const GateSide& side = sides.candidate;
   const double share = static_cast<double>(side.errors) / static_cast<double>(side.episodes);
   evidence.decision.value = ClopperPearsonInterval(side.errors, side.episodes, 1 - 2 * rule.alpha);
   evidence.decision.states = side.episodes;
+  evidence.initial_states = StatesTried(side);
   evidence.decision.p = Undefined{"errors are counted, not tested"};
-  evidence.decision.statement = fmt::format("{} of {} of {} ({}) could not go on", side.errors,
-                                            Counted(side.episodes, "episode"), side.policy, Percent(share));
+  evidence.decision.statement = fmt::format("{} of {}{} ({}) could not go on", side.errors,
+                                            Counted(side.episodes, "episode"),
+                                            side.policy.empty() ? "" : " of " + side.policy, Percent(share));
   evidence.good = "at most " + Percent(*rule.at_most);
   evidence.bad = "more than " + Percent(*rule.at_most);
   evidence.counted = share <= *rule.at_most ? GateOutcome::kPass : GateOutcome::kFail;

@@ -6,6 +6,8 @@
 #include <algorithm>
 #include <array>
 
+#include "core/hash.h"
+
 namespace evac {
 namespace {
 
@@ -142,7 +144,8 @@ GateRules ReadGateRules(const Config& page) {
   }
   if (rules.rules.empty())
     throw InvalidInput("{}: field gates: found no rule, wanted at least one", page.file().string());
-  rules.hash = page.ContentHash();
+  // The name that decisions are kept under is among what a file means, also where it is only called so.
+  rules.hash = page.Has("name") ? page.ContentHash() : Sha256Hex(page.ContentHash() + "\n" + rules.name);
   return rules;
 }
 

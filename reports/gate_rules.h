@@ -34,13 +34,14 @@ struct GateRule {
   std::string policy;           ///< "name@checkpoint"; empty: the run's only one, for the last three tests all of them;
                                 ///< always empty for correlation
   std::string baseline_policy;  ///< empty: the same name if the baseline has it, else its only one
-  std::string against = "human";  ///< judge_kappa: the other judge
+  std::string against = "human";  ///< judge_kappa: the other judge, none of those that `judge` names
   bool is_paired = true;          ///< noninferiority; the other tests say it themselves
   double alpha = 0.05;            ///< risk of a false "fail" (after the correction) and of a false "pass", in (0, 0.5)
   double margin = 0.1;            ///< how much worse is not worse, in (0, 1)
   std::optional<double> at_least, at_most;
-  int min_states = 0;          ///< fewer (task, initial state) that count, whatever the seeds: inconclusive
-  double max_error_share = 1;  ///< more errors among the episodes: inconclusive
+  int min_states = 0;          ///< fewer (task, initial state) that count, whatever the seeds: inconclusive; of
+                               ///< error_share all that were tried count
+  double max_error_share = 1;  ///< more errors among the episodes: inconclusive; error_share has at_most for it
   OnInconclusive on_inconclusive = OnInconclusive::kWarn;
 
   /// Whether it holds the candidate against a baseline, and whether state by state.
@@ -55,7 +56,7 @@ struct GateRules {
   std::string judge = "oracle";
   GateCorrection correction = GateCorrection::kHolm;  ///< of the failing p-values over the rules
   std::vector<GateRule> rules;
-  std::string hash;  ///< SHA-256 of what the file means, whatever its layout and comments
+  std::string hash;  ///< SHA-256 of what the file means, its name too where it says none, whatever layout and comments
 };
 
 /// @throws InvalidInput naming file, line, field, what was found and what was wanted.

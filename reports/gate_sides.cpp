@@ -6,10 +6,12 @@
 #include <algorithm>
 #include <map>
 #include <set>
+#include <sstream>
 #include <tuple>
 #include <utility>
 
 #include "core/error.h"
+#include "reports/counted_judges.h"
 
 namespace evac {
 namespace {
@@ -36,10 +38,11 @@ std::string BaselinePolicy(const GateRule& rule, const std::string& candidate, c
   return Chosen(same_name ? candidate : rule.baseline_policy, known, what + "baseline_policy");
 }
 
+/// @param world, policy  empty: any
 GateSide SideOf(const PinnedResult& result, const GateRule& rule, const std::string& world, const std::string& policy) {
   GateSide side{policy, {}, 0, 0};
   for (const PinnedCell& cell : result.cells) {
-    if ((!policy.empty() && cell.policy != policy) || cell.world != world ||
+    if ((!policy.empty() && cell.policy != policy) || (!world.empty() && cell.world != world) ||
         (!rule.task.empty() && cell.task != rule.task))
       continue;
     side.cells.push_back(&cell);
@@ -81,23 +84,59 @@ void DemandSame(const std::string& found, const std::string& wanted, const std::
   if (found != wanted) throw InvalidInput("{}: found {}, wanted the baseline's, {}", what, found, wanted);
 }
 
+void DemandKnown(const std::string& name, const std::map<std::string, std::string>& of_baseline,
+                 const std::string& what) {
+  if (!of_baseline.contains(name))
+    throw InvalidInput("{}: found '{}', which the baseline has not, wanted one of: {}", what, name,
+                       fmt::join(Keys(of_baseline), ", "));
+}
+
+void DemandJudge(const std::string& judge, const PinnedResult& baseline, const std::string& what) {
+  if (judge != baseline.judge)
+    throw InvalidInput("{}judge: found {}, wanted the baseline's, {}: `evac gate pin --judge` pins another's verdicts",
+                       what, judge, baseline.judge);
+}
+
+/// In full, where the baseline's judges are those whom the rules' names stand for.
+std::string FullName(const std::string& judge, const PinnedResult& baseline) {
+  std::vector<std::string> there;
+  std::istringstream names(baseline.judge);
+  for (std::string name; std::getline(names, name, ',');) there.push_back(name);
+  std::ranges::sort(there);
+  return FullJudgeNames(judge, there);
+}
+
 /// Unpaired, tasks are not kept apart: an easier one would pass for a better policy.
-void DemandOneTask(const GateSides& sides, const std::string& what) {
-  for (const auto& [side, where] : {std::pair{&sides.candidate, ""}, std::pair{&sides.baseline, " in the baseline"}}) {
-    if (side->cells.size() > 1)
-      throw InvalidInput("{}task: found {} tasks{}, wanted one: unpaired tasks pooled can say the opposite of each",
-                         what, side->cells.size(), where);
-  }
-  DemandSame(sides.candidate.cells.front()->task, sides.baseline.cells.front()->task, what + "task");
+void DemandOneTask(const GateSide& side, const std::string& where, const std::string& what) {
+  if (side.cells.size() > 1)
+    throw InvalidInput("{}task: found {} tasks{}, wanted one: unpaired tasks pooled can say the opposite of each", what,
+                       side.cells.size(), where);
+}
+
+/// Of what both know: a baseline of an earlier evac lacks some.
+void DemandSameIfKnown(const std::string& key, const std::map<std::string, std::string>& found,
+                       const std::map<std::string, std::string>& wanted, const std::string& what) {
+  const auto here = found.find(key), there = wanted.find(key);
+  if (here != found.end() && there != wanted.end()) DemandSame(here->second, there->second, what);
 }
 
 void DemandComparable(const GateSides& sides, const GateRule& rule, const GateData& data, const std::string& what) {
-  if (!rule.ComparesPairs()) DemandOneTask(sides, what);
+  if (!rule.ComparesPairs()) {
+    DemandOneTask(sides.candidate, "", what);
+    DemandOneTask(sides.baseline, " in the baseline", what);
+    DemandSame(sides.candidate.cells.front()->task, sides.baseline.cells.front()->task, what + "task");
+  }
   for (const PinnedCell* cell : sides.candidate.cells) {
     if (data.baseline->tasks.contains(cell->task))
       DemandSame(data.candidate.tasks.at(cell->task), data.baseline->tasks.at(cell->task),
                  what + "page of task " + cell->task);
+    DemandSameIfKnown(cell->task, data.candidate.scenes, data.baseline->scenes,
+                      what + "the page of task " + cell->task + " with all files that it names");
+    DemandSameIfKnown(cell->task, data.candidate.definitions, data.baseline->definitions,
+                      what + "cameras, stop rule and limits of task " + cell->task);
   }
+  for (const auto& [name, value] : data.candidate.settings)
+    DemandSameIfKnown(name, data.candidate.settings, data.baseline->settings, what + "the suite's " + name);
   if (!rule.ComparesPairs()) return;
   const std::string& world = sides.world;
   DemandSame(data.candidate.worlds.at(world), data.baseline->worlds.at(world), what + "profile of world " + world);
@@ -159,18 +198,32 @@ GateSides SidesOf(const GateRule& rule, const GateData& data) {
                        rule.task.empty() ? "" : " on task '" + rule.task + "'", sides.world);
   if (!rule.Compares()) return sides;
   if (!data.baseline) throw InvalidInput("{}baseline: found none, wanted --baseline RUN or PINNED.json", what);
-  if (!data.baseline->worlds.contains(sides.world))
-    throw InvalidInput("{}world: found '{}', which the baseline has not, wanted one of: {}", what, sides.world,
-                       fmt::join(Keys(data.baseline->worlds), ", "));
-  if (data.candidate.judge != data.baseline->judge)
-    throw InvalidInput("{}judge: found {}, wanted the baseline's, {}: `evac gate pin --judge` pins another's verdicts",
-                       what, data.candidate.judge, data.baseline->judge);
+  DemandKnown(sides.world, data.baseline->worlds, what + "world");
+  DemandJudge(data.candidate.judge, *data.baseline, what);
   const std::string other = BaselinePolicy(rule, policy, data.baseline->Policies(), what);
   sides.baseline = SideOf(*data.baseline, rule, sides.world, other);
   if (sides.baseline.cells.empty())
     throw InvalidInput("{}found no episode of {} in {} in the baseline, wanted some", what, other, sides.world);
   DemandComparable(sides, rule, data, what);
   return sides;
+}
+
+void DemandSideOf(const GateRule& rule, const std::string& judge, const PinnedResult& baseline) {
+  const std::string what = fmt::format("gate rule '{}': ", rule.name);
+  DemandJudge(FullName(judge, baseline), baseline, what);
+  if (!rule.task.empty()) DemandKnown(rule.task, baseline.tasks, what + "task");
+  const bool has_one_world = rule.world.empty() && baseline.worlds.size() == 1;
+  const std::string world = has_one_world ? baseline.worlds.begin()->first : rule.world;
+  if (!world.empty()) DemandKnown(world, baseline.worlds, what + "world");
+  const std::vector<std::string> known = baseline.Policies();
+  const bool is_open = rule.policy.empty() && rule.baseline_policy.empty() && known.size() > 1;  // as the candidate's
+  const std::string policy = is_open ? "" : BaselinePolicy(rule, rule.policy, known, what);
+  const GateSide side = SideOf(baseline, rule, world, policy);
+  if (side.cells.empty())
+    throw InvalidInput("{}found no episode of {}{}{} in the baseline, wanted some", what,
+                       policy.empty() ? "any policy" : policy, rule.task.empty() ? "" : " on task '" + rule.task + "'",
+                       world.empty() ? "" : " in " + world);
+  if (!rule.ComparesPairs() && !world.empty() && !policy.empty()) DemandOneTask(side, " in the baseline", what);
 }
 
 GatePairs PairUp(const GateSides& sides, const GateData& data) {

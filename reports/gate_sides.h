@@ -31,10 +31,17 @@ struct GateSides {
 };
 
 /// @throws InvalidInput naming the rule: a policy, world or task that is not there or is not named where there are
-/// several; no baseline; another task page than the baseline's; for pairs another list of initial states or another
+/// several; no baseline; another task page than the baseline's, or another scene, stop rule, picture size, chunk size
+/// or latency, as far as both sides know theirs (PinnedResult); for pairs another list of initial states or another
 /// world profile (a sequential rule may have seen only a part of its states yet); without pairs more than one task on
 /// either side, or not the same.
 GateSides SidesOf(const GateRule& rule, const GateData& data);
+
+/// Of a rule that compares, before there is a candidate: what SidesOf would refuse of the baseline whatever that is.
+/// @param judge  the rules', which may stand for the baseline's full name
+/// @throws InvalidInput naming the rule: another judge; a task, world or policy that the baseline has not, or no policy
+/// of several; no episode of these; more than one task where none is paired.
+void DemandSideOf(const GateRule& rule, const std::string& judge, const PinnedResult& baseline);
 
 /// The states that count on both sides. "First" is the candidate: flips.only_first are for the better.
 struct GatePairs {

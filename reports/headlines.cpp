@@ -4,7 +4,9 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
+#include <functional>
 
+#include "core/run_extent.h"
 #include "reports/counted_judges.h"
 #include "reports/wording.h"
 
@@ -20,10 +22,12 @@ std::string TagOf(const Estimate& difference, const Number& p) {
   return *difference.value < 0 ? "worse" : "better";
 }
 
-/// What gates decided: they were asked this very question.
+/// What gates decided, the gravest first: they were asked this very question.
 std::vector<HeadlineItem> GateItems(const ReportData& report) {
+  std::vector<ShownGate> gates = report.gates;
+  std::ranges::stable_sort(gates, std::ranges::greater(), GravityOf);
   std::vector<HeadlineItem> items;
-  for (const ShownGate& gate : report.gates) {
+  for (const ShownGate& gate : gates) {
     const std::string& judge = gate.decision.judge;
     std::string text = "gate " + gate.decision.name;
     if (!judge.empty() && judge != report.summary.options.judge) text += fmt::format(" (judge {})", JudgeWords(judge));
@@ -164,6 +168,11 @@ Headline Trusted(const ReportData& report) {
 }
 
 void AddMissing(const RunSummary& summary, std::vector<HeadlineItem>& items) {
+  if (const RunExtent extent = ExtentOf(summary.data.plan, summary.data.episodes); extent.missing > 0)
+    items.push_back({"",
+                     fmt::format("{} of {} not there yet: evac resume RUN, or evac merge with the other shards",
+                                 extent.missing, Counted(extent.planned, "episode is", "episodes are")),
+                     ""});
   if (const auto unjudged = summary.Count(Outcome::kUnjudged); unjudged > 0) {
     const std::string with_small = CountedWithSmall(summary);
     const std::string commands =

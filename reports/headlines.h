@@ -21,7 +21,7 @@ struct Headline {
   std::vector<HeadlineItem> items;  ///< never empty
 };
 
-/// Always four, in the order above.
+/// Always four, in the order above; decisions of gates come first in the first of them, the gravest before the others.
 std::vector<Headline> HeadlinesOf(const ReportData& report);
 
 }  // namespace evac

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <map>
 #include <optional>
+#include <set>
+#include <utility>
 
 #include "core/statistics/rate_difference.h"
 #include "core/statistics/rater_agreement.h"
@@ -17,14 +19,36 @@ bool Says(const std::vector<std::string>& judges, const std::string& name) {
 }
 
 /// People before the simulator's physics, that before any other.
+constexpr const char* kBestFirst[] = {"human", "oracle"};
+
 std::string TruthOf(const RunSummary& summary) {
-  for (const char* name : {"human", "oracle"}) {
+  for (const char* name : kBestFirst) {
     if (Says(summary.judges, name)) return name;
   }
   return LastJudge(summary.options.judge);
 }
 
 bool Decides(const Verdict& verdict) { return verdict.label == Label::kSuccess || verdict.label == Label::kFailure; }
+
+/// Of each world. People who looked at a few clips of one take nothing away from the oracle in another.
+std::map<std::string, std::string> TruthByWorld(const RunSummary& summary, const std::string& of_run) {
+  std::set<std::pair<std::string, std::string>> deciding;  // world, judge
+  for (const Episode& episode : summary.data.episodes) {
+    const auto verdicts = summary.data.verdicts.find(episode.key.Id());
+    if (verdicts == summary.data.verdicts.end()) continue;
+    for (const char* name : kBestFirst) {
+      const auto own = verdicts->second.find(name);
+      if (own != verdicts->second.end() && Decides(own->second)) deciding.emplace(episode.key.world, name);
+    }
+  }
+  std::map<std::string, std::string> truths;
+  for (const WorldInfo& world : summary.data.worlds) {
+    const auto best = std::ranges::find_if(
+        kBestFirst, [&](const char* name) { return deciding.contains({world.name, name}); });
+    truths[world.name] = best == std::end(kBestFirst) ? of_run : *best;
+  }
+  return truths;
+}
 
 /// What a judge and the truth said of the episodes of one world.
 struct Said {
@@ -103,16 +127,35 @@ void AddRaters(const RunSummary& summary, JudgeReport& report) {
 JudgeReport JudgesOf(const RunSummary& summary) {
   JudgeReport report;
   report.truth = TruthOf(summary);
+  const std::map<std::string, std::string> truths = TruthByWorld(summary, report.truth);
   for (const std::string& judge : summary.judges) {
     if (judge == report.truth) continue;
     if (report.truth == "human" && judge.starts_with("human:")) continue;  // their own votes are in it: alpha is theirs
     for (const WorldInfo& world : summary.data.worlds) {
-      JudgeAgreement agreement = AgreementOf(summary, judge, report.truth, world.name);
+      const std::string& best = truths.at(world.name);
+      JudgeAgreement agreement = AgreementOf(summary, judge, judge == best ? report.truth : best, world.name);
       if (agreement.judged > 0) report.judges.push_back(std::move(agreement));
     }
   }
   AddRaters(summary, report);
   return report;
+}
+
+std::string HeldAgainst(const JudgeReport& report) {
+  std::vector<std::pair<std::string, std::string>> worlds;  // its best
+  for (const JudgeAgreement& judge : report.judges) {
+    const auto world = std::ranges::find(worlds, judge.world, &std::pair<std::string, std::string>::first);
+    if (world == worlds.end()) {
+      worlds.emplace_back(judge.world, judge.against);
+    } else if (judge.against != report.truth) {
+      world->second = judge.against;
+    }
+  }
+  const bool is_one = std::ranges::all_of(worlds, [&](const auto& world) { return world.second == worlds[0].second; });
+  if (is_one) return worlds.empty() ? report.truth : worlds[0].second;
+  std::string text;
+  for (const auto& [world, best] : worlds) text += (text.empty() ? "" : ", ") + best + " in " + world;
+  return text;
 }
 
 }  // namespace evac

@@ -10,7 +10,8 @@
 #include "reports/summary.h"
 
 /// How far each judge may be believed: against the best judge there is, in each world, since a judge that reads real
-/// videos well may misread imagined ones (docs/statistics.md).
+/// videos well may misread imagined ones (docs/statistics.md). The best of a world is people where they told an outcome
+/// there, else the oracle where it did, else the best of the run.
 namespace evac {
 
 /// One judge in one world.
@@ -26,14 +27,21 @@ struct JudgeAgreement {
 };
 
 struct JudgeReport {
-  std::string truth;                   ///< "human" where people judged, else "oracle", else the judge that is counted
+  std::string truth;                   ///< the run's: "human" where people judged any episode, else "oracle", else the
+                                       ///< judge that is counted
   std::vector<JudgeAgreement> judges;  ///< every judge but the truth, and raters where people are it, by judge and world;
-                                       ///< those that spoke there
+                                       ///< those that spoke there. The best of a world that is not the run's is held
+                                       ///< against the run's, which told nothing there: it is not calibrated
   std::vector<std::string> raters;     ///< "human:anna", …
-  Number alpha = Undefined{"fewer than two human raters"};  ///< Krippendorff's, nominal, over the raters
-  std::int64_t rated_twice = 0;                             ///< episodes that two or more raters judged
+  /// Krippendorff's, nominal, over the raters, of success and failure alone; a rating session's board counts "cannot
+  /// tell" as a third answer.
+  Number alpha = Undefined{"fewer than two human raters"};
+  std::int64_t rated_twice = 0;  ///< episodes that two or more raters called one of the two
 };
 
 JudgeReport JudgesOf(const RunSummary& summary);
+
+/// "human"; where worlds differ, "human in real, oracle in sim".
+std::string HeldAgainst(const JudgeReport& report);
 
 }  // namespace evac

@@ -27,11 +27,10 @@ struct Contestant {
   Outcomes outcomes;
 };
 
-/// Two contestants of one place, and the p-value of "they succeed equally often".
+/// Two contestants of one place.
 struct Contest {
   std::size_t first = 0, second = 0;
-  double p = 1;
-  std::string unpaired_test;  ///< empty: paired
+  PolicyContest told;
 };
 
 /// The pairs of each initial state, so that its repeats do not count as if they were new.
@@ -64,15 +63,43 @@ std::vector<Count> TrialsByState(const Outcomes& outcomes) {
   return states;
 }
 
+void TestPairs(const std::vector<PairedOutcomes>& states, PolicyContest& contest) {
+  const PairedOutcomes effective = EffectivePairs(states);
+  contest.is_paired = true;
+  contest.test = "exact McNemar";
+  contest.shared = {contest.pairs.pairs, effective.pairs};
+  contest.first_leads = contest.pairs.flips.only_first > contest.pairs.flips.only_second;
+  contest.p = McNemarExact(effective.flips).p_exact;
+}
+
+void TestTwoSamples(const Outcomes& a, const Outcomes& b, PolicyContest& contest) {
+  const std::vector<Count> one = TrialsByState(a), two = TrialsByState(b);
+  const TwoSampleTest test = BoschlooOrNewcombe(one, two);
+  contest.test = test.method;
+  contest.first_episodes = {std::ssize(a), EffectiveCount(one).trials};
+  contest.second_episodes = {std::ssize(b), EffectiveCount(two).trials};
+  contest.first_leads = test.greater < test.less;
+  contest.p = test.two_sided;
+}
+
 Contest ContestOf(const std::vector<Contestant>& contestants, std::size_t first, std::size_t second) {
   const Outcomes &a = contestants[first].outcomes, &b = contestants[second].outcomes;
   const std::vector<PairedOutcomes> states = PairsByState(a, b);
-  std::int64_t shared = 0;
-  for (const PairedOutcomes& state : states) shared += state.pairs;
-  if (static_cast<double>(shared) >= kPairedFrom * static_cast<double>(std::max(a.size(), b.size())))
-    return {first, second, McNemarExact(EffectivePairs(states).flips).p_exact, ""};
-  const TwoSampleTest test = BoschlooOrNewcombe(TrialsByState(a), TrialsByState(b));
-  return {first, second, test.two_sided, test.method};
+  const RateCell& cell = *contestants[first].cell;
+  Contest contest{first, second, {}};
+  PolicyContest& told = contest.told;
+  told.world = cell.world;
+  told.task = cell.task;
+  told.first = cell.policy;
+  told.second = contestants[second].cell->policy;
+  told.pairs = SumOf(states);
+  told.shared_states = std::ssize(states);
+  if (static_cast<double>(told.pairs.pairs) >= kPairedFrom * static_cast<double>(std::max(a.size(), b.size()))) {
+    TestPairs(states, told);
+  } else {
+    TestTwoSamples(a, b, told);
+  }
+  return contest;
 }
 
 std::map<Place, std::vector<Contestant>> ContestantsOf(const std::vector<JudgedEpisode>& episodes,
@@ -120,32 +147,42 @@ std::vector<Contest> ContestsOf(const std::vector<Contestant>& contestants) {
   return contests;
 }
 
+using ContestsByTask = std::map<std::string, std::vector<Contest>>;
+
+void AdjustOverTasks(ContestsByTask& tasks) {
+  std::vector<double> p_values;
+  for (const auto& [task, contests] : tasks) {
+    for (const Contest& contest : contests) p_values.push_back(contest.told.p);
+  }
+  const std::vector<double> adjusted = HolmAdjusted(p_values);
+  auto p = adjusted.begin();
+  for (auto& [task, contests] : tasks) {
+    for (Contest& contest : contests) contest.told.p_holm = *p++;
+  }
+}
+
 }  // namespace
 
 LetterTests GiveLetters(const std::vector<JudgedEpisode>& episodes, double alpha, std::vector<RateCell>& cells) {
   std::map<Place, std::vector<Contestant>> places = ContestantsOf(episodes, cells);
-  std::map<std::string, std::map<std::string, std::vector<Contest>>> worlds;  // world, task
+  std::map<std::string, ContestsByTask> worlds;
   for (auto& [place, contestants] : places) {
     SortByRate(contestants);
     worlds[place.first][place.second] = ContestsOf(contestants);
   }
   LetterTests tests;
-  for (const auto& [world, tasks] : worlds) {
-    std::vector<double> p_values;
-    for (const auto& [task, contests] : tasks) {
-      for (const Contest& contest : contests) {
-        p_values.push_back(contest.p);
-        if (!contest.unpaired_test.empty()) tests.unpaired_tests.insert(contest.unpaired_test);
-      }
-    }
-    const std::vector<double> adjusted = HolmAdjusted(p_values);
-    tests.pairs = std::max(tests.pairs, static_cast<std::int64_t>(adjusted.size()));
-    auto p = adjusted.begin();
+  for (auto& [world, tasks] : worlds) {
+    AdjustOverTasks(tasks);
+    std::int64_t family = 0;
     for (const auto& [task, contests] : tasks) {
       std::vector<std::pair<std::size_t, std::size_t>> significant;
       for (const Contest& contest : contests) {
-        if (*p++ <= alpha) significant.emplace_back(contest.first, contest.second);
+        ++family;
+        tests.contests.push_back(contest.told);
+        if (!contest.told.is_paired) tests.unpaired_tests.insert(contest.told.test);
+        if (contest.told.p_holm <= alpha) significant.emplace_back(contest.first, contest.second);
       }
+      tests.pairs = std::max(tests.pairs, family);
       const std::vector<Contestant>& contestants = places.at({world, task});
       if (contests.empty()) continue;  // nobody to differ from
       const std::vector<std::string> letters = CompactLetters(contestants.size(), significant);

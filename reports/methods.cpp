@@ -129,9 +129,9 @@ std::string Judges(const ReportData& report) {
   for (const JudgeAgreement& judge : report.judges.judges) calibrated += judge.IsCalibrated();
   if (report.summary.judges.size() < 2) return "No second judge was consulted. ";
   return fmt::format(
-      "Judges were held against {} per world by Cohen’s kappa with the standard error of Fleiss, Cohen and Everitt, "
+      "Judges were held against {}, per world, by Cohen’s kappa with the standard error of Fleiss, Cohen and Everitt, "
       "summed by initial state where it repeats ({}). ",
-      report.judges.truth, Counted(calibrated, "judge and world", "judges and worlds"));
+      HeldAgainst(report.judges), Counted(calibrated, "judge and world", "judges and worlds"));
 }
 
 }  // namespace

@@ -34,7 +34,7 @@ std::string CheckpointsPart(const ReportData& report) {
       html += policy.empty() ? "" : "</div>";
       html += fmt::format("<h3>{}</h3><p class=\"quiet\">{}</p><div class=\"multiples\">", Breakable(curve.policy),
                           curve.has_steps ? "In the order of the numbers that end their names."
-                                          : "In the order of the suite: not all names end with a number.");
+                                          : "In the order of their names, numbers as numbers.");
       policy = curve.policy;
     }
     html += Curve(curve);

@@ -61,9 +61,10 @@ std::string Heading() {
 std::string Raters(const JudgeReport& judges) {
   if (judges.raters.empty()) return "";
   if (judges.raters.size() < 2) return "<p>One human rater: nobody to agree with.</p>";
-  return fmt::format("<p>{} human raters, {} judged by two or more: Krippendorff’s alpha {}.</p>", judges.raters.size(),
-                     Counted(judges.rated_twice, "episode"),
-                     judges.alpha ? Plain(*judges.alpha) : "undefined: " + Escaped(judges.alpha.reason()));
+  return fmt::format(
+      "<p>{} human raters, {} judged by two or more: Krippendorff’s alpha, of success and failure alone, {}.</p>",
+      judges.raters.size(), Counted(judges.rated_twice, "episode"),
+      judges.alpha ? Plain(*judges.alpha) : "undefined: " + Escaped(judges.alpha.reason()));
 }
 
 /// "312 ok, 3 timeout, 1 parse_error"
@@ -110,10 +111,13 @@ std::string JudgesPart(const ReportData& report) {
                            : "") +
            Raters(judges) + Calls(report.summary.data.judge_calls) + "</section>";
   }
+  const std::string against = HeldAgainst(judges);
+  const bool is_one = judges.judges.front().against == against;
   html += fmt::format(
-      "<p class=\"quiet\">Each judge held against <b>{}</b>, world by world. Matrix: both success · only the judge · only "
-      "{} · both failure. In brackets what is believed with {:.0f} %, over other initial states.</p>",
-      Escaped(judges.truth), Escaped(judges.truth), 100 * report.summary.options.confidence);
+      "<p class=\"quiet\">Each judge held against the best there is in its world: <b>{}</b>. Matrix: both success · "
+      "only the judge · only {} · both failure. In brackets what is believed with {:.0f} %, over other initial "
+      "states.</p>",
+      Escaped(against), is_one ? Escaped(against) : "that one", 100 * report.summary.options.confidence);
   html += Heading();
   for (const JudgeAgreement& judge : judges.judges) html += JudgeRow(judge);
   return html + "</tbody></table></div>" + Raters(judges) + Calls(report.summary.data.judge_calls) + "</section>";

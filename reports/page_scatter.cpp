@@ -62,8 +62,8 @@ std::string StatisticsTable(const WorldComparison& comparison) {
                          Plain(*group.ranks.over_range));
   if (group.distance.bias) {
     notes += fmt::format(
-        " Rates in {} are {:+.0f} points off on average, {:.0f} points in size (means over the points, no interval).",
-        Escaped(comparison.other), 100 * *group.distance.bias, 100 * *group.distance.mae);
+        " Rates in {} are {} points off on average, {:.0f} points in size (means over the points, no interval).",
+        Escaped(comparison.other), SignedPoints(*group.distance.bias), 100 * *group.distance.mae);
   }
   return html + "<p class=\"quiet\">" + notes +
          (HasIntervals(comparison)

@@ -186,9 +186,12 @@ std::vector<std::string> Words(const PlanOptions& o, const std::vector<PlanRow>&
                                 Counted(static_cast<std::int64_t>(*raters.value), "rater"),
                                 At(rows, "three_raters_split").shown));
   }
-  words.push_back(fmt::format(
-      "A correlation over fewer than {} policies will not be told from 0, whatever it is in truth up to {:.2f}.",
-      At(rows, "correlation_points").shown, o.correlation));
+  const PlanRow& points = At(rows, "correlation_points");
+  if (points.value) {
+    words.push_back(
+        fmt::format("To tell a correlation of {:.2f} from 0 with {} power takes {} policies; fewer see it less often.",
+                    o.correlation, Percent(o.promise.power), points.shown));
+  }
   return words;
 }
 

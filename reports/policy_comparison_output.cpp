@@ -17,11 +17,10 @@ using Json = nlohmann::ordered_json;
 /// "+30 points [10, 48]".
 std::string Points(const Estimate& difference) {
   if (!difference.value) return "undefined: " + difference.value.reason();
-  const auto points = [](double share) { return fmt::format("{:+.0f}", 100 * share + 0.0); };
   if (!difference.interval)
-    return points(*difference.value) + " points (no interval: " + difference.interval.reason() + ")";
-  return fmt::format("{} points [{}, {}]", points(*difference.value), points(difference.interval->low),
-                     points(difference.interval->high));
+    return SignedPoints(*difference.value) + " points (no interval: " + difference.interval.reason() + ")";
+  return fmt::format("{} points [{}, {}]", SignedPoints(*difference.value), SignedPoints(difference.interval->low),
+                     SignedPoints(difference.interval->high));
 }
 
 /// "0.12", "< 0.001".
@@ -96,25 +95,6 @@ const char* Name(Winner winner) {
   return "not_decided";
 }
 
-Json RowJson(const ComparisonRow& row) {
-  Json json;
-  json["task"] = row.task.empty() ? Json(nullptr) : Json(row.task);
-  json["paired"] = row.is_paired;
-  json["first"] = JsonOf(row.first);
-  json["second"] = JsonOf(row.second);
-  json["difference"] = JsonOf(row.difference);
-  json["episodes"] = {{"first", row.first_episodes}, {"second", row.second_episodes}, {"shared", row.shared}};
-  json["apart"] = {{"first", row.first_apart}, {"second", row.second_apart}};
-  json["flips"] = {{"only_first", row.flips.only_first}, {"only_second", row.flips.only_second}};
-  json["test"] = row.test;
-  Put(json, "p", row.p);
-  Put(json, "p_holm", row.p_holm);
-  json["winner"] = Name(row.winner);
-  json["more"] = row.more ? Json(*row.more) : Json(nullptr);
-  if (!row.more) json["more_reason"] = row.more.reason();
-  return json;
-}
-
 std::string BetsText(const ComparedWorld& compared) {
   if (compared.bets.empty()) return "";
   const double alpha = compared.comparison.options.alpha;
@@ -173,6 +153,25 @@ std::string ComparisonText(const ComparedWorld& compared) {
                      BetsText(compared));
 }
 
+nlohmann::ordered_json JsonOf(const ComparisonRow& row) {
+  Json json;
+  json["task"] = row.task.empty() ? Json(nullptr) : Json(row.task);
+  json["paired"] = row.is_paired;
+  json["first"] = JsonOf(row.first);
+  json["second"] = JsonOf(row.second);
+  json["difference"] = JsonOf(row.difference);
+  json["episodes"] = {{"first", row.first_episodes}, {"second", row.second_episodes}, {"shared", row.shared}};
+  json["apart"] = {{"first", row.first_apart}, {"second", row.second_apart}};
+  json["flips"] = {{"only_first", row.flips.only_first}, {"only_second", row.flips.only_second}};
+  json["test"] = row.test;
+  Put(json, "p", row.p);
+  Put(json, "p_holm", row.p_holm);
+  json["winner"] = Name(row.winner);
+  json["more"] = row.more ? Json(*row.more) : Json(nullptr);
+  if (!row.more) json["more_reason"] = row.more.reason();
+  return json;
+}
+
 nlohmann::ordered_json ComparisonJson(const ComparedWorld& compared) {
   const PolicyComparison& comparison = compared.comparison;
   Json json = {{"world", compared.world},
@@ -186,8 +185,8 @@ nlohmann::ordered_json ComparisonJson(const ComparedWorld& compared) {
                {"winner", Name(comparison.all.winner)},
                {"statement", DecisionOf(comparison)}};
   json["tasks"] = Json::array();
-  for (const ComparisonRow& row : comparison.tasks) json["tasks"].push_back(RowJson(row));
-  json["all_tasks"] = RowJson(comparison.all);
+  for (const ComparisonRow& row : comparison.tasks) json["tasks"].push_back(JsonOf(row));
+  json["all_tasks"] = JsonOf(comparison.all);
   json["all_tasks"]["left_out"] = comparison.left_out;
   json["sequential"] = Json::array();
   for (const BetState& bet : compared.bets) {

@@ -19,7 +19,7 @@ struct BetState {
   int looks = 0;
 };
 
-/// One world's comparison, and with --sequential its bets (all tasks last), else none.
+/// One world's comparison, and with --sequential its bets (of what has pairs, all tasks last), else none.
 struct ComparedWorld {
   std::string world, judge;
   PolicyComparison comparison;
@@ -31,6 +31,8 @@ struct ComparedWorld {
 /// A sentence, then the table.
 std::string ComparisonText(const ComparedWorld& compared);
 nlohmann::ordered_json ComparisonJson(const ComparedWorld& compared);
+/// One task, or all of them, as ComparisonJson has it in "tasks" and "all_tasks".
+nlohmann::ordered_json JsonOf(const ComparisonRow& row);
 
 /// "visual_pick@good is better: 85 % against 55 %, +30 points [10, 48], p = 0.03 (exact McNemar, 20 pairs)."
 std::string DecisionOf(const PolicyComparison& comparison);

@@ -100,6 +100,7 @@ ReportData ReportDataOf(RunSummary summary, const ReportOptions& options) {
   report.summary = std::move(summary);
   report.letters =
       GiveLetters(report.summary.episodes, 1 - report.summary.options.confidence, report.summary.rates);
+  report.summary.contests = report.letters.contests;
   const RunSummary& run = report.summary;
   report.by_judge = RatesOfOtherJudges(run);
   report.baseline = BaselineOf(run, options.baseline);

@@ -17,7 +17,7 @@ std::vector<ReportFile> ReportFiles(const ReportData& report, const PageOptions&
   const RunSummary& summary = report.summary;
   std::vector<ShownGate> gates;
   if (!summary.data.gates.empty()) gates = LastGates(summary.data.gates, DataHash(summary.data));
-  return {{"report.json", ReportJson(summary, options.program)},
+  return {{"report.json", ReportJson(report, options.program)},
           {"summary.md", SummaryMarkdown(summary, gates)},
           {"junit.xml", JunitXml(summary, gates)},
           {"benchmark.json", BenchmarkJson(summary)},

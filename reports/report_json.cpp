@@ -4,13 +4,24 @@
 
 #include "reports/estimate_json.h"
 #include "reports/findings.h"
-#include "reports/gate_data.h"
-#include "reports/gate_decision.h"
+#include "reports/headlines.h"
+#include "reports/methods.h"
+#include "reports/policy_comparison_output.h"
 
 namespace evac {
 namespace {
 
 using Json = nlohmann::ordered_json;
+
+Json HeadlinesJson(const ReportData& report) {
+  Json json = Json::array();
+  for (const Headline& headline : HeadlinesOf(report)) {
+    Json items = Json::array();
+    for (const HeadlineItem& item : headline.items) items.push_back({{"tag", item.tag}, {"text", item.text}});
+    json.push_back({{"question", headline.question}, {"answers", std::move(items)}});
+  }
+  return json;
+}
 
 Json FindingsJson(const RunSummary& summary) {
   Json json = Json::array();
@@ -20,14 +31,124 @@ Json FindingsJson(const RunSummary& summary) {
   return json;
 }
 
-Json RatesJson(const RunSummary& summary) {
+Json RatesJson(const std::vector<RateCell>& rates) {
   Json json = Json::array();
-  for (const RateCell& cell : summary.rates) {
+  for (const RateCell& cell : rates) {
     Json row = {{"task", cell.task}, {"policy", cell.policy}, {"world", cell.world}, {"initial_states", cell.states}};
     for (std::size_t i = 0; i < kOutcomes; ++i) row["episodes"][Name(static_cast<Outcome>(i))] = cell.counts[i];
     row["success_rate"] = JsonOf(cell.rate);
     row["letters"] = cell.letters;
     json.push_back(std::move(row));
+  }
+  return json;
+}
+
+/// p over all candidates, as the page has it; who wins by one comparison's own step is not said beside it.
+Json AmongCandidates(const ComparisonRow& row, const Number& p_holm) {
+  Json json = JsonOf(row);
+  for (const char* key : {"p_holm", "p_holm_reason", "winner", "more", "more_reason"}) json.erase(key);
+  Put(json, "p_holm", p_holm);
+  return json;
+}
+
+Json CandidatesJson(const ReportData& report) {
+  Json json = Json::array();
+  for (const Candidate& candidate : report.candidates) {
+    const PolicyComparison& comparison = candidate.comparison;
+    Json row = {{"policy", comparison.first}, {"baseline", comparison.second}, {"world", report.world}};
+    row["tasks"] = Json::array();
+    for (std::size_t i = 0; i < comparison.tasks.size(); ++i)
+      row["tasks"].push_back(AmongCandidates(comparison.tasks[i], candidate.task_p_holm[i]));
+    row["all_tasks"] = AmongCandidates(comparison.all, candidate.p_holm);
+    row["all_tasks"]["left_out"] = comparison.left_out;
+    row["all_tasks"]["more"] = candidate.more ? Json(*candidate.more) : Json(nullptr);
+    if (!candidate.more) row["all_tasks"]["more_reason"] = candidate.more.reason();
+    json.push_back(std::move(row));
+  }
+  return json;
+}
+
+Json StagesJson(const StageReport& stages) {
+  Json json = {{"episodes", stages.episodes}, {"funnels", Json::array()}, {"partings", Json::array()}};
+  for (const StageFunnel& funnel : stages.funnels) {
+    Json row = {{"task", funnel.task}, {"policy", funnel.policy}, {"stages", funnel.stages}, {"worlds", Json::array()}};
+    for (const StageRow& world : funnel.worlds) {
+      Json reached = Json::array();
+      for (const Estimate& share : world.reached) reached.push_back(JsonOf(share));
+      row["worlds"].push_back({{"world", world.world}, {"reached", std::move(reached)}});
+    }
+    json["funnels"].push_back(std::move(row));
+  }
+  for (const StageParting& parting : stages.partings) {
+    Json row = {{"task", parting.task},
+                {"stage", parting.stage},
+                {"world", parting.world},
+                {"pairs", parting.pairs},
+                {"effective_pairs", parting.effective_pairs},
+                {"other_only", parting.flips.only_first},
+                {"real_only", parting.flips.only_second}};
+    Put(row, "p", parting.p);
+    Put(row, "p_holm", parting.p_holm);
+    json["partings"].push_back(std::move(row));
+  }
+  return json;
+}
+
+Json CheckpointsJson(const std::vector<CheckpointCurve>& curves) {
+  Json json = Json::array();
+  for (const CheckpointCurve& curve : curves) {
+    Json row = {{"task", curve.task}, {"policy", curve.policy}, {"worlds", curve.worlds}, {"points", Json::array()}};
+    for (const CheckpointPoint& point : curve.points) {
+      Json rates = Json::array();
+      for (const Estimate& rate : point.rate) rates.push_back(JsonOf(rate));
+      row["points"].push_back({{"checkpoint", point.checkpoint}, {"step", point.step}, {"rates", std::move(rates)}});
+    }
+    row["steps_are_named"] = curve.has_steps;
+    row["last_against_first"] = Json::array();
+    for (const auto& ends : curve.ends) row["last_against_first"].push_back(ends ? JsonOf(ends->all) : Json(nullptr));
+    json.push_back(std::move(row));
+  }
+  return json;
+}
+
+Json AgreementJson(const JudgeAgreement& judge) {
+  Json json = {{"judge", judge.judge},
+               {"against", judge.against},
+               {"world", judge.world},
+               {"judged", judge.judged},
+               {"compared", judge.confusion.total()},
+               {"apart", judge.apart},
+               {"both_success", judge.confusion.both_success},
+               {"only_judge_success", judge.confusion.only_judge_success},
+               {"only_other_success", judge.confusion.only_human_success},
+               {"both_failure", judge.confusion.both_failure}};
+  if (!judge.IsCalibrated()) return json;
+  json["kappa"] = JsonOf(judge.statistics.kappa);
+  json["kinder_by"] = JsonOf(judge.bias);
+  json["sensitivity"] = JsonOf(judge.statistics.sensitivity);
+  json["specificity"] = JsonOf(judge.statistics.specificity);
+  if (!judge.calibration.ece) return json;
+  json["brier"] = JsonOf(judge.calibration.brier);
+  json["ece"] = *judge.calibration.ece;
+  return json;
+}
+
+Json JudgesJson(const ReportData& report) {
+  const JudgeReport& judges = report.judges;
+  Json json = {{"agreement", Json::array()}, {"raters", judges.raters}, {"rated_twice", judges.rated_twice}};
+  Put(json, "raters_alpha", judges.alpha);
+  for (const JudgeAgreement& judge : judges.judges) json["agreement"].push_back(AgreementJson(judge));
+  json["rates_by_other_judges"] = Json::array();
+  for (const JudgeRates& other : report.by_judge)
+    json["rates_by_other_judges"].push_back({{"judge", other.judge}, {"rates", RatesJson(other.rates)}});
+  json["model_server_calls"] = Json::array();
+  for (const CallTotals& totals : report.summary.data.judge_calls) {
+    json["model_server_calls"].push_back({{"judge", totals.judge},
+                                          {"calls", totals.calls},
+                                          {"requests", totals.attempts},
+                                          {"prompt_tokens", totals.prompt_tokens},
+                                          {"completion_tokens", totals.completion_tokens},
+                                          {"waited_s", static_cast<double>(totals.latency_ms) / 1000}});
   }
   return json;
 }
@@ -95,10 +216,9 @@ Json ComparisonsJson(const RunSummary& summary) {
   return json;
 }
 
-Json GatesJson(const RunSummary& summary) {
+Json GatesJson(const std::vector<ShownGate>& gates) {
   Json json = Json::array();
-  if (summary.data.gates.empty()) return json;
-  for (const ShownGate& gate : LastGates(summary.data.gates, DataHash(summary.data))) {
+  for (const ShownGate& gate : gates) {
     json.push_back(JsonOf(gate.decision));
     json.back()["current"] = gate.is_current;
   }
@@ -168,10 +288,18 @@ Json ProvenanceJson(const RunSummary& summary, const std::string& program) {
 
 }  // namespace
 
-std::string ReportJson(const RunSummary& summary, const std::string& program) {
-  Json json = {{"schema", kReportJsonSchema}, {"findings", FindingsJson(summary)}, {"rates", RatesJson(summary)}};
+std::string ReportJson(const ReportData& report, const std::string& program) {
+  const RunSummary& summary = report.summary;
+  Json json = {{"schema", kReportJsonSchema}, {"in_short", HeadlinesJson(report)}, {"findings", FindingsJson(summary)}};
+  json["rates"] = RatesJson(summary.rates);
+  json["candidates"] = CandidatesJson(report);
+  json["trust"] = TrustJson(WorldsTrust{report.trust, report.unsaid});
   json["comparisons"] = ComparisonsJson(summary);
-  json["gates"] = GatesJson(summary);
+  json["stages"] = StagesJson(report.stages);
+  json["checkpoints"] = CheckpointsJson(report.checkpoints);
+  json["judges"] = JudgesJson(report);
+  json["gates"] = GatesJson(report.gates);
+  json["methods"] = MethodsParagraph(report);
   json["counters"] = summary.data.counters;
   json["provenance"] = ProvenanceJson(summary, program);
   std::string text = Dumped(json, 1);
@@ -179,6 +307,10 @@ std::string ReportJson(const RunSummary& summary, const std::string& program) {
   text += ",\n ";
   AppendEpisodes(summary, text);
   return text + "\n}\n";
+}
+
+std::string ReportJson(const RunSummary& summary, const std::string& program) {
+  return ReportJson(ReportDataOf(summary), program);
 }
 
 }  // namespace evac

@@ -135,7 +135,9 @@ RunData ReadRun(const Store& store) {
           store.CountersByPolicy(),
           store.RealTrials(),
           store.GateRecords(),
-          TotalsOfCalls(store.folder())};
+          TotalsOfCalls(store.folder()),
+          store.Plan(),
+          store.PageHashes()};
 }
 
 std::int64_t RateCell::Apart() const {

@@ -12,6 +12,7 @@
 #include "core/store_calls.h"
 #include "core/types.h"
 #include "reports/comparison.h"
+#include "reports/letters.h"
 #include "reports/outcome.h"
 
 /// One run, counted: everything the page and the JSON say, before it is said. Read this file first.
@@ -29,6 +30,8 @@ struct RunData {
   std::vector<RealTrial> real_trials = {};                         ///< imported ones, in the order they were added
   std::vector<GateRecord> gates;                                   ///< what gates decided, oldest first
   std::vector<CallTotals> judge_calls = {};                        ///< to model servers, by judge
+  std::vector<PlannedEpisodes> plan = {};                          ///< empty: an earlier evac began the run
+  std::map<std::string, std::string> page_hashes = {};             ///< Store::PageHashes
 };
 RunData ReadRun(const Store& store);
 
@@ -59,6 +62,7 @@ struct RunSummary {
   std::vector<RateCell> rates;          ///< by task, policy, world, in the orders declared; only those with episodes
   std::string reference;                ///< the real world's name; empty if there is none
   std::vector<WorldComparison> comparisons;  ///< each other world with the reference
+  std::vector<PolicyContest> contests = {};  ///< reports/letters.h: what letters rest on; empty before they were given
   std::int64_t Count(Outcome outcome) const;
 };
 

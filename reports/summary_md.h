@@ -10,9 +10,9 @@
 
 namespace evac {
 
-/// More than this no CI service shows of a step's summary for certain; what does not fit is counted, not cut in
-/// silence.
-inline constexpr std::size_t kMostSummaryBytes = 200'000;
+/// GitHub takes a comment of 65 536 characters, and leaves a few for whoever posts it; a step's summary may be longer.
+/// What does not fit is counted, not cut in silence.
+inline constexpr std::size_t kMostSummaryBytes = 60'000;
 
 /// The run in Markdown (GitHub's), for a pull request or $GITHUB_STEP_SUMMARY: gates if there were any, the table of
 /// rates, the findings; flips, counter-examples and provenance folded. Never longer than kMostSummaryBytes.

@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "core/error.h"
+#include "core/statistics/rate_difference.h"
 #include "core/statistics/special.h"
 #include "reports/wording.h"
 
@@ -199,6 +200,7 @@ void AddCorrelation(const TaskPoints& points, const TrustOptions& options, TaskT
         fmt::format("{} policies, and fewer than {} say nothing", points.points.size(), kMinTrustPolicies)};
     task.correlation.value = too_few;
     task.correlation.interval = too_few;
+    task.correlation.method = "none";
     return;
   }
   BootstrapOptions bootstrap = options.bootstrap;
@@ -234,23 +236,38 @@ void AddBias(const std::map<std::string, BothWorlds>& tables, double confidence,
   task.tested_pairs = effective.pairs;
 }
 
+/// All that it takes until the interval of a bias within the margin lies within it.
+double PairsToTrust(const TaskTrust& task, double bias, const TrustOptions& options) {
+  const double n = static_cast<double>(task.pairs.n()), effective = static_cast<double>(task.effective_pairs);
+  const double distance = options.margin - std::abs(bias), z = TwoSidedZ(options.confidence);
+  const double flips = static_cast<double>(task.pairs.discordant()) * effective / n;
+  const double variance = (flips + 1) / (effective + 1) - bias * bias;
+  const double by_flips = z * z * variance / (distance * distance) * n / effective;
+  // Never surer than without any flip, where each state is one pair.
+  const double by_states = z * z * (1 - options.margin) / options.margin * n / static_cast<double>(task.states);
+  return std::max(by_flips, by_states);
+}
+
+/// All that it takes until the interval of a bias beyond the margin lies beyond it. Where all pairs flip one way they
+/// show no variance: what the interval goes by is the one at the margin.
+double PairsToDistrust(const TaskTrust& task, double bias, const TrustOptions& options) {
+  const BothWorlds& pairs = task.pairs;
+  const Number independent =
+      PairsUntilTangoLeavesOut(std::copysign(options.margin, bias),
+                               {{pairs.only_model, pairs.only_real}, pairs.n()}, options.confidence);
+  return *independent * static_cast<double>(pairs.n()) / static_cast<double>(task.effective_pairs);
+}
+
 /// From how many pairs on the bias's interval would no longer reach the margin it is nearest to; a further pair is
 /// taken to tell as much as those there are.
 Defined<std::int64_t> MorePairs(const TaskTrust& task, const TrustOptions& options) {
   const BothWorlds& pairs = task.pairs;
   if (pairs.n() == 0) return Undefined{"no pair to plan from"};
-  const double n = static_cast<double>(pairs.n()), effective = static_cast<double>(task.effective_pairs);
-  const double bias = static_cast<double>(pairs.only_model - pairs.only_real) / n;
-  const double distance = std::abs(options.margin - std::abs(bias)), z = TwoSidedZ(options.confidence);
-  if (distance < 0.005) return Undefined{"the bias seen is at the margin"};
-  const double flips = static_cast<double>(pairs.discordant()) * effective / n;
-  const double variance = (flips + 1) / (effective + 1) - bias * bias;
-  const double by_flips = z * z * variance / (distance * distance) * n / effective;
-  // Never surer than without any flip, where each state is one pair.
-  const double by_states = std::abs(bias) < options.margin
-                               ? z * z * (1 - options.margin) / options.margin * n / static_cast<double>(task.states)
-                               : 0;
-  const auto wanted = static_cast<std::int64_t>(std::ceil(std::max(by_flips, by_states)));
+  const double bias = static_cast<double>(pairs.only_model - pairs.only_real) / static_cast<double>(pairs.n());
+  const double beyond = std::abs(bias) - options.margin;
+  if (std::abs(beyond) < 0.005) return Undefined{"the bias seen is at the margin"};
+  const double all = beyond < 0 ? PairsToTrust(task, bias, options) : PairsToDistrust(task, bias, options);
+  const auto wanted = static_cast<std::int64_t>(std::ceil(all));
   if (wanted > kMostPairsAskedFor) {
     return Undefined{fmt::format("the bias seen is so near the margin that {} pairs would not do", kMostPairsAskedFor)};
   }

@@ -13,8 +13,6 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-std::string SignedPoints(double share) { return fmt::format("{:+.0f}", 100 * share + 0.0); }
-
 std::string Bias(const Estimate& bias) {
   if (!bias.value) return "bias undefined: " + bias.value.reason();
   return fmt::format("bias {} points [{}, {}]", SignedPoints(*bias.value), SignedPoints(bias.interval->low),

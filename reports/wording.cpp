@@ -34,6 +34,10 @@ std::string PointsWithInterval(const Estimate& difference) {
   return fmt::format("{} [{}, {}]", text, points(difference.interval->low), points(difference.interval->high));
 }
 
+std::string SignedPoints(double difference) {
+  return fmt::format("{:+.0f}", std::nearbyint(100 * difference) + 0.0);
+}
+
 std::string NumberWithInterval(const Estimate& estimate) {
   if (!estimate.value) return "undefined: " + estimate.value.reason();
   if (!estimate.interval)

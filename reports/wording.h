@@ -14,6 +14,8 @@ std::string Percent(double share);
 std::string PercentWithInterval(const Estimate& rate);
 /// A difference of shares: "+30 points [10, 48]", "-3 points [-12, 5]"; "undefined: …".
 std::string PointsWithInterval(const Estimate& difference);
+/// Alone: "+30", "-3", "+0"; no "-0".
+std::string SignedPoints(double difference);
 /// "0.91 [0.78, 0.97]"; "0.91 (interval undefined: …)"; "undefined: …".
 std::string NumberWithInterval(const Estimate& estimate);
 /// "0.91", "-0.05": two decimals, no "-0.00"; "0.999" and less, cut, where it would otherwise

@@ -188,21 +188,28 @@ void ChunkCache::Keep(const std::string& key, const CachedChunk& chunk) {
     if (!std::exchange(warned_, true)) Warn(why.what());
     return;
   }
-  size_ += fs::file_size(path, error);
-  if (static_cast<double>(size_) > options_.limit_gb * 1e9) Evict();
+  const std::uintmax_t bytes = fs::file_size(path, error);
+  if (error) return;  // another process removed it
+  size_ += bytes;
+  kept_ += bytes;
+  const double limit = options_.limit_gb * 1e9;
+  if (static_cast<double>(size_) > limit || static_cast<double>(kept_) > limit / 10) CountAnew();
 }
 
 void ChunkCache::Warn(const std::string& what) {
   std::fprintf(stderr, "evac: warning: chunk cache: %s; it is imagined again\n", what.c_str());
 }
 
-/// Down to nine tenths of the limit, so that it is not done for every chunk.
-void ChunkCache::Evict() {
+/// Where there is too much, down to nine tenths of the limit, so that it is not done for every chunk.
+void ChunkCache::CountAnew() {
   std::vector<Entry> entries = EntriesOf(options_.folder);
-  std::sort(entries.begin(), entries.end(), [](const Entry& a, const Entry& b) { return a.used < b.used; });
   size_ = TotalOf(entries);
+  kept_ = 0;
+  const double limit = options_.limit_gb * 1e9;
+  if (static_cast<double>(size_) <= limit) return;
+  std::sort(entries.begin(), entries.end(), [](const Entry& a, const Entry& b) { return a.used < b.used; });
   for (const Entry& entry : entries) {
-    if (static_cast<double>(size_) <= 0.9 * options_.limit_gb * 1e9) break;
+    if (static_cast<double>(size_) <= 0.9 * limit) break;
     std::error_code error;
     fs::remove(entry.path, error);
     size_ -= entry.bytes;

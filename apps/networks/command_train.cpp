@@ -22,7 +22,19 @@ namespace fs = std::filesystem;
 
 using Arguments = std::shared_ptr<TrainArguments>;
 
-/// --job: the pages are read and the files hashed, as if the training began; it is done elsewhere.
+/// What is to be typed where it is done: each file that was named, by its own name.
+std::string CommandThere(const TrainArguments& arguments) {
+  std::string command = fmt::format("evac-train {} SHARDS", fs::path(arguments.job).filename().string());
+  const auto add = [&](const char* option, const std::string& file) {
+    if (!file.empty()) command += fmt::format(" {} {}", option, fs::path(file).filename().string());
+  };
+  add("--codec", arguments.codec);
+  add("--init", arguments.init);
+  add("--forecast", arguments.forecast);
+  return command + " --out OUT";
+}
+
+/// --job: all is looked at and the files are hashed, as if the training began; it is done elsewhere.
 /// @param options  of the job, of its kind
 template <class Options>
 ExitCode WriteJob(const TrainArguments& arguments, const std::string& section, train::TrainingJob& job,
@@ -32,15 +44,18 @@ ExitCode WriteJob(const TrainArguments& arguments, const std::string& section, t
   TrainingProgress progress(stderr);
   const train::JobPlace place = PlaceOf(arguments, progress);
   CheckHoldouts(place.shards);
+  if (job.kind == train::TrainingKind::kCodec) train::CheckCodecTraining(place, job.codec);
+  else train::CheckWorldTraining(place, job.world, job.start);
   job.config = place.config;
   job.begun_with = place.begun_with;
+  job.recipe = train::RecipesOf(place.shards);
   job.wants_init = !arguments.init.empty();
   job.wants_forecast = !arguments.forecast.empty();
   if (job.wants_init) job.init_sha256 = Sha256HexOfFile(arguments.init);
   if (job.wants_forecast) job.forecast_sha256 = Sha256HexOfFile(arguments.forecast);
   train::WriteTrainingJob(arguments.job, job);
-  fmt::print("{}: carry it, the shards and the weights that were named. There: evac-train {} SHARDS --out OUT\n",
-             arguments.job, fs::path(arguments.job).filename().string());
+  fmt::print("{}: carry it, the shards and the weights that were named. There: {}\n", arguments.job,
+             CommandThere(arguments));
   return ExitCode::kOk;
 }
 

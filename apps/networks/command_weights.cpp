@@ -268,6 +268,7 @@ ExitCode RunConvert(const WeightsArguments& arguments) {
   train::RoutedWeights routed({{nn::kForecastPrefix, &forecast}, {"", &source}});
   std::erase_if(options.without, [](const std::string& key) { return key.starts_with(nn::kForecastPrefix); });
   options.metadata["forecast"] = Sha256HexOfFile(arguments.forecast);
+  options.metadata.erase("holdout");  // it was measured with the other one
   Save(arguments, routed, std::move(options));
   return ExitCode::kOk;
 }

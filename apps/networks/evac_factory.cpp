@@ -117,7 +117,7 @@ Sight SightOf(const SuiteWorld& world, const std::filesystem::path& folder) {
   const TrainedFor trained = TrainedFor::Read(world.evac->weights);
   trained.CheckPeriod(world.evac->period_s, fmt::format("world {}: field period_s", world.name));
   if (!trained.cameras.empty()) return {world.evac->period_s, trained.cameras};
-  std::vector<std::string> cameras = NamesOf(ReadRecording(folder, {.count_video_frames = false}).cameras);
+  std::vector<std::string> cameras = CamerasIn(folder);
   const auto views = static_cast<std::size_t>(ReadEvacConfig(world.evac->config).views);
   if (cameras.size() > views) cameras.resize(views);  // fewer are refused where an episode begins
   return {world.evac->period_s, std::move(cameras)};
@@ -139,7 +139,7 @@ Recording ReadAsTrained(const Suite& suite, const std::filesystem::path& folder)
     throw InvalidInput("{}: field recording: world {} is to see {}, world {} {}: wanted a suite for each",
                        suite.path.string(), first->name, wanted.Words(), world.name, own.Words());
   }
-  return Thinned(ReadRecording(folder, {.cameras = wanted.cameras}), wanted.period_s);
+  return BegunFrom(ReadRecording(folder, {.cameras = wanted.cameras}), wanted.period_s);
 } catch (const TensorError& error) {
   throw InvalidInput("{}", error.what());
 }

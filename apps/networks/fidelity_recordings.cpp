@@ -9,6 +9,7 @@
 #include "apps/networks/fidelity_judge.h"
 #include "apps/interrupts.h"
 #include "apps/networks/pack_sources.h"
+#include "apps/warnings.h"
 #include "worldmodel/echo_world.h"
 #include "worldmodel/evac_config.h"
 #include "worldmodel/trained_for.h"
@@ -52,6 +53,7 @@ void RefuseFieldsThatMeanNothing(const Suite& suite) {
   const std::vector<std::uint64_t> one_seed = {1};
   std::vector<std::pair<std::string, bool>> fields = {
       {"still", suite.recorded_task.still.has_value()},
+      {"task", suite.recorded_task.name.has_value()},
       {"workspace_m", suite.recorded_task.workspace_m.has_value()},
       {"seeds", !suite.seeds.empty() && suite.seeds != one_seed}};
   for (const SuiteWorld& world : suite.worlds)
@@ -76,6 +78,7 @@ ArmsKind ArmsReadBy(const TrainedFor& trained) {
 std::vector<Recording> ReadAll(const Suite& suite, const SuiteWorld& model, const nn::ModelConfig& config) {
   const fs::path& folder = *suite.recording;
   const std::vector<fs::path> folders = FindRecordings(folder);
+  SayPassedOver(folder);
   const TrainedFor trained = TrainedFor::Read(model.evac->weights);
   SourceOptions how{.period_s = model.evac->period_s,
                     .cameras = trained.cameras,

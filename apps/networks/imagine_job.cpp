@@ -1,10 +1,10 @@
 #include "apps/networks/imagine_job.h"
 
 #include "apps/networks/imagine_output.h"
+#include "apps/networks/imagined_page.h"
 #include "core/config.h"
 #include "core/file.h"
 #include "core/hash.h"
-#include "core/parse_json.h"
 #include "core/version.h"
 #include "worldmodel/action_statistics.h"
 #include "worldmodel/nn/library.h"
@@ -92,14 +92,6 @@ void RequireOthersFilesStay(const ImagineArguments& arguments, const ImagineStar
                        "another --out", frames.string(), kImagined);
 }
 
-/// The job that a sidecar tells of. @throws InvalidInput if it tells of none
-Json JobIn(const fs::path& path) try {
-  return ParseJson<Json>(ReadFile(path)).at("job").get<Json::object_t>();
-} catch (const Json::exception&) {
-  throw InvalidInput("{}: is there, and says of no job of evac imagine; wanted that name free, or another --out",
-                     path.string());
-}
-
 /// chunk_00000.safetensors, and .partial-4711 of a process that was killed
 bool IsChunk(const std::string& name) {
   const std::size_t digits_end = name.find_first_not_of("0123456789", 6);
@@ -154,21 +146,14 @@ Sidecar::Sidecar(const ImagineArguments& arguments, const ImagineStart& start, J
            {"period_s", start.period_s}};
   const fs::path path = out_ / kImagined;
   const bool is_claimed = fs::exists(path);
-  const Json before = is_claimed ? JobIn(path) : Json();
+  const Json before = is_claimed ? JobOnPage(ReadFile(path), path.string()) : Json();
   if (is_claimed && !arguments.restart) Refuse(before);
   RequireOthersFilesStay(arguments, start, is_claimed);
   if (is_claimed && arguments.restart) RemoveJob(out_);
 }
 
 void Sidecar::Refuse(const Json& job) const {
-  std::string differences;
-  for (const auto& [name, value] : page_.at("job").items()) {
-    const Json found = job.value(name, Json());
-    if (found == value) continue;
-    const std::string there = found.dump(), here = value.dump();
-    differences += there.size() + here.size() > 60 ? fmt::format("; {} is another", name)
-                                                   : fmt::format("; {} is {} there, {} here", name, there, here);
-  }
+  const std::string differences = DifferencesOf(page_.at("job"), job);
   if (differences.empty()) return;
   throw InvalidInput("{}: another job's frames are there{}; choose another --out, or --restart to throw them away",
                      out_.string(), differences);

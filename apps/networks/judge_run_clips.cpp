@@ -56,17 +56,30 @@ std::vector<std::string> CameraNames(const Task& task) {
 /// same names.
 class Tasks {
  public:
+  explicit Tasks(const std::function<void(const std::string&)>& say) : say_(say) {}
   const Task* Add(const Task& task, const std::filesystem::path& run) {
     const std::vector<std::string> names = CameraNames(task);
     if (cameras_.empty()) cameras_ = names;
     if (names != cameras_)
       throw InvalidInput("{}: task {} is seen by {}, wanted {} as the tasks before it", run.string(), task.id,
                          fmt::join(names, ", "), fmt::join(cameras_, ", "));
+    SayIfAnother(task, run);
     return &tasks_.try_emplace({run, task.id}, task).first->second;
   }
   const std::vector<std::string>& cameras() const { return cameras_; }
 
  private:
+  /// Tasks of one name are learned as one. Two that a folder's name made one are told otherwise.
+  void SayIfAnother(const Task& task, const std::filesystem::path& run) {
+    const auto& [first, told] = told_.try_emplace(task.id, run, task.instruction).first->second;
+    if (task.instruction == told) return;
+    say_(fmt::format("warning: task {} is '{}' in {} and '{}' in {}: both are learned as one task; two tasks want two "
+                     "names (`task` in a suite with a recording)",
+                     task.id, told, first.string(), task.instruction, run.string()));
+  }
+
+  const std::function<void(const std::string&)>& say_;
+  std::map<std::string, std::pair<std::filesystem::path, std::string>> told_;  ///< by task: the first run, and what there
   std::map<std::pair<std::filesystem::path, std::string>, Task> tasks_;
   std::vector<std::string> cameras_;
 };
@@ -162,7 +175,7 @@ void CheckWorlds(const std::vector<std::string>& wanted, const std::set<std::str
 }  // namespace
 
 LabelledClips ReadLabelledClips(const LabelledRuns& options, const std::function<void(const std::string&)>& say) {
-  Tasks tasks;
+  Tasks tasks(say);
   std::vector<Labelled> labelled;
   std::set<std::string> worlds;
   for (const std::filesystem::path& run : options.runs) AddRun(run, options, tasks, labelled, worlds);

@@ -28,7 +28,8 @@ struct LabelledClips {
 
 /// Reads the labelled clips, each as 24 pictures evenly spaced in time, into memory (a clip of two views of 64x96: 0.9
 /// MB).
-/// @param say  is told of clips that cannot be read and are left out
+/// @param say  is told of clips that cannot be read and are left out, and of a task whose instruction is another in
+///   another run
 /// @throws InvalidInput if a run is none; if no run has a world that is named; if nobody of that name has judged; if
 ///   tasks have other cameras; if a task has too few labels of one kind, or what is kept to measure with has none of
 ///   one: it says how many there are.

@@ -63,14 +63,22 @@ bool HoldsOut(const PackSource& source, const PackArguments& arguments) {
   return SplitMix64(SeedFor(SeedFor(arguments.seed, "hold-out"), source.state)).Uniform() < arguments.hold_out;
 }
 
+std::vector<std::string> ViewsOf(const std::vector<fs::path>& folders, const SourceOptions& how) try {
+  return ChooseViews(folders, how);
+} catch (const Error& error) {
+  if (error.exit_code() != ExitCode::kInvalidInput) throw;
+  throw InvalidInput("{}; --cameras names others", error.what());
+}
+
 /// Looks at every recording, several at a time; what cannot be packed is left out.
 void LookAtAll(const PackArguments& arguments, Packing& packing) {
   std::vector<fs::path> folders;
   for (const fs::path& input : arguments.inputs) {
     const std::vector<fs::path> found = FindRecordings(input);
     folders.insert(folders.end(), found.begin(), found.end());
+    SayPassedOver(input);
   }
-  packing.how.cameras = ChooseViews(folders, packing.how);
+  packing.how.cameras = ViewsOf(folders, packing.how);
   std::vector<Looked> looked(folders.size());
   CountProgress progress("recordings looked at", static_cast<std::int64_t>(folders.size()), 0);
   ShareOut(

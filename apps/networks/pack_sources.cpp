@@ -62,19 +62,19 @@ PackSource Examine(const fs::path& folder, const SourceOptions& options) {
 
 std::vector<std::string> ChooseViews(const std::vector<fs::path>& folders, const SourceOptions& options) {
   if (!options.cameras.empty()) return options.cameras;
-  std::string last = "there is none";
+  std::string why = "none has so many";
   for (const fs::path& folder : folders) {
+    std::vector<std::string> names = CamerasIn(folder);
+    if (names.size() < options.views) continue;
+    names.resize(options.views);
     try {
-      const Recording recording = ReadRecording(folder, {.count_video_frames = false});
-      if (recording.cameras.size() < options.views) continue;
-      std::vector<std::string> names;
-      for (std::size_t view = 0; view < options.views; ++view) names.push_back(recording.cameras[view].name);
+      ReadRecording(folder, {.cameras = names, .count_video_frames = false});
       return names;
     } catch (const Error& error) {
-      last = error.what();
+      why = fmt::format("the last one that could not: {}", error.what());
     }
   }
-  throw InvalidInput("no recording with {} cameras can be read; the last one that could not: {}", options.views, last);
+  throw InvalidInput("no recording's first {} cameras can be read; {}", options.views, why);
 }
 
 Recording ReadForPacking(const fs::path& folder, const SourceOptions& options) {

@@ -20,7 +20,7 @@ enum class ArmsKind { kAuto, kTold, kMeasured };  ///< auto: told in our own col
 /// How recordings are read for packing.
 struct SourceOptions {
   double period_s = 0.1;             ///< of the clips: every nth recorded step is kept
-  std::vector<std::string> cameras;  ///< empty: as many of the first recording's as `views`
+  std::vector<std::string> cameras;  ///< empty: as many of the first recording's as `views` (ChooseViews)
   std::size_t views = 1;
   ArmsKind arms = ArmsKind::kAuto;
   std::size_t least_frames = 17;  ///< shorter recordings are left out
@@ -44,7 +44,8 @@ struct LeftOut {
   std::string sentence;
 };
 
-/// The cameras that will be packed: those asked for, or the first of the first recording that can be read.
+/// The cameras that will be packed: those asked for, or the first of the first recording whose first ones can be read,
+/// whatever is wrong with its others. @throws InvalidInput if there is none
 std::vector<std::string> ChooseViews(const std::vector<std::filesystem::path>& folders, const SourceOptions& options);
 
 /// Reads a recording as it will be packed. @throws Error with a kind.

@@ -90,6 +90,14 @@ void CheckHoldouts(const train::ShardFolders& folders) {
   }
 }
 
+void CheckSides(std::int64_t height_px, std::int64_t width_px) {
+  const auto fits = [](std::int64_t side_px) { return side_px >= 8 && side_px <= 4096 && side_px % 8 == 0; };
+  if (!fits(height_px) || !fits(width_px))
+    throw InvalidInput("the clips' pictures are {}x{}, wanted multiples of 8, at most 4096, on the page of sizes that "
+                       "`evac pack` is given",
+                       width_px, height_px);
+}
+
 PackedSet::PackedSet(const train::ShardFolders& folders, train::Split split) : shards(folders, split) {
   tasks = NamesIn(shards.metadata().at("tasks"));
   cameras = NamesIn(shards.metadata().at("cameras"));

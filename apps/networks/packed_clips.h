@@ -33,4 +33,8 @@ struct PackedSet {
 ///   said of recordings, where there are several folders
 void CheckHoldouts(const train::ShardFolders& folders);
 
+/// The networks of judges and policies see a picture at an eighth of its size, and nobody opens one that learned from
+/// others. @throws InvalidInput unless both sides are multiples of 8, at most 4096
+void CheckSides(std::int64_t height_px, std::int64_t width_px);
+
 }  // namespace evac

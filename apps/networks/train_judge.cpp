@@ -219,6 +219,7 @@ void Write(const train::JobPlace& place, const Learners<ClassifierNet>& learners
 
 void CalibrateJudge(const train::JobPlace& place, const JudgeTrainingOptions& given, const JudgeData& data) {
   CheckJudgeOptions(given);
+  CheckSides(data.learn.height_px, data.learn.width_px);
   JudgeTrainingOptions options = given;
   options.looks = LooksOnCard(WeightFile(data.init, kClassifierFormat));  // the weights stay as they are
   CheckInit(data, options);
@@ -236,6 +237,7 @@ void CalibrateJudge(const train::JobPlace& place, const JudgeTrainingOptions& gi
 train::TrainerSummary TrainJudge(const train::JobPlace& place, const JudgeTrainingOptions& given,
                                  const JudgeData& data) {
   JudgeTrainingOptions options = given;
+  CheckSides(data.learn.height_px, data.learn.width_px);
   CheckInit(data, options);
   const JudgeSplit split = SplitForJudge(data.learn.clips, options);
   const ClassifierShape shape = ShapeOf(data.learn, options);

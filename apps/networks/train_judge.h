@@ -16,13 +16,14 @@ struct JudgeData {
 /// anew on all of `data.learn`, and what it is worth is measured on the hold-out. How long a clip may be and at how many
 /// places it looks stay as its card has them, whatever `given` says.
 /// @throws InvalidInput, TensorError naming an option that is out of range (CheckJudgeOptions); InvalidInput if
-///   `data.init` is of other tasks or views, or if `data.learn` has not clips of both outcomes.
+///   `data.init` is of other tasks or views, if `data.learn` has not clips of both outcomes, or for CheckSides.
 void CalibrateJudge(const train::JobPlace& place, const JudgeTrainingOptions& given, const JudgeData& data);
 
 /// Trains the classifier judge and writes OUT/judge.safetensors: its weights and its card (docs/classifier_judge.md).
 /// Where the clips have a codec, `reconstructed_share` of them are shown as it gives them back, which is how a world
 /// model's clips look. An interrupted training writes none.
 /// @param place  of it `shards` and `config` are not read
+/// @throws InvalidInput for pictures whose sides are no multiples of 8 (CheckSides), and as CalibrateJudge
 train::TrainerSummary TrainJudge(const train::JobPlace& place, const JudgeTrainingOptions& options,
                                  const JudgeData& data);
 

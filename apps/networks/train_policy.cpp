@@ -49,6 +49,7 @@ train::TrainerSummary TrainPolicy(const train::JobPlace& place, const PolicyOpti
                                   const std::vector<std::int64_t>& keep_steps) {
   PolicyOptions options = given;
   PackedSet set(place.shards, train::Split::kTrain);
+  CheckSides(set.shards.height_px(), set.shards.width_px());
   const PackedSet holdout(place.shards, train::Split::kHoldout);
   if (codec) codec->Open(set.shards);
   const LearnedShape shape{set.tasks, set.cameras, ArmsOf(set), static_cast<int>(set.shards.height_px()),

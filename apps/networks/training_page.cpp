@@ -1,6 +1,7 @@
 #include "apps/networks/training_page.h"
 
 #include <algorithm>
+#include <utility>
 
 namespace evac {
 namespace {
@@ -14,6 +15,11 @@ void ReadField(const Config& page, const train::Setting& setting) {
           const auto found = page.Get<std::uint64_t>(name);
           page.Require(found < (std::uint64_t{1} << 40), name, "a whole number below 2^40");
           *field = static_cast<std::int64_t>(found);
+        } else if constexpr (std::is_same_v<Type, std::string>) {
+          std::string found = page.Get<std::string>(name);
+          if (found.find('\n') != std::string::npos)  // identities and jobs hold an option in a line
+            throw InvalidInput("{}: found a line's end in a text, wanted it in one line", page.Where(name));
+          *field = std::move(found);
         } else {
           *field = page.Get<Type>(name);
         }

@@ -216,8 +216,10 @@ SampleSize PairsForNonInferiority(double discordance, double margin, const Promi
   Check(promise);
   RequireShare(discordance, "discordance");
   RequireInside(margin, "margin");
-  const double z = OneSidedSum(promise);
-  return RoundedUp(z * z * discordance / (margin * margin));
+  const double z = OneSidedSum(promise), z_alpha = std::max(0.0, NormalQuantile(1 - promise.alpha));
+  const double by_flips = z * z * discordance / (margin * margin);
+  const double by_none = z_alpha * z_alpha * (1 - margin) / margin;  // then the interval ends at z² / (n + z²)
+  return RoundedUp(std::max({1.0, by_flips, by_none}));
 }
 
 SampleSize TrialsForNonInferiority(double p, double margin, const Promise& promise) {

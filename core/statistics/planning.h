@@ -54,7 +54,8 @@ double FisherPower(std::int64_t n, double p1, double p2, double alpha = 0.05);
 SampleSize PointsForCorrelation(double r, const Promise& promise = {});
 
 /// Pairs to show that the candidate's rate is not below the baseline's by `margin` or more, if they are equal and flip
-/// in a share `discordance` of pairs: (z_1-alpha + z_power)² discordance / margin², alpha one-sided.
+/// in a share `discordance` of pairs: (z_1-alpha + z_power)² discordance / margin², alpha one-sided. No fewer than show
+/// it where no pair flips, z_1-alpha² (1 - margin) / margin, and at least 1. @param margin  in (0, 1)
 SampleSize PairsForNonInferiority(double discordance, double margin, const Promise& promise = {});
 /// The same on different initial states, per policy, both with rate p: 2 p (1 - p) in place of the discordance.
 SampleSize TrialsForNonInferiority(double p, double margin, const Promise& promise = {});

@@ -169,6 +169,15 @@ Estimate TangoOfClusters(std::span<const PairedOutcomes> clusters, double confid
   return difference;
 }
 
+Number PairsUntilTangoLeavesOut(double limit, const PairedOutcomes& outcomes, double confidence) {
+  const Estimate difference = PairedDifference(outcomes, confidence);
+  if (!(limit > -1 && limit < 1)) throw InvalidInput("statistics: limit is {}, wanted -1 < limit < 1", limit);
+  if (!difference.value) return Undefined{difference.value.reason()};
+  const double score = TangoScore(WeightedPairs(outcomes), limit), z = TwoSidedZ(confidence);
+  if (score == 0) return Undefined{"the difference is the limit"};
+  return static_cast<double>(outcomes.pairs) * z * z / (score * score);
+}
+
 Repeated PairsOfInterval(std::span<const PairedOutcomes> clusters, double confidence) {
   const double pairs = BasisOf(clusters, confidence).pairs;
   return {SumOf(clusters).pairs, static_cast<std::int64_t>(std::floor(pairs + kRounding))};

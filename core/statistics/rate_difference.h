@@ -40,6 +40,11 @@ PairedOutcomes EffectivePairs(std::span<const PairedOutcomes> clusters);
 /// PairsOfInterval says. One pair per cluster: as TangoDifference. @throws as EffectivePairs and TangoDifference.
 Estimate TangoOfClusters(std::span<const PairedOutcomes> clusters, double confidence = 0.95);
 
+/// How many pairs that flip as these leave `limit` outside Tango's interval or on its end: its score grows with the
+/// root of the pairs. Undefined without pairs, and where the difference is the limit itself.
+/// @param limit  in (-1, 1)
+Number PairsUntilTangoLeavesOut(double limit, const PairedOutcomes& outcomes, double confidence = 0.95);
+
 /// All pairs of the clusters, and how many independent ones that interval rests on: EffectivePairs, but where few of
 /// them differ from the rest, no more than leave it as wide as one pair of each cluster would if none did. One flip
 /// alone does not show that all the pairs that agree are independent (docs/decisions/0012-interval-of-record.md).

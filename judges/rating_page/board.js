@@ -60,7 +60,7 @@ function drawBoard(data) {
     ...notices(data),
     make('section.figures', {}, figure('Success', percent(data.all.majority), `majority of ${data.all.decided} decided clips`),
       figure('If undecided', `${percent(data.all.low)} … ${percent(data.all.high)}`, `${data.all.undecided} not decided`),
-      figure('Alpha', decimal(data.agreement.alpha), `${range(data.agreement.alpha)} ${data.agreement.clips} clips with two votes` +
+      figure('Alpha', decimal(data.agreement.alpha), `${range(data.agreement.alpha)} ${data.agreement.clips} clips with two votes; cannot tell is a third answer` +
         (data.agreement.dropped_replicates ? `; ${plural(data.agreement.dropped_replicates, 'replicate')} without any spread dropped` : '')),
       figure('Raw agreement', percent(data.agreement.agreement), `Fleiss kappa ${decimal(data.agreement.fleiss)}`),
       figure('Disputes', String(data.disputes.length), 'wait for an adjudicator')),

@@ -115,6 +115,20 @@ TEST_F(CalibrateJudgeTest, ClipsOfOneOutcomeOrOfNoneAreRefused) {
   EXPECT_FALSE(std::filesystem::exists(folder_ / "out"));
 }
 
+/// It was calibrated and written, and no command judged by it.
+TEST_F(CalibrateJudgeTest, ClipsWhoseSidesAreNoMultiplesOfEightAreRefused) {
+  WriteLearningShards(folder_ / "odd", {.clips = 8, .height_px = 20});
+  const ShardClips learn({folder_ / "odd"}, train::Split::kTrain, nullptr),
+      holdout({folder_ / "odd"}, train::Split::kHoldout, nullptr);
+  const Learners<ClassifierNet> learners(ClassifierShape{{"carry"}, {"head", "hand_right"}, 20, 24}, 3, 1);
+  TensorMetadata card = CardOfNone();
+  card["height_px"] = "20";
+  learners.Write(folder_ / "odd.safetensors", card);
+  EXPECT_THAT([&] { CalibrateJudge(Place("out"), {}, {learn, holdout, folder_ / "odd.safetensors"}); },
+              ThrowsMessage<Error>(HasSubstr("pictures are 24x20, wanted multiples of 8")));
+  EXPECT_FALSE(std::filesystem::exists(folder_ / "out"));
+}
+
 TEST_F(CalibrateJudgeTest, OptionsOutOfRangeAreRefusedAsByTraining) {
   const ShardClips learn = Learn();
   const std::filesystem::path judge = Given({});

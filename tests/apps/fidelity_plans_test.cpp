@@ -102,6 +102,7 @@ TEST(RecordedFidelity, RefusesFieldsOfTheSuiteThatWouldBePassedOver) {
                     fmt::format("suite.yaml: field {}: means nothing for `evac fidelity` of recordings", field))));
   };
   refuses("still", [](Suite& suite) { suite.recorded_task.still.emplace(); });
+  refuses("task", [](Suite& suite) { suite.recorded_task.name = "pour"; });
   refuses("workspace_m", [](Suite& suite) { suite.recorded_task.workspace_m.emplace(); });
   refuses("seeds", [](Suite& suite) { suite.seeds = {1, 2}; });
   refuses("initial_states of world dream", [](Suite& suite) { suite.worlds[0].initial_states = 2; });

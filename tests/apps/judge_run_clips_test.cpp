@@ -19,6 +19,7 @@
 namespace evac {
 namespace {
 
+using testing::AllOf;
 using testing::Each;
 using testing::HasSubstr;
 using testing::ThrowsMessage;
@@ -29,9 +30,10 @@ class LabelledRun : public testing::Test {
  protected:
   LabelledRun() { FillIn(store_, 24); }
 
-  static void FillIn(Store& store, int width_px) {
+  static void FillIn(Store& store, int width_px, const std::string& instruction = "") {
     Task task;
     task.id = "carry";
+    task.instruction = instruction;
     task.cameras = {{.name = "head", .width_px = width_px, .height_px = 16}};
     task.rubric.version = "1";
     store.AddTask(task);
@@ -102,6 +104,19 @@ TEST_F(LabelledRun, BesideAnotherOfTheSameTaskByLargerCamerasBothAreReadWhole) {
   EXPECT_THAT(said_, testing::IsEmpty());
   EXPECT_EQ(clips.learn->clips.size() + clips.holdout->clips.size(), 4U * (kStates - 1));
   EXPECT_EQ(clips.learn->tasks, std::vector<std::string>{"carry"});
+}
+
+/// Recordings of pour/held_out and stack/held_out were one task, held_out, and nobody said so.
+TEST_F(LabelledRun, OfTwoRunsWhoseTaskOfOneNameIsToldOtherwiseItIsSaid) {
+  Store other = Store::CreateOrContinue(
+      folder_ / "other", {.suite_text = "suite: test\n", .suite_hash = "o", .suite_path = "", .evac_version = "0"});
+  FillIn(other, 24, "Stack the cups.");
+  LabelledRuns options = Options();
+  options.runs = {folder_ / "run", folder_ / "other"};
+  Read(options);
+  ASSERT_EQ(said_.size(), 1U);
+  EXPECT_THAT(said_.front(), AllOf(HasSubstr("warning: task carry is '' in " + (folder_ / "run").string()),
+                                   HasSubstr("and 'Stack the cups.' in " + (folder_ / "other").string())));
 }
 
 /// Each row of judged.csv said recording 0, and which clips the judge takes wrongly could not be looked at.

@@ -100,7 +100,7 @@ void Write(const std::filesystem::path& path, const LearningShards& o, const Ten
                    {"cameras", "head,hand_right"},
                    {"arms", "right"},
                    {"tasks", "carry"},
-                   {"pose_map", "radius_px=2 thickness_px=1"},
+                   {"pose_map", "radius_px=3 thickness_px=1"},  // of this height, scaled
                    {"delta_frames", "3"},
                    {"statistics", "synthetic"},
                    {"recipe", "carry"},

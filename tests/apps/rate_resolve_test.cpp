@@ -294,6 +294,29 @@ TEST_F(Resolving, UnderTheNameOfAnotherJudgeOrOfNoneNothingIsWritten) {
   EXPECT_EQ(Told().at("people").label, Label::kFailure);
 }
 
+/// A panel's label "human:panel" was taken, and was one more rater to reports: in alpha, and in no list of judges.
+TEST_F(Resolving, APanelsLabelIsNotNamedLikeASingleRater) {
+  Import("ann", "failure");
+  Import("bob", "failure");
+  for (const char* rater : {"human:panel", "human:study:r1", "human:"}) {
+    EXPECT_THAT([&] { ResolveStudy(store, {.judge = rater}); },
+                testing::ThrowsMessage<Error>(testing::AllOf(testing::HasSubstr(fmt::format("found '{}'", rater)),
+                                                             testing::HasSubstr("does not begin with 'human:'"))));
+    EXPECT_FALSE(Told().contains(rater));
+  }
+}
+
+/// The report's alpha has "cannot tell" as no answer at all: two numbers of one name.
+TEST_F(Resolving, TheStatusSaysThatItsAlphaHasCannotTellAsAnAnswer) {
+  AtTheDesk ann(store, desk), bob(store, desk);
+  RateAll(ann, "success");
+  RateAll(bob, "failure");
+  testing::internal::CaptureStdout();
+  PrintRatingStatus(store, 1, false);
+  EXPECT_THAT(testing::internal::GetCapturedStdout(),
+              testing::HasSubstr("agreement, \"cannot tell\" a third answer: alpha "));
+}
+
 TEST_F(Resolving, WhatAnAdjudicatorDecidedStandsWhoeverLeft) {
   AtTheDesk ann(store, desk), bob(store, desk), judge(store, desk, RaterRole::kAdjudicator);
   RateAll(ann, "success", 3);

@@ -16,6 +16,8 @@
 #include "tests/apps/printed.h"
 #include "tests/support/command.h"
 #include "tests/support/temp_folder.h"
+#include "worldmodel/evac_config.h"
+#include "worldmodel/nn/weights.h"
 
 /// What `evac train` and `evac judge train` take and refuse, before and when they go on.
 namespace evac {
@@ -60,6 +62,11 @@ class TrainCommand : public testing::Test {
     std::vector<std::string> words = {"train"};
     words.insert(words.end(), more.begin(), more.end());
     return Printed(AddTrain, words);
+  }
+  /// Latents of the codec that TrainCodec made, beside the shards.
+  void Encode() const {
+    Printed(AddEncode, {"encode", Path("shards"), "--config", Path("page.yaml"), "--codec",
+                        Path("codec/codec.safetensors")});
   }
   std::string TrainCodec(const std::vector<std::string>& more = {}) const {
     std::vector<std::string> words = {"codec", Path("shards"), "--config", Path("page.yaml"), "--out", Path("codec"),
@@ -253,6 +260,22 @@ TEST_F(TrainCommand, OptionsThatDoNothingAreRefused) {
         << option;
 }
 
+/// What --job wrote of it was refused where it was carried to: a text's second line stood for an option of its own.
+TEST_F(TrainCommand, AnOptionsTextThatIsNotInOneLineIsRefused) {
+  train::WorldOptions options;
+  const auto refused = ThrowsMessage<Error>(
+      HasSubstr("field optimiser: found a line's end in a text, wanted it in one line"));
+  EXPECT_THAT([&] { ReadTrainingPage("", "world", {"optimiser=\"muon\\noption batch 9\""}, SettingsOf(options)); },
+              refused);
+  WriteFileAtomically(Path("training.yaml"), "world:\n  optimiser: |\n    muon\n");
+  EXPECT_THAT([&] { ReadTrainingPage(Path("training.yaml"), "world", {}, SettingsOf(options)); },
+              ThrowsMessage<Error>(HasSubstr("field world.optimiser: found a line's end in a text")));
+  EXPECT_EQ(options.job.trainer.optimiser, "adamw");
+  WriteFileAtomically(Path("training.yaml"), "world:\n  optimiser: |-\n    muon\n");
+  ReadTrainingPage(Path("training.yaml"), "world", {}, SettingsOf(options));
+  EXPECT_EQ(options.job.trainer.optimiser, "muon");
+}
+
 /// The trained judge was replaced, and its training put it back uncalibrated.
 TEST_F(TrainCommand, CalibratingTakesNoStepsAndNoFolderOfATraining) {
   const std::vector<std::string> words = {"judge",            Path("shards"), "--init",     Path("page.yaml"),
@@ -342,6 +365,12 @@ TEST_F(TrainCommand, AJobThatIsCarriedElsewhereHoldsItsFolderAndSaysItsVersionAs
 TEST_F(TrainCommand, AJobThatIsCarriedElsewhereTakesTheFilesThatItWasWrittenForAlone) {
   TrainCodec();
   const std::string own = Path("codec/codec.safetensors"), other = Path("other.safetensors"), config = Path("page.yaml");
+  Encode();
+  const std::string told = Path("told.yaml"), whole = Path("whole.safetensors");
+  WriteFileAtomically(told, std::string(kPage) + "object_forecast: true\npose_map: {scaled: true}\n");
+  Replace("told.yaml", "in_channels: 31", "in_channels: 32");
+  nn::RandomWeights random(1);
+  nn::SaveWeights(whole, random, ReadEvacConfig(told));
   std::string bytes = ReadFile(own);
   bytes[bytes.size() - 4] ^= 1;  // the last digit of its last number
   WriteFileAtomically(other, bytes);
@@ -356,10 +385,13 @@ TEST_F(TrainCommand, AJobThatIsCarriedElsewhereTakesTheFilesThatItWasWrittenForA
     EXPECT_FALSE(std::filesystem::exists(Path("there"))) << option;
   };
   const std::string job = Path("job");
-  Train({"world", Path("shards"), "--config", config, "--codec", own, "--init", own, "--forecast", own, "--job", job});
-  refused({"--codec", other, "--init", own, "--forecast", own}, "--codec");
-  refused({"--codec", own, "--init", other, "--forecast", own}, "--init");
-  refused({"--codec", own, "--init", own, "--forecast", other}, "--forecast");
+  EXPECT_THAT(Train({"world", Path("shards"), "--config", told, "--codec", own, "--init", whole, "--forecast", whole,
+                     "--set", "first_image=true", "--job", job}),
+              HasSubstr("There: evac-train job SHARDS --codec codec.safetensors --init whole.safetensors --forecast "
+                        "whole.safetensors --out OUT\n"));
+  refused({"--codec", other, "--init", whole, "--forecast", whole}, "--codec");
+  refused({"--codec", own, "--init", other, "--forecast", whole}, "--init");
+  refused({"--codec", own, "--init", whole, "--forecast", other}, "--forecast");
 
   Train({"codec", Path("shards"), "--config", config, "--init", own, "--job", job, "--set", "batch=2", "--steps", "1"});
   refused({"--init", other}, "--init");
@@ -369,6 +401,52 @@ TEST_F(TrainCommand, AJobThatIsCarriedElsewhereTakesTheFilesThatItWasWrittenForA
   WriteFileAtomically(job, text.substr(0, line) + text.substr(text.find('\n', line) + 1));
   const CommandResult of_an_earlier_version = there({"--init", other});
   EXPECT_EQ(of_an_earlier_version.exit_code, 0) << of_an_earlier_version.err;
+}
+
+/// Of packings that nobody had compared, one learned from what another held out.
+TEST_F(TrainCommand, AJobThatIsCarriedElsewhereTakesTheShardsThatItWasWrittenForAlone) {
+  const std::string job = Path("job"), shards = Path("shards");
+  Train({"codec", shards, "--config", Path("page.yaml"), "--job", job, "--set", "batch=2", "--steps", "1"});
+  const auto there = [&](std::vector<std::string> words) {
+    words.insert(words.begin(), {Binary("evac-train"), job});
+    words.insert(words.end(), {"--threads", "1", "--out", Path("there")});
+    return RunCommand(words);
+  };
+  const CommandResult twice = there({shards, shards});
+  EXPECT_EQ(twice.exit_code, 2) << twice.err;
+  EXPECT_THAT(twice.err, HasSubstr("evac-train: SHARDS: they are others than the job was written for, or in another "
+                                   "order: recipe carry,carry, wanted carry\n"));
+  EXPECT_FALSE(std::filesystem::exists(Path("there")));
+  EXPECT_EQ(there({shards}).exit_code, 0);
+  std::filesystem::remove_all(Path("there"));
+  Replace("job", "recipe carry\n", "");
+  EXPECT_EQ(there({shards, shards}).exit_code, 0) << "of an earlier version, it is not asked";
+}
+
+/// The job was written, and refused on the other machine.
+TEST_F(TrainCommand, WhatATrainingWouldRefuseIsRefusedBeforeItsJobIsWritten) {
+  TrainCodec();
+  const std::string codec = Path("codec/codec.safetensors"), job = Path("job");
+  const auto refused = [&](std::vector<std::string> words, const std::string& why) {
+    words.insert(words.begin() + 1, {Path("shards"), "--config", Path("page.yaml"), "--job", job});
+    EXPECT_THAT([&] { Train(words); }, ThrowsMessage<TensorError>(HasSubstr(why)));
+    EXPECT_FALSE(std::filesystem::exists(job)) << why;
+  };
+  refused({"codec", "--set", "map_share=2"}, "codec training: map_share is 2, wanted 0 to 1");
+  refused({"codec", "--set", "holdout_size=0"}, "holdout_size is 0, wanted at least 1");
+  refused({"world", "--codec", codec}, "shard_00000.safetensors has no latents");
+  Encode();
+  refused({"world", "--codec", codec}, "the page's pose_map wants 'radius_px=50 thickness_px=8'");
+  Replace("page.yaml", "views: 2\n", "views: 2\npose_map: {scaled: true}\n");
+  refused({"world", "--codec", codec, "--set", "step_weight=fast"}, "step_weight is 'fast'");
+  refused({"world", "--codec", codec, "--set", "view_weights=1,1,1"}, "view_weights has 3 numbers, wanted 2");
+  refused({"world", "--codec", codec, "--set", "strip_steps=1"}, "strip_steps is 1, wanted 2 to 1000");
+  refused({"world", "--codec", codec, "--set", "learning_rate=0"}, "learning_rate is 0");
+  refused({"world", "--codec", codec, "--set", "drop=2"}, "world training: drop is 2, wanted 0 to 1");
+  refused({"world", "--codec", codec, "--init", codec}, "does not fit the page of sizes");
+  refused({"world", "--codec", codec, "--forecast", codec}, "object_forecast: false, wanted true, or no --forecast");
+  EXPECT_THAT(Train({"world", Path("shards"), "--config", Path("page.yaml"), "--codec", codec, "--job", job}),
+              HasSubstr("There: evac-train job SHARDS --codec codec.safetensors --out OUT\n"));
 }
 
 TEST_F(TrainCommand, WantsAFolderToWriteOrAJobAndNotBoth) {

@@ -77,6 +77,17 @@ TEST_F(TrainJudgeTest, ATinyClassifierTellsClipsApartThatItHasNotSeen) {
   EXPECT_NO_THROW(ClassifierJudge(folder_ / "judge" / "judge.safetensors", folder_.path()));
 }
 
+/// It was trained to the end, and refused by each command that was to judge by it.
+TEST_F(TrainJudgeTest, PicturesWhoseSidesAreNoMultiplesOfEightAreRefusedBeforeTheFirstStep) {
+  for (const auto& [height_px, width_px] : {std::pair(20, 24), std::pair(16, 28)}) {
+    WriteLearningShards(folder_ / "shards", {.clips = 8, .height_px = height_px, .width_px = width_px});
+    const std::string found = std::to_string(width_px) + "x" + std::to_string(height_px);
+    EXPECT_THAT([&] { Train(Place("judge"), Quick(2)); },
+                ThrowsMessage<Error>(HasSubstr("pictures are " + found + ", wanted multiples of 8")));
+    EXPECT_FALSE(std::filesystem::exists(folder_ / "judge"));
+  }
+}
+
 TEST_F(TrainJudgeTest, GoesOnFromAJudgeThatIsGiven) {
   Train(Place("first"), Quick(150));
   const std::filesystem::path first = folder_ / "first" / "judge.safetensors";

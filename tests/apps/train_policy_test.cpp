@@ -113,6 +113,17 @@ TEST_F(TrainPolicyTest, OptionsOutOfRangeAreRefusedByName) {
   }
 }
 
+/// It ended in the first step, in libtorch's words: "shape is invalid for input".
+TEST_F(TrainPolicyTest, PicturesWhoseSidesAreNoMultiplesOfEightAreRefusedBeforeTheFirstStep) {
+  for (const auto& [height_px, width_px] : {std::pair(20, 24), std::pair(16, 28)}) {
+    WriteLearningShards(folder_ / "shards", {.clips = 8, .height_px = height_px, .width_px = width_px});
+    const std::string found = std::to_string(width_px) + "x" + std::to_string(height_px);
+    EXPECT_THAT([&] { TrainPolicy(Place("policy"), Quick(2), nullptr, {}); },
+                ThrowsMessage<Error>(HasSubstr("pictures are " + found + ", wanted multiples of 8")));
+    EXPECT_FALSE(std::filesystem::exists(folder_ / "policy"));
+  }
+}
+
 /// Every outcome times this: failures stay failures.
 void MultiplyOutcomes(const std::filesystem::path& folder, int by) {
   for (const std::filesystem::path& shard : train::ShardPaths(folder)) {

@@ -300,12 +300,35 @@ TEST(Recording, AClipWithOnlyAFirstFrameIsReadAtThirtyHertz) {
   EXPECT_EQ(ReadRecording(folder / "a", {.recorded_period_s = 0.05}).period_s, 0.05);
 }
 
+/// A first frame and a step or two could begin no episode of a network whose frames are .05 s apart.
+TEST(Recording, ABeginningOfWhichNoVideoSaysTheRateIsInStepsOfThePeriodThatIsWanted) {
+  const TempFolder folder;
+  const auto without_video = [&](const std::string& name, int steps) {
+    SyntheticClip clip(steps);
+    std::ranges::fill(clip.grippers, 60.0F);
+    clip.Write(OneFolder(folder / name));
+    fs::remove(folder / name / "head_color.mp4");
+    cv::imwrite((folder / name / "frame.png").string(), cv::Mat(32, 48, CV_8UC3, cv::Scalar::all(77)));
+    return ReadRecording(folder / name);
+  };
+  const Recording beginning = BegunFrom(without_video("a", 2), 0.05);
+  EXPECT_EQ(beginning.period_s, 0.05);
+  EXPECT_EQ(beginning.arms.size(), 2u);
+  EXPECT_THAT(beginning.source, HasSubstr("taken to be 0.05 s apart"));
+  EXPECT_EQ(BegunFrom(without_video("b", 7), 0.1).arms.size(), 3u) << "thinned where it can be";
+  const auto refused = testing::ThrowsMessage<Error>(HasSubstr("wanted steps of 0.05 s, or of a whole part of it"));
+  EXPECT_THAT([&] { BegunFrom(without_video("c", 16), 0.05); }, refused) << "an episode";
+  SyntheticClip(2).Write(OneFolder(folder / "d"));
+  EXPECT_THAT([&] { BegunFrom(ReadRecording(folder / "d"), 0.05); }, refused) << "its video says 30 Hz";
+}
+
 TEST(Recording, BrokenNumbersInTheTrackAreRefusedWithStepAndArm) {
   const TempFolder folder;
   SyntheticClip clip(4);
   clip.positions_m[(2 * 2 + 1) * 3] = std::numeric_limits<double>::infinity();
   clip.Write(OneFolder(folder / "infinite"));
-  EXPECT_THAT(ErrorOf(folder / "infinite"), HasSubstr("proprio_stats.h5: step 2, right arm: the pose is not finite"));
+  EXPECT_THAT(ErrorOf(folder / "infinite"),
+              HasSubstr("proprio_stats.h5: state/end: step 2, right arm: the pose is not finite"));
   clip = SyntheticClip(4);
   clip.quaternions_xyzw[3] = 0;
   clip.Write(OneFolder(folder / "zero"));

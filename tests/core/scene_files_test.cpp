@@ -36,6 +36,28 @@ TEST_F(SceneFiles, IncludesMeshesAndTexturesOfIncludedFilesToo) {
   EXPECT_THAT(Found(scene), ElementsAre("meshes/hand.stl", "robot.xml", "skins/wood.png"));
 }
 
+/// Of an include that was not called .xml the meshes were nobody's.
+TEST_F(SceneFiles, WhatIsIncludedIsReadWhateverItIsCalled) {
+  const auto scene = Write("scene.mjcf", R"(<mujoco><include file="robot.mjcf"/><include file="table"/></mujoco>)");
+  Write("robot.mjcf", "\xEF\xBB\xBF\n<mujoco><mesh file='hand.stl'/></mujoco>");
+  Write("table", R"(<mujoco><texture file="wood.bin"/></mujoco>)");
+  Write("hand.stl", "mesh");
+  Write("wood.bin", "no XML: file='foot.stl'");
+  Write("foot.stl", "of nobody");
+  EXPECT_THAT(Found(scene), ElementsAre("hand.stl", "robot.mjcf", "table", "wood.bin"));
+}
+
+/// MuJoCo looks for them by their names alone then, and they were in no hash.
+TEST_F(SceneFiles, MeshesAreFoundWithoutTheirFoldersWhereTheSceneStripsPaths) {
+  const std::string assets = R"(<mesh file="parts/hand.stl"/><mesh file="C:\parts\foot.stl"/></mujoco>)";
+  Write("meshes/hand.stl", "mesh");
+  Write("meshes/foot.stl", "mesh");
+  EXPECT_THAT(Found(Write("a.xml", R"(<mujoco><compiler meshdir="meshes" strippath="true"/>)" + assets)),
+              ElementsAre("meshes/foot.stl", "meshes/hand.stl"));
+  EXPECT_THAT(Found(Write("b.xml", R"(<mujoco><compiler meshdir="meshes" strippath="false"/>)" + assets)),
+              ElementsAre());
+}
+
 TEST_F(SceneFiles, FilesThatIncludeEachOtherAreReadOnce) {
   const auto scene = Write("a.xml", R"(<include file="b.xml"/>)");
   Write("b.xml", R"(<include file="a.xml"/>)");

@@ -5,6 +5,7 @@
 
 #include "core/error.h"
 #include "core/store.h"
+#include "core/store_sqlite.h"
 #include "tests/core/store_samples.h"
 #include "tests/support/temp_folder.h"
 
@@ -119,6 +120,66 @@ TEST(StoreTrials, AGateDecisionThatIsAskedForAgainIsTheLastAndTheSame) {
   store.RepeatGateRecord("k3");
   EXPECT_THAT(store.GateRecords(), ElementsAre(pass, fail)) << "nobody decided that";
   EXPECT_THROW(store.AddGateRecord(fail, {}), Error) << "it is still there once";
+}
+
+
+TEST(StorePlan, IsOfTasksAndWorldsThatAreThereAndTheLargerNumberStays) {
+  const TempFolder folder;
+  Store store = Store::CreateOrContinue(folder / "run", SomeRun());
+  Declare(store);
+  EXPECT_THAT(store.Plan(), IsEmpty());
+  const PlannedEpisodes real{"take_bottle", "real", "visual_pick", "good", 20};
+  const PlannedEpisodes sim{"take_bottle", "sim", "hold", "default", 5};
+  store.AddPlan({sim, real});
+  PlannedEpisodes fewer = real, elsewhere = real;
+  fewer.episodes = 19;
+  store.AddPlan({fewer});
+  elsewhere.world = "moon";
+  EXPECT_THROW(store.AddPlan({elsewhere}), Error);
+  EXPECT_THAT(Store::Open(folder / "run", Store::Mode::kReadOnly).Plan(), ElementsAre(real, sim));
+}
+
+TEST(StorePlan, APageIsTheSameWithAllFilesThatItNames) {
+  const TempFolder folder;
+  Store store = Store::InMemory(folder.path(), SomeRun());
+  store.AddTask(SomeTask());
+  EXPECT_THAT(store.PageHashes(), IsEmpty()) << "nobody said";
+  store.AddTask(SomeTask(), "9a9e");
+  store.AddTask(SomeTask(), "9a9e");
+  EXPECT_THAT(store.PageHashes(), ElementsAre(testing::Pair("take_bottle", "9a9e")));
+  EXPECT_THAT([&] { store.AddTask(SomeTask(), "07e42"); },
+              testing::ThrowsMessage<Error>(testing::AllOf(testing::HasSubstr("9a9e"), testing::HasSubstr("07e42"))));
+}
+
+TEST(StorePlan, GoesWhereARunWithoutEpisodesMakesRoom) {
+  const TempFolder folder;
+  {
+    Store store = Store::CreateOrContinue(folder / "run", SomeRun());
+    Declare(store);
+    store.AddTask(SomeTask(), "9a9e");
+    store.AddPlan({{"take_bottle", "real", "visual_pick", "good", 20}});
+  }
+  RunInfo other = SomeRun();
+  other.suite_hash = "07e42";
+  const Store store = Store::CreateOrContinue(folder / "run", other);
+  EXPECT_THAT(store.Plan(), IsEmpty());
+  EXPECT_THAT(store.PageHashes(), IsEmpty());
+}
+
+TEST(StorePlan, ARunOfAnEarlierEvacSaysNoneUntilItGoesOn) {
+  const TempFolder folder;
+  {
+    Store store = Store::CreateOrContinue(folder / "run", SomeRun());
+    Declare(store);
+  }
+  sqlite::Connection::OpenReadWrite(folder / "run/evac.sqlite")
+      .RunScript("DROP TABLE planned_episodes; DROP TABLE page_hashes; PRAGMA user_version = 4");
+  const Store before = Store::Open(folder / "run", Store::Mode::kReadOnly);
+  EXPECT_THAT(before.Plan(), IsEmpty());
+  EXPECT_THAT(before.PageHashes(), IsEmpty());
+  Store after = Store::CreateOrContinue(folder / "run", SomeRun());
+  after.AddPlan({{"take_bottle", "real", "visual_pick", "good", 20}});
+  EXPECT_EQ(after.Plan().size(), 1u);
 }
 
 }  // namespace

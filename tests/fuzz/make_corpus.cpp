@@ -1,6 +1,7 @@
 #include <array>
 #include <cstdio>
 #include <span>
+#include <vector>
 
 #include "core/collection.h"
 #include "core/file.h"
@@ -148,7 +149,7 @@ void MakeTextSeeds(const fs::path& corpus) {
   evac::WriteText(corpus / "training_tables_fuzz/small.csv", "step,loss\n1,0.5\n2,0.25\n200,nan\n");
   evac::WriteText(corpus / "training_job_fuzz/small",
                   "evac-training 1\nworld\nsize chunk 8\nsize unet.channel_mult 1,2,4,4\noption batch 4\ninit_widen true\n"
-                  "init_sha256 a\nbegun_with x\n");
+                  "init_sha256 a\nrecipe b,b\nbegun_with x\n");
   evac::WriteText(corpus / "vlm_config_fuzz/server.yaml",
                   "name: qwen3-vl\nbase_url: http://localhost:8000/v1\nmodel: m\nkey: {env: KEY}\n"
                   "sampling: {temperature: 0.1, seed: 7, max_tokens: 500}\nclip: {frames: 8, tail_frames: 2}\n"
@@ -215,6 +216,30 @@ void MakeTensorSeeds(const fs::path& corpus) {
   evac::WriteTensorFile(corpus / "chunk_cache_fuzz/small", chunk, {});
 }
 
+/// What a training is told by its page and by --set, what it leaves to go on from, and what `evac imagine` does.
+void MakeJobSeeds(const fs::path& corpus) {
+  const std::string page = evac::ReadFile(EVAC_SOURCE_DIR "/apps/configs/desk_training.yaml");
+  evac::WriteText(corpus / "training_page_fuzz/desk", "\n" + page);
+  evac::WriteText(corpus / "training_page_fuzz/set", "optimiser=muon\n" + page);
+  evac::WriteText(corpus / "training_page_fuzz/world",
+                  "view_weights=1,0.25\nworld: {steps: 3, minutes: 0.5, seed: 18446744073709551615, drop: 1e-3, "
+                  "successes_only: true, memory_noise_kind: uniform, step_weight: min_snr}\n");
+  evac::WriteText(corpus / "imagined_page_fuzz/finished.json",
+                  R"({"job": {"eta": 1.0, "reference_quirks": {"residual_noise": false}, "seed": 9, "solver": "ddim",
+ "statistics": {"mean": [0.0, 0.5]}}, "finished": true, "frames": 7, "command": ["evac", "imagine"]})");
+  const std::array<float, 6> numbers = {0, 1.5F, -2, 1e-3F, 4, 0.25F};
+  std::vector<evac::TensorView> tensors;
+  for (const char* name : {"values", "first_moment", "second_moment", "average", "best"})
+    tensors.push_back({{name, evac::TensorType::kF32, {6}}, std::as_bytes(std::span(numbers))});
+  const evac::TensorMetadata metadata = {{"format", "own"},        {"layout", "own"},        {"identity", "own"},
+                                         {"step", "3"},            {"steps", "10"},          {"planned", "1"},
+                                         {"minutes", "0x1p+0"},    {"not_finite", "0"},      {"left_out", "1"},
+                                         {"smooth_loss", "-nan"},  {"best_score", "0x1p-3"}, {"best_step", "2"},
+                                         {"holdouts_since_best", "1"}};
+  fs::create_directories(corpus / "training_checkpoint_fuzz");
+  evac::WriteTensorFile(corpus / "training_checkpoint_fuzz/planned", tensors, metadata);
+}
+
 /// CORPUS/npy_fuzz: one array per type. CORPUS/recording_fuzz: a camera's pages and a collection's row, each after the
 /// letter that says which it is. CORPUS/proprio_fuzz and CORPUS/video_fuzz: a track and a video of four steps.
 void MakeCorpus(const fs::path& corpus) {
@@ -242,6 +267,7 @@ void MakeCorpus(const fs::path& corpus) {
   MakePageSeeds(corpus);
   MakeShardSeeds(corpus / "shards_fuzz");
   MakeTensorSeeds(corpus);
+  MakeJobSeeds(corpus);
   fs::create_directories(corpus / "truth_fuzz");
   evac::WriteTruth(corpus / "truth_fuzz/three_frames", {{"head"}, std::vector<float>(6, 1), std::vector<std::uint8_t>(3, 0)});
   evac::WriteText(corpus / "scene_files_fuzz/desk.xml",

@@ -14,6 +14,8 @@ void ReadAll(const evac::Store& store) {
   store.Tasks();
   store.Worlds();
   store.Policies();
+  store.PageHashes();
+  store.Plan();
   store.Verdicts();
   store.CurrentVerdicts();
   store.CountersByPolicy();

@@ -194,6 +194,24 @@ TEST_F(MergedRuns, SayWhichShardsCallsOfModelServersStayBehind) {
   EXPECT_THAT(summary.notes[0], testing::HasSubstr((b_.folder() / CallCache::kFile).string()));
 }
 
+/// A shard that was killed, or was none of those that were merged, was no loss to anybody.
+TEST_F(MergedRuns, SayHowManyEpisodesOfTheSuiteNoShardHas) {
+  const PairKey& pair = key_.pair;
+  const PlannedEpisodes three{pair.task, key_.world, pair.policy, pair.checkpoint, 3};
+  a_.AddTask(samples::SomeTask(), "9a9e");
+  for (Store* store : {&a_, &b_}) store->AddPlan({three});
+  a_.Add(samples::SomeEpisode(a_, key_));
+  b_.Add(samples::SomeEpisode(b_, other_));
+  const MergeSummary part = Merge("part");
+  ASSERT_EQ(part.notes.size(), 1u);
+  EXPECT_THAT(part.notes[0], testing::HasSubstr("2 of the suite's 3 episodes are there"));
+  const Store merged = Store::Open(folder_ / "part", Store::Mode::kReadOnly);
+  EXPECT_EQ(merged.Plan(), std::vector<PlannedEpisodes>{three});
+  EXPECT_EQ(merged.PageHashes(), (std::map<std::string, std::string>{{pair.task, "9a9e"}}));
+  b_.Add(samples::SomeEpisode(b_, samples::Key(3, "real"), StopReason::kPolicyError));
+  EXPECT_TRUE(Merge("whole").notes.empty()) << "one that failed has run";
+}
+
 /// Two labs' lists that both count from one: the second's were dropped without a word.
 TEST_F(MergedRuns, RefuseRealTrialsOfWhichTwoShardsSayOtherwise) {
   for (Store* store : {&a_, &b_}) store->Add(samples::SomeEpisode(*store, key_));

@@ -53,6 +53,16 @@ class SuiteTest : public ::testing::Test {
     }
     return "no complaint";
   }
+  /// A suite of one task: a page of that name, whose scene is that file.
+  std::filesystem::path WriteSuiteOf(const std::string& page, const std::string& scene) {
+    std::string text = ReadFile(EVAC_SOURCE_DIR "/worldmodel/sim/scenes/take_bottle.yaml");
+    Write(page, text.replace(text.find("scene: take_bottle.xml"), 22, "scene: " + scene));
+    std::string suite = ReadFile(EVAC_SOURCE_DIR "/tests/system/small.yaml");
+    suite.replace(suite.find("../../worldmodel/sim/scenes/take_bottle.yaml"), 44, (folder_ / page).string());
+    for (std::size_t at; (at = suite.find("../../worldmodel")) != std::string::npos;)
+      suite.replace(at, 5, EVAC_SOURCE_DIR);
+    return Write("suite.yaml", suite);
+  }
   TempFolder folder_;
 };
 
@@ -145,24 +155,93 @@ TEST_F(SuiteTest, TheHashCoversWhatARecordingsTaskIsCalled) {
   EXPECT_EQ(hash("link"), hash("rec"));
 }
 
+/// Runs of one task from recordings in two folders were of two tasks to judges and comparisons.
+TEST_F(SuiteTest, ARecordingsTaskIsCalledAsThePageSaysWhereverItLies) {
+  std::filesystem::create_directory(folder_ / "other");
+  Write("other/action.npy", "bytes");
+  const auto path = Write("suite.yaml", std::string(kSuite) + "task: pour\n");
+  const Suite suite = ReadSuite(path, {});
+  EXPECT_EQ(suite.recorded_task.name, "pour");
+  EXPECT_EQ(ReadSuite(path, {"recording=" + (folder_ / "other").string()}).hash, suite.hash);
+  EXPECT_NE(ReadSuite(path, {"task=stack"}).hash, suite.hash);
+  EXPECT_THAT(Complaint(path, {"task=a/b"}), HasSubstr("field task"));
+  EXPECT_THAT(Complaint(std::filesystem::path(EVAC_SOURCE_DIR "/tests/system/small.yaml"), {"task=pour"}),
+              AllOf(HasSubstr("field task"), HasSubstr("none but beside a `recording`")));
+}
+
+/// All depth pictures below a recording were hashed whenever a suite was read, and one more ended `resume`.
+TEST_F(SuiteTest, TheHashCoversOfRecordingsWhatIsReadOfThemAndAllWhereAPolicyIsToldWhereTheyLie) {
+  const auto make = [&](const std::string& name) {
+    std::filesystem::create_directories((folder_ / name).parent_path());
+    Write(name, name);
+  };
+  const std::string camera = "tree/parameters/carry/1/parameters/camera/";
+  const std::vector<std::string> read = {"tree/observations/carry/1/videos/head_color.mp4",
+                                         "tree/proprio_stats/carry/1/proprio_stats.h5",
+                                         camera + "head_intrinsic_params.json",
+                                         camera + "head_extrinsic_params_aligned.json",
+                                         "clips/a/proprio_stats.h5", "clips/a/frame.png", "clips/b/action.npy"};
+  for (const std::string& name : read) make(name);
+  const auto path = Write("suite.yaml", kSuite);
+  const std::vector<std::string> recordings = {"tree", "tree/observations/carry", "tree/observations/carry/1", "clips",
+                                               "clips/a"};
+  const auto hashes = [&](const std::string& more = "seeds=[1]") {
+    std::vector<std::string> found;
+    for (const std::string& recording : recordings)
+      found.push_back(ReadSuite(path, {"recording=" + (folder_ / recording).string(), more}).hash);
+    return found;
+  };
+  const std::string told = R"(policies.0.command=[mine, "${recording}"])";
+  const std::vector<std::string> before = hashes(), before_told = hashes(told);
+  for (const std::string& name : {std::string("tree/observations/carry/1/depth/head_depth_000000.png"),
+                                  std::string("tree/observations/carry/1/tactile/left.h5"), camera + "notes.txt",
+                                  std::string("clips/a/depth.png"), std::string("clips/a/more/depth.png")})
+    make(name);
+  EXPECT_EQ(hashes(), before);
+  const Suite suite = ReadSuite(path, {"recording=" + (folder_ / "tree").string()});
+  EXPECT_EQ(suite.hashed_files.size(), 4U) << "nothing else of the tree is read at all";
+  const std::vector<std::string> now_told = hashes(told);
+  for (std::size_t i = 0; i < recordings.size(); ++i) {
+    const bool is_one = recordings[i].ends_with("/1") || recordings[i].ends_with("/a");  // of several nobody is told
+    EXPECT_EQ(now_told[i] != before_told[i], is_one) << recordings[i];
+  }
+  for (const std::string& name : read) {
+    Write(name, "another");
+    EXPECT_NE(hashes(), before) << name;
+    Write(name, name);
+  }
+  EXPECT_EQ(hashes(), before);
+}
+
 TEST_F(SuiteTest, TheHashCoversWhatASceneInAnotherFolderThanItsPageIsMadeOf) {
-  const std::filesystem::path scenes = EVAC_SOURCE_DIR "/worldmodel/sim/scenes";
   for (const char* name : {"tasks", "mjcf", "mjcf/meshes"}) std::filesystem::create_directory(folder_ / name);
-  std::string page = ReadFile(scenes / "take_bottle.yaml");
-  page.replace(page.find("scene: take_bottle.xml"), 22, "scene: ../mjcf/scene.xml");
-  Write("tasks/take_bottle.yaml", page);
+  const auto path = WriteSuiteOf("tasks/take_bottle.yaml", "../mjcf/scene.xml");
   Write("mjcf/scene.xml", R"(<mujoco><include file="robot.xml"/><compiler meshdir="meshes"/></mujoco>)");
   Write("mjcf/robot.xml", R"(<mujoco><asset><mesh file="hand.stl"/></asset></mujoco>)");
   Write("mjcf/meshes/hand.stl", "a hand");
-  std::string suite = ReadFile(EVAC_SOURCE_DIR "/tests/system/small.yaml");
-  suite.replace(suite.find("../../worldmodel/sim/scenes/take_bottle.yaml"), 44, (folder_ / "tasks/take_bottle.yaml").string());
-  for (std::size_t at; (at = suite.find("../../worldmodel")) != std::string::npos;) suite.replace(at, 5, EVAC_SOURCE_DIR);
-  const auto path = Write("suite.yaml", suite);
   std::set<std::string> hashes = {ReadSuite(path, {}).hash};
   Write("mjcf/robot.xml", R"(<mujoco><asset><mesh file="hand.stl" scale="2 2 2"/></asset></mujoco>)");
   EXPECT_TRUE(hashes.insert(ReadSuite(path, {}).hash).second) << "an included file";
   Write("mjcf/meshes/hand.stl", "another hand");
   EXPECT_TRUE(hashes.insert(ReadSuite(path, {}).hash).second) << "a mesh";
+}
+
+/// Only what was called .xml was looked into: a run went on with another mesh of a scene.mjcf, and with another scene
+/// that had no ending at all.
+TEST_F(SuiteTest, TheHashCoversWhatASceneIsMadeOfWhateverItAndItsIncludesAreCalled) {
+  std::filesystem::create_directories(folder_ / "mjcf/meshes");
+  for (const std::string ending : {".xml", ".mjcf", ".XML", ""}) {
+    const std::string scene = "mjcf/scene" + ending, robot = "mjcf/robot" + ending;
+    const auto path = WriteSuiteOf("take_bottle.yaml", scene);
+    Write(scene, R"(<mujoco><compiler meshdir="meshes"/><include file="robot)" + ending + R"("/></mujoco>)");
+    Write(robot, R"(<mujoco><asset><mesh file="hand.stl"/></asset></mujoco>)");
+    Write("mjcf/meshes/hand.stl", "a hand");
+    std::set<std::string> hashes = {ReadSuite(path, {}).hash};
+    for (const std::string& file : {scene, robot, std::string("mjcf/meshes/hand.stl")}) {
+      Write(file, ReadFile(folder_ / file) + "<!-- another -->");
+      EXPECT_TRUE(hashes.insert(ReadSuite(path, {}).hash).second) << scene << ": " << file;
+    }
+  }
 }
 
 TEST_F(SuiteTest, TheHashCoversTheFilesThatAPolicyListsAndWhichItDoesNotIsKnown) {
@@ -195,6 +274,40 @@ policies:
   EXPECT_THAT(unlisted({}, std::filesystem::relative(path)), testing::IsEmpty());
   EXPECT_THAT(unlisted({"policies.0.files=[]"}, path), testing::ElementsAre("policy.py", "net/step_9.bin"));
   EXPECT_THAT(Complaint(path, {"policies.0.files=[nowhere]"}), AllOf(HasSubstr("files"), HasSubstr("nowhere")));
+}
+
+/// Shards whose nodes had the same weights in scratch folders of their own were "runs of different suites".
+TEST_F(SuiteTest, TheHashTakesAPolicysFilesByContentWhereverTheyLie) {
+  const auto path = Write("suite.yaml", kSuite);
+  for (const std::string node : {"a", "b"}) {
+    std::filesystem::create_directories(folder_ / node / "net");
+    Write(node + "/policy.pt", "weights"), Write(node + "/net/norm.json", "norm");
+  }
+  const auto hash = [&](const std::string& node, const std::string& field = "policies.0.files") {
+    const std::string weights = (folder_ / node / "policy.pt").string(), net = (folder_ / node / "net").string();
+    return ReadSuite(path, {field + "=[" + weights + ", " + net + "]"}).hash;
+  };
+  const std::string alike = hash("a");
+  EXPECT_EQ(hash("b"), alike);
+  EXPECT_NE(hash("b", "policies.1.files"), alike) << "another policy's";
+  EXPECT_NE(ReadSuite(path, {"policies.0.files=[" + (folder_ / "a/net").string() + "]"}).hash, alike) << "one is gone";
+  Write("b/net/norm.json", "another");
+  EXPECT_NE(hash("b"), alike);
+}
+
+TEST_F(SuiteTest, WhatIsPlannedIsHowManyJobsThereAre) {
+  const Suite suite =
+      ReadSuite(EVAC_SOURCE_DIR "/tests/system/small.yaml", {"seeds=[1, 2]", "worlds.1.initial_states=1"});
+  std::int64_t all = 0;
+  for (const PlannedEpisodes& planned : PlannedOf(suite)) {
+    EXPECT_EQ(planned.episodes, planned.world == "sim" ? 2 : 4);
+    all += planned.episodes;
+  }
+  std::size_t jobs = 0;
+  for (const SuiteWorld& world : suite.worlds) {
+    for (const SuitePolicy& policy : suite.policies) jobs += AllJobs(suite, world, policy).size();
+  }
+  EXPECT_EQ(all, static_cast<std::int64_t>(jobs));
 }
 
 TEST_F(SuiteTest, ItsStopRuleIsCheckedAsATasksIs) {

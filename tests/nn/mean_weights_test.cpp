@@ -108,6 +108,28 @@ TEST_F(MeanOfWeights, OfOneCodecThatWasRoundedForSomeIsTaken) {
   EXPECT_THROW(MeanWeights({half, whole, folder_ / "rounded"}, config_), TensorError) << "the two floats differ";
 }
 
+/// Each number of the codec was half way between itself and its rounding: a third codec, which no latents were made by.
+TEST_F(MeanOfWeights, CodecAndForecastAreThoseOfTheFileThatSaysMostDigits) {
+  config_.object_forecast = true;
+  config_.unet.in_channels += 1;
+  config_.vae.channel_mult = {1, 1, 1};
+  const fs::path half = Written("half", Trained(1), {.dtype = at::kBFloat16}), whole = Written("whole", Trained(2), {});
+  FileWeights exact(whole, config_), rounded(half, config_);
+  MeanWeights mean({half, whole}, config_), of_halves({half, half}, config_);
+  int differ = 0, forecast = 0;
+  for (const auto& [key, shape] : CheckpointKeys(config_)) {
+    if (!key.starts_with("first_stage_model") && !key.starts_with(kForecastPrefix)) continue;
+    const Tensor wanted = exact.Take(key, shape);
+    if (!wanted.defined()) continue;
+    EXPECT_TRUE(at::equal(mean.Take(key, shape), wanted)) << key;
+    EXPECT_TRUE(at::equal(of_halves.Take(key, shape), rounded.Take(key, shape))) << key;
+    differ += at::equal(rounded.Take(key, shape), wanted) ? 0 : 1;
+    forecast += key.starts_with(kForecastPrefix) ? 1 : 0;
+  }
+  EXPECT_GT(differ, 10) << "or nothing is tested";
+  EXPECT_GT(forecast, 0);
+}
+
 /// The card of a mean kept no sizes where one of the cards had fewer, of an earlier version.
 TEST_F(MeanOfWeights, SaysTheSizesThatItsCardsSayTogether) {
   const std::string sizes = SizesNobodySees(config_), earlier = "fps 2\ndomain 11\n";

@@ -257,6 +257,27 @@ TEST_F(RunCorrelation, ComparesTheRealWorldWithEachOtherInAllAndTaskByTask) {
   }
 }
 
+/// It said 9 pairs of these 7: the one within each task was counted with its world's and again with its task's.
+TEST_F(RunCorrelation, APairOfTiedPointsIsCountedOnceThoughItsTaskHasAGroupOfItsOwn) {
+  const char* real[] = {"ssff", "ssff", "sssf"};
+  const char* sim[][3] = {{"ffff", "sfff", "ssff"}, {"sssf", "ssss", "ssff"}};  // by task
+  for (int task = 0; task < 2; ++task) {
+    for (int policy = 0; policy < 3; ++policy) {
+      for (std::size_t state = 0; state < 4; ++state) {
+        const PairKey pair{kTasks[task], "7-" + std::to_string(state), "pick", kCheckpoints[policy], 0};
+        Add(pair, "real", real[policy][state] == 's' ? Label::kSuccess : Label::kFailure);
+        Add(pair, "sim", sim[task][policy][state] == 's' ? Label::kSuccess : Label::kFailure);
+      }
+    }
+  }
+  const auto groups = CorrelateRun(store_, {.correlation = {}, .judge = "oracle", .world = "sim"});
+  ASSERT_THAT(groups, SizeIs(3));
+  EXPECT_EQ(groups[1].ranks.ties, 1);
+  EXPECT_EQ(groups[2].ranks.ties, 1);
+  EXPECT_EQ(groups[0].ranks.ties, 7);
+  EXPECT_THAT(CorrelationText(groups), HasSubstr("; 7 pairs of points tied\n"));
+}
+
 TEST_F(RunCorrelation, AWorldCanBeChosenAndAWrongNameIsNamed) {
   AddAll();
   RunCorrelationOptions options;

@@ -197,6 +197,15 @@ TEST(Badge, IsGreenOnlyIfEveryGatePassedOnJustTheseData) {
   EXPECT_THAT(BadgeSvg(summary, {failed_then, failed}), HasSubstr("#cf222e")) << "what holds now comes first";
 }
 
+/// It said "no verdict", though all were judged: no world was the real one, whose rate it would have been.
+TEST(Badge, OfSeveralWorldsWithoutARealOneItCountsAsOfSeveralPolicies) {
+  RunData data = ReadRun(SampleRun({{"a", "pick", "1", "ssff", "sfff"}}).store());
+  EXPECT_THAT(BadgeSvg(Summarise(data, {}), {}), HasSubstr("evac: 50 % ["));
+  for (WorldInfo& world : data.worlds) world.is_real = false;
+  EXPECT_THAT(BadgeSvg(Summarise(data, {}), {}),
+              AllOf(HasSubstr("evac: 1 policy, 8 episodes"), Not(HasSubstr("no verdict"))));
+}
+
 TEST(Xml, WhatXmlCannotHoldIsReplaced) {
   EXPECT_EQ(XmlText("a\x01<\xFF\xEF\xBF\xBF"), "a\xEF\xBF\xBD&lt;\xEF\xBF\xBD\xEF\xBF\xBD");
   EXPECT_EQ(XmlAttribute("a\nb\tc\""), "a&#10;b&#9;c&quot;");
@@ -245,14 +254,26 @@ TEST(SummaryMarkdown, ANameOfSeveralLinesStaysInItsFold) {
   EXPECT_THAT(page, Not(HasSubstr("\n# Passed")));
 }
 
-TEST(SummaryMarkdown, IsNeverLongerThanItsLimitAndSaysWhatIsLeftOut) {
+/// Of thirty policies with names of eight thousand letters.
+RunSummary LongNamedRun() {
   std::vector<SampleCell> cells;
   const std::string name(8000, 'x');
   for (int i = 0; i < 30; ++i) cells.push_back({"a", std::to_string(i), "", "s", "-"});
   RunSummary summary = SampleRun(cells).Summary();
   for (RateCell& cell : summary.rates) cell.policy += name;
   for (std::string& policy : summary.policies) policy += name;
-  const std::string page = SummaryMarkdown(summary, {});
+  return summary;
+}
+
+/// GitHub refuses a longer one: 65 536 characters.
+TEST(SummaryMarkdown, FitsTheCommentOfAPullRequest) {
+  const std::string page = SummaryMarkdown(LongNamedRun(), {});
+  EXPECT_LT(page.size(), 65'536u);
+  EXPECT_GT(page.size(), 40'000u) << "as much as fits is said";
+}
+
+TEST(SummaryMarkdown, IsNeverLongerThanItsLimitAndSaysWhatIsLeftOut) {
+  const std::string page = SummaryMarkdown(LongNamedRun(), {});
   EXPECT_LE(page.size(), kMostSummaryBytes);
   EXPECT_NE(page.find("report.json has all."), std::string::npos);
   EXPECT_NE(page.find("Provenance"), std::string::npos);
@@ -261,6 +282,21 @@ TEST(SummaryMarkdown, IsNeverLongerThanItsLimitAndSaysWhatIsLeftOut) {
 TEST(ReportFiles, TheSameStoreGivesTheSameBytes) {
   EXPECT_EQ(FilesOf(LargeRun().Summary()), FilesOf(LargeRun().Summary()));
   EXPECT_EQ(FilesOf(LargeRun().Summary()).size(), 9u);
+}
+
+/// A classifier has judged the real world beside the oracle; it gives probabilities.
+RunSummary OfTwoJudges() {
+  SampleRun run({{"a", "pick", "1", "sff", "sff"}, {"a", "pick", "2", "ssf", "-"}});
+  for (const Episode& episode : run.store().Episodes()) {
+    if (episode.key.world != "real") continue;
+    Verdict verdict;
+    verdict.episode_id = episode.key.Id();
+    verdict.judge = "classifier:abc";
+    verdict.label = Label::kSuccess;
+    verdict.probability = 0.75;
+    run.store().AddVerdict(verdict);
+  }
+  return run.Summary();
 }
 
 TEST(ReportFiles, ReportJsonFitsItsPublishedSchema) {
@@ -275,7 +311,7 @@ TEST(ReportFiles, ReportJsonFitsItsPublishedSchema) {
          EVAC_SOURCE_DIR "/docs/formats/report.schema.json", (folder / "report.json").string()});
   };
   const RunSummary unpaired = SampleRun({{"a", "pick", "1", "uu", "sf"}}).Summary();
-  for (const RunSummary& summary : {LargeRun().Summary(), HostileRun(), unpaired}) {
+  for (const RunSummary& summary : {LargeRun().Summary(), HostileRun(), unpaired, OfTwoJudges()}) {
     const CommandResult result = validate(FilesOf(summary).at("report.json"));
     EXPECT_EQ(result.exit_code, 0) << result.err.substr(0, 3000);
   }

@@ -5,8 +5,11 @@
 #include <nlohmann/json.hpp>
 
 #include "core/error.h"
+#include "core/hash.h"
+#include "reports/gate.h"
 #include "reports/gate_baseline.h"
 #include "reports/gate_rules.h"
+#include "tests/reports/repeated_run.h"
 #include "tests/reports/sample_run.h"
 
 /// The two files a gate reads: its rules, and the pinned baseline.
@@ -81,6 +84,48 @@ const SampleRun& Run() {
 
 PinnedResult Pinned() { return Pin(Run().Summary({.bootstrap_replicates = 1}), "out/main"); }
 
+/// What a rule of `fields` is told of a baseline, before there is a candidate.
+std::string ToldBeforeTheRun(const std::string& fields, const PinnedResult& baseline, const std::string& top = "") {
+  const GateRules rules = Read(top + "gates: [{name: r, " + fields + "}]\n");
+  return MessageOf([&] { DemandBaseline(rules, baseline); });
+}
+
+/// It said how many episodes the rule takes; that it can never be held was known after these had been run.
+TEST(GateRules, ThatCanNeverBeHeldAgainstTheBaselineAreRefusedBeforeTheRun) {
+  const SampleRun run({{"take", "pick", "good", "-", "sf"},
+                       {"take", "pick", "poor", "-", "ff"},
+                       {"put", "pick", "good", "-", "sf"},
+                       {"put", "pick", "poor", "-", "-"}});
+  const PinnedResult pinned = Pin(run.Summary({.bootstrap_replicates = 1}), "out/main");
+  const std::string test = "test: paired_mcnemar, ";
+  EXPECT_THAT(ToldBeforeTheRun(test + "task: tak", pinned),
+              HasSubstr("gate rule 'r': task: found 'tak', which the baseline has not, wanted one of: put, take"));
+  EXPECT_THAT(ToldBeforeTheRun(test + "world: moon", pinned),
+              HasSubstr("gate rule 'r': world: found 'moon', which the baseline has not, wanted one of: real, sim"));
+  EXPECT_THAT(ToldBeforeTheRun(test + "baseline_policy: pick@god", pinned),
+              HasSubstr("baseline_policy: found 'pick@god', wanted one of: pick@good, pick@poor"));
+  EXPECT_THAT(ToldBeforeTheRun(test + "policy: pick@new", pinned),
+              HasSubstr("baseline_policy: found nothing, wanted one of: pick@good, pick@poor"));
+  EXPECT_THAT(ToldBeforeTheRun(test + "world: real, baseline_policy: pick@good", pinned),
+              HasSubstr("found no episode of pick@good in real in the baseline, wanted some"));
+  EXPECT_THAT(ToldBeforeTheRun(test + "world: sim, task: put, policy: pick@poor", pinned),
+              HasSubstr("found no episode of pick@poor on task 'put' in sim in the baseline"));
+  EXPECT_THAT(ToldBeforeTheRun("test: boschloo, world: sim, policy: pick@good", pinned),
+              HasSubstr("task: found 2 tasks in the baseline, wanted one"));
+  EXPECT_THAT(ToldBeforeTheRun(test + "world: sim, policy: pick@good", pinned, "judge: classifier\n"),
+              HasSubstr("gate rule 'r': judge: found classifier, wanted the baseline's, oracle"));
+}
+
+TEST(GateRules, ThatAnyCandidateMayYetKeepAreNotRefusedBeforeTheRun) {
+  PinnedResult pinned = Pinned();
+  pinned.judge = "oracle,classifier:abc";
+  const std::string test = "test: paired_mcnemar, ", judge = "judge: 'oracle,classifier'\n";
+  for (const std::string fields : {"world: sim", "world: sim, policy: pick@new", "task: take_bottle", "margin: 0.2"})
+    EXPECT_EQ(ToldBeforeTheRun(test + fields, pinned, judge), "nothing was thrown") << fields;
+  EXPECT_EQ(ToldBeforeTheRun("test: error_share, world: moon, at_most: 0", pinned), "nothing was thrown")
+      << "it compares with no baseline";
+}
+
 TEST(PinnedResult, IsReadAsItWasWritten) {
   const PinnedResult pinned = Pinned();
   const PinnedResult read = ReadPinned(PinnedJson(pinned), "p.json");
@@ -132,6 +177,92 @@ TEST(PinnedResult, AMillionBracketsAreRefused) {
   std::string text = PinnedJson(Pinned());
   text.insert(text.find('{') + 1, "\"notes\": " + deep + ",");
   EXPECT_EQ(MessageOf([&] { ReadPinned(text, "p.json"); }), "p.json: lists and objects lie more than 32 deep");
+}
+
+/// A copy under another name got the decision of the first, and nothing was kept under its own.
+TEST(GateRules, ACopyUnderAnotherNameIsAnotherGate) {
+  const auto hash = [](const std::string& text, const char* file) {
+    return ReadGateRules(Config::FromText(text, file)).hash;
+  };
+  const std::string nameless = "gates: [{name: r, test: savi}]\n", named = "name: nightly\n" + nameless;
+  EXPECT_NE(hash(nameless, "gate.yaml"), hash(nameless, "release.yaml"));
+  EXPECT_EQ(hash(nameless, "gate.yaml"), hash(nameless, "elsewhere/gate.yaml"));
+  EXPECT_EQ(hash(named, "gate.yaml"), hash(named, "release.yaml")) << "it says its name";
+  EXPECT_EQ(hash(named, "gate.yaml"), Config::FromText(named, "gate.yaml").ContentHash()) << "decisions that are kept";
+}
+
+
+/// Four successes of p on t, whose page names a scene.
+RunSummary RunOnPage() {
+  RunSummary run = RepeatedRun({{"t", "p", {}, {"ssss"}}});
+  run.data.tasks.at(0).page = "id: t\nmujoco: {scene: t.xml}\n";
+  run.data.page_hashes = {{"t", "5ce9e"}};
+  run.data.run.suite_text = "suite: s\npolicy: {latency: 0.10}\n";
+  return run;
+}
+
+/// What a rule is told of that run, changed, held against a baseline.
+std::string Told(const std::string& rule, const PinnedResult& baseline, const std::function<void(RunData&)>& change,
+                 RunSummary run = RunOnPage()) {
+  change(run.data);
+  const GateRules rules = Read("gates: [{name: r, world: sim, " + rule + "}]\n");
+  return MessageOf([&] { Decide(rules, {run, "out", {}}, &baseline); });
+}
+
+/// The page's text alone was compared: other physics, pictures, stop rules, chunks and latencies passed without a word.
+TEST(PinnedResult, OfAnotherSceneStopRulePictureChunkOrLatencyIsRefused) {
+  const PinnedResult baseline = ReadPinned(PinnedJson(Pin(RunOnPage(), "out/main")), "p.json");
+  for (const std::string rule : {"test: paired_mcnemar", "test: boschloo"}) {
+    SCOPED_TRACE(rule);
+    const auto told = [&](const std::function<void(RunData&)>& change) { return Told(rule, baseline, change); };
+    EXPECT_EQ(told([](RunData&) {}), "nothing was thrown");
+    EXPECT_THAT(told([](RunData& run) { run.page_hashes["t"] = "07e42"; }),
+                HasSubstr("gate rule 'r': the page of task t with all files that it names: found 07e42, wanted the "
+                          "baseline's, 5ce9e"));
+    EXPECT_THAT(told([](RunData& run) { run.tasks[0].still.dwell_chunks = 9; }),
+                HasSubstr("gate rule 'r': cameras, stop rule and limits of task t: found "));
+    EXPECT_THAT(told([](RunData& run) { run.tasks[0].cameras.resize(1); }), HasSubstr("cameras, stop rule and limits"));
+    EXPECT_THAT(told([](RunData& run) { run.run.suite_text += "chunk_size: 16\n"; }),
+                HasSubstr("the suite's chunk_size: found 16, wanted the baseline's, 8"));
+    EXPECT_THAT(told([](RunData& run) { run.run.suite_text = "suite: s\n"; }),
+                HasSubstr("the suite's policy.latency: found off, wanted the baseline's, 0.1 s"));
+    EXPECT_EQ(told([](RunData& run) { run.run.suite_text = "suite: s\nchunk_size: 8\npolicy: {latency: 0.1}\n"; }),
+              "nothing was thrown");
+    EXPECT_EQ(told([](RunData& run) { run.page_hashes.clear(); }), "nothing was thrown") << "an earlier evac's run";
+  }
+}
+
+TEST(PinnedResult, OfOtherRecordingsIsRefusedOnlyWhereWhatIsDoneInThemDiffers) {
+  RunSummary run = RunOnPage();
+  run.data.tasks.at(0).page = "";
+  run.data.page_hashes.clear();
+  const PinnedResult baseline = Pin(run, "out/main");
+  const auto told = [&](const std::function<void(RunData&)>& change) {
+    return Told("test: boschloo", baseline, change, run);
+  };
+  EXPECT_EQ(told([](RunData& data) {
+              data.tasks[0].max_chunks = 99;  // the longest has so many
+              data.tasks[0].workspace_m.extend(Eigen::Vector3d(9, 9, 9));
+            }),
+            "nothing was thrown");
+  EXPECT_THAT(told([](RunData& data) { data.tasks[0].still.enabled = false; }), HasSubstr("stop rule"));
+  EXPECT_THAT(told([](RunData& data) { data.run.suite_text += "max_chunks: 5\n"; }),
+              HasSubstr("the suite's max_chunks: found 5, wanted the baseline's, not said"));
+}
+
+TEST(PinnedResult, OfAnEarlierEvacIsComparedWithoutWhatItLacks) {
+  nlohmann::ordered_json json = nlohmann::ordered_json::parse(PinnedJson(Pin(RunOnPage(), "out/main")));
+  for (const char* key : {"scenes", "definitions", "settings", "sha256"}) EXPECT_EQ(json.erase(key), 1u) << key;
+  json["sha256"] = Sha256Hex(json.dump());
+  const PinnedResult baseline = ReadPinned(json.dump(), "old.json");
+  EXPECT_EQ(nlohmann::ordered_json::parse(PinnedJson(baseline)), json);
+  EXPECT_EQ(Told("test: paired_mcnemar", baseline,
+                 [](RunData& run) {
+                   run.page_hashes["t"] = "07e42";
+                   run.tasks[0].still.dwell_chunks = 9;
+                   run.run.suite_text = "suite: s\nchunk_size: 16\n";
+                 }),
+            "nothing was thrown");
 }
 
 }  // namespace

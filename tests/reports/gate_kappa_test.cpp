@@ -71,5 +71,19 @@ TEST(GateOfAnUnerringJudge, OneAnswerAloneIsNoKappa) {
   EXPECT_THAT(constant.statement, HasSubstr("both always gave the same one answer"));
 }
 
+/// By `judge: human` a rule held human against human, the default of `against`: a kappa of 1.00 that passed.
+TEST(GateOfAnUnerringJudge, NobodyIsHeldAgainstThemselves) {
+  RunSummary run = RepeatedRun({{"t", "p", {}, {Half(40)}}});
+  for (auto& [episode, verdicts] : run.data.verdicts) verdicts["human"] = verdicts.at("oracle");
+  const GateRules rules = ReadGateRules(
+      Config::FromText("gates: [{name: r, test: judge_kappa, world: sim, at_least: 0.6}]\n", "gate.yaml"));
+  for (const std::string judge : {"human", "oracle,human"}) {
+    const RunSummary judged = Summarise(run.data, {.judge = judge, .bootstrap_replicates = 1});
+    EXPECT_THAT([&] { Decide(rules, {judged, "out", {}}, nullptr); },
+                testing::ThrowsMessage<Error>("gate rule 'r': against: found 'human', wanted another than the rules' "
+                                              "own judge, " + judge));
+  }
+}
+
 }  // namespace
 }  // namespace evac

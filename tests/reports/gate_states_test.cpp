@@ -1,8 +1,14 @@
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <cmath>
+
+#include "core/statistics/special.h"
 #include "reports/gate.h"
+#include "reports/gate_data.h"
 #include "tests/reports/repeated_run.h"
+#include "tests/reports/sample_run.h"
 
 /// How many initial states a rule rests on, where each was tried with several seeds or by several policies.
 namespace evac {
@@ -27,7 +33,8 @@ TEST(GateStates, EachCountsOnceWhateverTheSeedsAndThePolicies) {
   for (const std::string rule : {"test: paired_mcnemar, policy: good@c", "test: noninferiority, policy: good@c",
                                  "test: boschloo, policy: good@c", "test: savi, policy: good@c",
                                  "test: ci_lower, policy: good@c, at_least: 0.5",
-                                 "test: correlation, metric: pearson, at_least: 0.5"}) {
+                                 "test: correlation, metric: pearson, at_least: 0.5",
+                                 "test: error_share, at_most: 0.02", "test: error_share, policy: good@c, at_most: 0"}) {
     SCOPED_TRACE(rule);
     const RuleDecision few = DecidedOnTwentyStates(rule + ", min_states: 21");
     EXPECT_EQ(few.outcome, GateOutcome::kInconclusive);
@@ -36,6 +43,127 @@ TEST(GateStates, EachCountsOnceWhateverTheSeedsAndThePolicies) {
     EXPECT_THAT(DecidedOnTwentyStates(rule + ", min_states: 20").statement, Not(HasSubstr("of at least")));
   }
   EXPECT_EQ(DecidedOnTwentyStates("test: paired_mcnemar, policy: good@c").states, 60) << "in JSON with seeds";
+}
+
+/// The rule asked for a hundred states, and passed on one.
+TEST(GateStates, ARuleOfErrorsThatAsksForMoreThanWereTriedIsInconclusiveWhicheverWayItLeans) {
+  const RunSummary run = RepeatedRun({{"t", "good", {"ss"}, {"ss"}}});
+  const auto decided = [&run](const std::string& fields) {
+    const std::string rule = "gates: [{name: r, test: error_share, world: sim, at_most: 0, " + fields + "}]\n";
+    return Decide(ReadGateRules(Config::FromText(rule, "gate.yaml")), {run, "out", {}}, nullptr).decision;
+  };
+  EXPECT_EQ(decided("min_states: 2").outcome, GateOutcome::kPass);
+  EXPECT_EQ(decided("min_states: 100").outcome, GateOutcome::kInconclusive);
+  EXPECT_EQ(decided("min_states: 100").rules.at(0).more, "The rule asks for 98 more initial states.");
+  EXPECT_EQ(decided("min_states: 100, on_inconclusive: fail").outcome, GateOutcome::kFail);
+}
+
+/// The points were counted, a fifth of the states where there are eight over forty; what is drawn again are states.
+TEST(GateStates, HowManyMoreACorrelationTakesIsSaidOfThem) {
+  std::vector<RepeatedCell> cells;
+  for (const std::size_t successes : {4, 8, 12, 16}) {  // in sim in other states, so that draws differ
+    const std::string yes(successes, 's'), no(20 - successes, 'f');
+    cells.push_back({"t", "p" + std::to_string(successes), {yes + no}, {no + yes}});
+  }
+  const RunSummary run = Summarise(RepeatedRun(cells).data, {});  // resampled as often as usual
+  const auto held_at = [&run](double at_least) {
+    const std::string rule = fmt::format("{{name: r, test: correlation, world: sim, at_least: {}}}", at_least);
+    const GateRules rules = ReadGateRules(Config::FromText("gates: [" + rule + "]\n", "gate.yaml"));
+    return Decide(rules, {run, "out", {}}, nullptr).decision.rules.at(0);
+  };
+  const Interval seen = *held_at(0.5).value.interval;
+  const double threshold = (seen.low + seen.high) / 2;  // within the interval: neither shown
+  const RuleDecision rule = held_at(threshold);
+  ASSERT_EQ(rule.outcome, GateOutcome::kInconclusive) << rule.statement;
+  const double value = *rule.value.value;
+  ASSERT_GT(value, threshold);
+  const double ratio = (value - seen.low) / (value - threshold) * (1 + NormalQuantile(0.8) / NormalQuantile(1 - 0.05));
+  EXPECT_EQ(rule.more, fmt::format("If the value stays as seen: about {} more initial states.",
+                                   std::ceil(20 * (ratio * ratio - 1))));
+}
+
+/// It took "0 episodes of each at 100 %".
+TEST(GateStates, ABaselineThatNeverFailsIsPlannedForToo) {
+  const PinnedResult pinned = Pin(RepeatedRun({{"t", "p", {}, {std::string(40, 's')}}}), "out/main");
+  const auto size_of = [&pinned](const std::string& test) {
+    const GateRules rules =
+        ReadGateRules(Config::FromText("gates: [{name: r, world: sim, test: " + test + "}]\n", "gate.yaml"));
+    return SizesOf(rules, &pinned).at(0);
+  };
+  EXPECT_THAT(size_of("boschloo"), HasSubstr("takes 25 episodes of each at 100 %"));
+  EXPECT_THAT(size_of("noninferiority"), HasSubstr("(25 episodes of each unpaired at 100 %)"));
+}
+
+
+/// Fifty successes on an easy task, and what else the suite asks for.
+RunSummary EasyPartOf(const std::vector<PlannedEpisodes>& others) {
+  RunSummary run = RepeatedRun({{"easy", "p", {}, {std::string(50, 's')}}});
+  run.data.plan = {{"easy", "sim", "p", "c", 50}};
+  run.data.plan.insert(run.data.plan.end(), others.begin(), others.end());
+  return run;
+}
+
+RuleDecision DecidedOf(const RunSummary& run, const std::string& rule) {
+  const PinnedResult pinned = Pin(EasyPartOf({}), "out/main");
+  const std::string text = "gates: [{name: r, world: sim, " + rule + "}]\n";
+  return Decide(ReadGateRules(Config::FromText(text, "gate.yaml")), {run, "out", {}}, &pinned).decision.rules.at(0);
+}
+
+/// A run that was killed behind its easy task passed on that.
+TEST(GateStates, ARunThatIsNotWholeIsDecidedByNoRuleButABet) {
+  const RunSummary whole = EasyPartOf({}), part = EasyPartOf({{"hard", "sim", "p", "c", 30}});
+  for (const std::string rule :
+       {"test: ci_lower, at_least: 0.7", "test: paired_mcnemar", "test: boschloo, task: easy, policy: p@c",
+        "test: noninferiority", "test: error_share, at_most: 0.1"}) {
+    SCOPED_TRACE(rule);
+    EXPECT_EQ(DecidedOf(whole, rule).outcome, GateOutcome::kPass);
+    const bool is_of_easy = rule.find("task: easy") != std::string::npos;
+    const RuleDecision decision = DecidedOf(part, rule);
+    EXPECT_EQ(decision.outcome, is_of_easy ? GateOutcome::kPass : GateOutcome::kInconclusive);
+    if (is_of_easy) continue;
+    EXPECT_THAT(decision.statement, HasSubstr(": 50 of 80 episodes are there."));
+    EXPECT_THAT(decision.more, HasSubstr("evac resume"));
+  }
+  EXPECT_THAT(DecidedOf(part, "test: savi").statement, Not(HasSubstr("are there")));
+}
+
+TEST(GateStates, WhatIsMissingElsewhereBlocksNoRule) {
+  const std::string rule = "test: ci_lower, at_least: 0.7";
+  EXPECT_EQ(DecidedOf(EasyPartOf({{"easy", "real", "p", "c", 50}}), rule).outcome, GateOutcome::kPass) << "no world's";
+  const RunSummary other_policy = EasyPartOf({{"easy", "sim", "q", "c", 50}});
+  EXPECT_EQ(DecidedOf(other_policy, rule + ", policy: p@c").outcome, GateOutcome::kPass);
+  EXPECT_EQ(DecidedOf(other_policy, rule).outcome, GateOutcome::kInconclusive) << "p is its only one only so far";
+}
+
+TEST(GateStates, ACorrelationWantsTheRealWorldWholeToo) {
+  const std::vector<std::string> good = {std::string(20, 's')}, fair = {std::string(10, 's') + std::string(10, 'f')},
+                                 poor = {std::string(20, 'f')};
+  RunSummary run = RepeatedRun({{"t", "a", good, good}, {"t", "b", fair, fair}, {"t", "d", poor, poor}});
+  const auto statement = [&] { return DecidedOf(run, "test: correlation, at_least: 0.5").statement; };
+  run.data.plan = {{"t", "real", "a", "c", 20}, {"t", "sim", "a", "c", 20}};
+  EXPECT_THAT(statement(), Not(HasSubstr("are there")));
+  run.data.plan[0].episodes = 30;
+  EXPECT_THAT(statement(), HasSubstr("40 of 50 episodes are there"));
+}
+
+TEST(GateStates, ErrorsThatAreTooManyForTheWholeFailAPartOfIt) {
+  const SampleRun run({{"t", "p", "c", "-", std::string(10, 'e') + std::string(10, 's')}});
+  const auto outcome = [&](std::int64_t planned) {
+    RunSummary summary = run.Summary({.bootstrap_replicates = 1});
+    summary.data.plan = {{"t", "sim", "p", "c", planned}};
+    return DecidedOf(summary, "test: error_share, at_most: 0.1").outcome;
+  };
+  EXPECT_EQ(outcome(20), GateOutcome::kFail);
+  EXPECT_EQ(outcome(99), GateOutcome::kFail) << "10 of 99, whatever comes";
+  EXPECT_EQ(outcome(100), GateOutcome::kInconclusive);
+}
+
+TEST(GateStates, WhatWasDecidedOfAPartIsNotOfAWholeThatLooksTheSame) {
+  const RunData whole = EasyPartOf({}).data, part = EasyPartOf({{"hard", "sim", "p", "c", 30}}).data;
+  EXPECT_NE(DataHash(part), DataHash(whole));
+  RunData unsaid = whole;
+  unsaid.plan.clear();
+  EXPECT_EQ(DataHash(unsaid), DataHash(whole)) << "an earlier evac's decision stands";
 }
 
 }  // namespace

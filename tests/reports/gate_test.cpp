@@ -292,6 +292,11 @@ TEST(Gate, ErrorsAreCountedAndNotTested) {
             GateOutcome::kFail);
 }
 
+TEST(Gate, ErrorsOfAllPoliciesLeaveNoHoleForAName) {
+  const std::string rule = "  - {name: r, test: error_share, world: sim, at_most: 0.1}\n";
+  EXPECT_THAT(Decided(Rules(rule), "sss", "s").rules.at(0).statement, HasSubstr("0 of 3 episodes (0 %) could not go"));
+}
+
 TEST(Gate, ACorrelationIsHeldAgainstItsFloorAndMmrvAgainstItsCeiling) {
   const auto outcome = [](const std::string& rule) {
     const SampleRun& run = LargeRun();

@@ -3,8 +3,10 @@
 
 #include <nlohmann/json.hpp>
 
+#include "reports/dashboard_pages.h"
 #include "reports/gate.h"
 #include "reports/gate_output.h"
+#include "reports/headlines.h"
 #include "reports/page.h"
 #include "reports/report_json.h"
 #include "reports/summary_md.h"
@@ -84,6 +86,28 @@ TEST(GatesOnThePage, ADecisionByAnotherJudgeThanThePagesNamesIts) {
   EXPECT_THAT(ReportPage(ReportDataOf(now.Summary({.bootstrap_replicates = 1})), {"", "evac test"}),
               Not(HasSubstr("(judge oracle)")))
       << "the page's own";
+}
+
+ShownGate GateOf(const std::string& name, GateOutcome outcome, bool is_current = true) {
+  ShownGate gate{{}, is_current};
+  gate.decision.name = name;
+  gate.decision.outcome = outcome;
+  return gate;
+}
+
+/// The first by name was shown, and a gate that failed was hidden behind it.
+TEST(GatesOnThePage, TheDashboardsLineIsThatOfTheGravestGate) {
+  ReportData report = ReportDataOf(SampleRun({{"take", "p", "c", "s", "s"}}).Summary());
+  const auto verdict = [&report] { return DashboardRunOf("monday", report).verdict; };
+  report.gates = {GateOf("alpha", GateOutcome::kPass)};
+  EXPECT_EQ(verdict(), "pass: gate alpha");
+  report.gates.push_back(GateOf("beta", GateOutcome::kPass, false));
+  EXPECT_EQ(verdict(), "pass: gate beta (of older data)");
+  report.gates.push_back(GateOf("gamma", GateOutcome::kInconclusive));
+  EXPECT_EQ(verdict(), "inconclusive: gate gamma");
+  report.gates.push_back(GateOf("omega", GateOutcome::kFail));
+  EXPECT_EQ(verdict(), "fail: gate omega");
+  EXPECT_EQ(HeadlinesOf(report).front().items.at(3).text, "gate alpha") << "the others follow";
 }
 
 TEST(GatesOnThePage, ADecisionThatWasKeptWithoutItsJudgeIsReadAllTheSame) {

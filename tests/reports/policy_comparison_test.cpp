@@ -9,6 +9,7 @@
 #include "core/statistics/stratified.h"
 #include "core/statistics/two_by_two.h"
 #include "reports/policy_comparison_output.h"
+#include "reports/wording.h"
 
 namespace evac {
 namespace {
@@ -72,6 +73,14 @@ TEST(ComparePolicies, WhatIsNotDecidedSaysHowManyMorePairsWould) {
   const PolicyComparison equal = ComparePolicies(Policy("a", "ssff"), Policy("b", "ssff"));
   EXPECT_FALSE(equal.all.more);
   EXPECT_THAT(DecisionOf(equal), HasSubstr("No number of further episodes can be named: no pair differs"));
+}
+
+TEST(ComparePolicies, ADifferenceThatRoundsToNothingHasNoMinus) {
+  PolicyComparison comparison = ComparePolicies(Policy("a", "ssffss"), Policy("b", "sfsfss"));
+  comparison.all.difference.value = -0.003;
+  comparison.all.difference.interval = Interval{-0.032, -0.004};
+  EXPECT_THAT(DecisionOf(comparison), HasSubstr("+0 points [-3, +0]")) << "it was -0";
+  EXPECT_EQ(SignedPoints(0.3), "+30");
 }
 
 TEST(ComparePolicies, BelowEightyPercentSharedStatesTheTwoAreNotPaired) {

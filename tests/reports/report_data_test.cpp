@@ -109,6 +109,67 @@ TEST(Judges, AJudgeIsHeldAgainstPeopleInEachWorldApart) {
   EXPECT_FALSE(judges.judges[1].IsCalibrated()) << "nobody looked at sim";
 }
 
+/// One label by people in real took the oracle away in sim: of the classifier there, "uncalibrated".
+TEST(Judges, WherePeopleDidNotLookTheOracleIsStillTheBest) {
+  SampleRun run({{"a", "pick", "1", "ssff", "ssff"}});
+  std::vector<Verdict> verdicts;
+  for (const Episode& episode : run.store().Episodes()) {
+    Verdict verdict;
+    verdict.episode_id = episode.key.Id();
+    verdict.judge = "classifier:abc";
+    verdict.label = episode.key.pair.initial_state == "41-0000" ? Label::kFailure : Label::kSuccess;
+    verdicts.push_back(verdict);
+    if (episode.key.world != "real") continue;
+    for (const char* judge : {"human", "human:study:r1", "human:study:r2"}) {
+      verdict.judge = judge;
+      verdict.label = Label::kSuccess;
+      verdicts.push_back(verdict);
+    }
+  }
+  run.store().AddVerdicts(verdicts);
+  const ReportData report = ReportDataOf(run.Summary());
+  const std::vector<JudgeAgreement>& judges = report.judges.judges;
+  ASSERT_EQ(judges.size(), 4u) << "classifier and oracle in both worlds";
+  EXPECT_EQ(judges[0].world, "real");
+  EXPECT_EQ(judges[0].against, "human");
+  EXPECT_EQ(judges[0].confusion.both_success, 3);
+  EXPECT_EQ(judges[1].world, "sim");
+  EXPECT_EQ(judges[1].against, "oracle");
+  EXPECT_EQ(judges[1].confusion.both_success, 1);
+  EXPECT_EQ(judges[1].confusion.only_judge_success, 2);
+  EXPECT_EQ(judges[1].confusion.only_human_success, 1);
+  EXPECT_EQ(judges[3].judge, "oracle");
+  EXPECT_EQ(judges[3].against, "human");
+  EXPECT_FALSE(judges[3].IsCalibrated()) << "people did not look at sim";
+  EXPECT_EQ(HeldAgainst(report.judges), "human in real, oracle in sim");
+  EXPECT_THAT(MethodsParagraph(report), HasSubstr("Judges were held against human in real, oracle in sim, per world"));
+  const std::string page = ReportPage(report, {"", "evac test"});
+  EXPECT_THAT(page, HasSubstr("the best there is in its world: <b>human in real, oracle in sim</b>"));
+  EXPECT_THAT(page, HasSubstr("Krippendorff’s alpha, of success and failure alone, ")) << "not as a session's board";
+}
+
+/// Nobody told an outcome in an imagined world: what stands there is held against the run's best, as before.
+TEST(Judges, AnOracleThatCannotTellIsNoYardstick) {
+  SampleRun run({{"a", "pick", "1", "sf", "??"}});
+  std::vector<Verdict> verdicts;
+  for (const Episode& episode : run.store().Episodes()) {
+    Verdict verdict;
+    verdict.episode_id = episode.key.Id();
+    verdict.judge = "classifier:abc";
+    verdict.label = Label::kSuccess;
+    verdicts.push_back(verdict);
+    verdict.judge = "human";
+    if (episode.key.world == "real") verdicts.push_back(verdict);
+  }
+  run.store().AddVerdicts(verdicts);
+  const JudgeReport judges = JudgesOf(run.Summary());
+  for (const JudgeAgreement& judge : judges.judges) {
+    EXPECT_EQ(judge.against, "human") << judge.judge << " in " << judge.world;
+    EXPECT_EQ(judge.IsCalibrated(), judge.world == "real") << judge.judge;
+  }
+  EXPECT_EQ(HeldAgainst(judges), "human");
+}
+
 TEST(Checkpoints, TheirOrderIsThatOfTheNumbersInTheirNames) {
   EXPECT_EQ(StepOf("step_20000"), 20000);
   EXPECT_EQ(StepOf("120k"), 120000);
@@ -136,6 +197,22 @@ TEST(Checkpoints, ADecimalBeforeAUnitIsOfTheNumberAndElsewhereOfAVersion) {
   EXPECT_EQ(curves[0].points[0].checkpoint, "0.5M");
   EXPECT_THAT(TrendInWords(curves[0], 0), HasSubstr("In real, from 0.5M to 2M: 0 % → 100 %, +100 points"));
   EXPECT_THAT(TrendInWords(curves[0], 0), HasSubstr("2 of 2 steps rise"));
+}
+
+/// 31 January stood after 1 February, and v1.9 after v2.0: "the last against the first" said the opposite.
+TEST(Checkpoints, OfDatesAndVersionsAreOrderedByAllTheirNumbers) {
+  for (const auto& [first, last] : {std::pair{"2026-01-31", "2026-02-01"},
+                                    {"v1.9", "v2.0"},
+                                    {"v9.1", "v10.0"},
+                                    {"epoch=9-step=90", "epoch=10-step=100"}}) {
+    const SampleRun run({{"a", "pick", last, "sss", "sss"}, {"a", "pick", first, "fff", "fff"}});
+    const std::vector<CheckpointCurve> curves = CheckpointsOf(run.Summary());
+    ASSERT_EQ(curves.size(), 1u);
+    EXPECT_FALSE(curves[0].has_steps);
+    EXPECT_THAT(TrendInWords(curves[0], 0), HasSubstr(fmt::format("In real, from {} to {}: 0 % → 100 %", first, last)));
+  }
+  const SampleRun minor({{"a", "pick", "v1.10", "sss", "sss"}, {"a", "pick", "v1.9", "fff", "fff"}});
+  EXPECT_EQ(CheckpointsOf(minor.Summary()).at(0).points[0].checkpoint, "v1.9") << "the number at the end alone differs";
 }
 
 TEST(Checkpoints, APolicyWithOneIsNoCurve) {

@@ -52,6 +52,18 @@ TEST(TrustIn, ABiasBesideTheMarginAsksForNoMorePairsThanAnyoneHas) {
   EXPECT_THAT(task.more.reason(), HasSubstr("so near the margin that 10000 pairs would not do"));
 }
 
+/// Where all pairs flip one way no variance is seen: it asked for one more after one, two and three.
+TEST(TrustIn, AModelThatIsAlwaysWrongIsFoundOutByAsManyPairsAsWereAskedFor) {
+  for (int pairs = 1; pairs <= 4; ++pairs) {
+    const TaskTrust few = TrustOf(Input(Times(pairs, "s"), Times(pairs, "f")))[0];
+    EXPECT_EQ(few.trust, Trust::kUnknown) << pairs;
+    ASSERT_TRUE(few.more) << pairs;
+    EXPECT_EQ(*few.more, 5 - pairs);
+    EXPECT_EQ(*TrustOf(Input(Times(pairs, "f"), Times(pairs, "s")))[0].more, 5 - pairs) << "the other way round";
+  }
+  EXPECT_EQ(TrustOf(Input("sssss", "fffff"))[0].trust, Trust::kNo);
+}
+
 TEST(TrustIn, AModelThatAlwaysSucceedsIsNot) {
   const TaskTrust task = TrustOf(Input(Times(15, "sf"), Times(30, "s")))[0];
   EXPECT_EQ(task.trust, Trust::kNo);
@@ -239,6 +251,13 @@ TEST(TrustOutput, NoShareIsAboveAHundredPercent) {
     EXPECT_LE(policy.at(rate).at("value").get<double>(), 1) << rate;
 }
 
+TEST(TrustOutput, ABiasThatRoundsToNothingHasNoMinus) {
+  const std::string all = Times(400, "s");
+  const TrustReport report{"sim", "the world real", "oracle", {}, TrustOf(Input(all, "f" + all.substr(1)))};
+  EXPECT_LT(*report.tasks[0].bias.value, 0);
+  EXPECT_THAT(TrustText(report), HasSubstr("bias +0 points [")) << "it was -0";
+}
+
 TEST(PlanFor, AnswersInWordsAndATableForTheUsersNumbers) {
   const Plan plan = MakePlan({.rate = 0.28, .difference = 0.08, .trials = 25});
   EXPECT_THAT(PlanText(plan), HasSubstr("it takes 533 episodes of each"));
@@ -270,6 +289,19 @@ TEST(PlanFor, ByDefaultNoMoreStatesFlipThanTheTwoRatesLeaveRoomFor) {
             "plan: --flips is 0.15, wanted at most 0.1: of 100 % against 90 % no more can differ");
   EXPECT_EQ(message({.rate = 0.5, .difference = 0.6, .flips = 0.7}),
             "plan: --difference is 0.6, wanted at most 0.5, as far as a rate can be from 0.5");
+}
+
+TEST(PlanFor, NotWorseByTakesNoFewerThanShowItWhereNothingDiffers) {
+  const Plan plan = MakePlan({.rate = 0.99, .difference = 0.01});
+  for (const char* key : {"non_inferiority_pairs", "non_inferiority_episodes"})
+    EXPECT_EQ(*std::ranges::find(plan.rows, key, &PlanRow::key)->value, 25) << key << ": it was 7 and 13";
+}
+
+/// "Will not be told from 0": they are, in fewer than 80 of 100 cases.
+TEST(PlanFor, ASizeIsThatOfItsPowerAndNoWallBelowIt) {
+  EXPECT_EQ(MakePlan({}).words.back(),
+            "To tell a correlation of 0.90 from 0 with 80 % power takes 7 policies; fewer see it less often.");
+  EXPECT_THAT(PlanText(MakePlan({.correlation = 1e-12})), testing::Not(HasSubstr("takes undefined")));
 }
 
 TEST(PlanFor, AModelThatNeverAgreesIsPlannedForToo) {

@@ -53,6 +53,29 @@ class GateCommand : public testing::Test {
     store.AddVerdicts(verdicts);
   }
 
+  /// A run of four policies in real and sim, on ten states: each succeeds in two more than the one before.
+  void WriteTwoWorlds(const std::string& name) const {
+    Store store = Store::CreateOrContinue(folder_ / name, samples::SomeRun());
+    samples::Declare(store);
+    std::vector<EpisodeRecord> records;
+    std::vector<Verdict> verdicts;
+    for (int i = 0; i < 2 * 4 * 10; ++i) {
+      const int policy = i / 10 % 4, state = i % 10;
+      EpisodeRecord& record = records.emplace_back(EpisodeRecord{});
+      record.episode.key = samples::Key(1, i < 40 ? "real" : "sim");
+      record.episode.key.pair.initial_state = fmt::format("41-{:04d}", state);
+      record.episode.key.pair.checkpoint = fmt::format("step_{}", policy);
+      record.episode.stop = StopReason::kStill;
+      if (i < 40 && state == 0) store.AddPolicy({"visual_pick", record.episode.key.pair.checkpoint, "{}"});
+      Verdict& verdict = verdicts.emplace_back();
+      verdict.episode_id = record.episode.key.Id();
+      verdict.judge = "oracle";
+      verdict.label = state <= 2 * policy ? Label::kSuccess : Label::kFailure;
+    }
+    store.AddAll(records);
+    store.AddVerdicts(verdicts);
+  }
+
   CommandResult Evac(std::vector<std::string> words) const {
     words.insert(words.begin(), Binary("evac"));
     return RunCommand(words);
@@ -140,6 +163,17 @@ TEST_F(GateCommand, TheSameDataGetTheStoredDecisionAndTheReportShowsIt) {
   EXPECT_THAT(Gate("worse").out, HasSubstr("0 better / 14 worse"));
 }
 
+/// Without a rule that is a correlation its findings of worlds rested on a single draw, and said "yes" by it.
+TEST_F(GateCommand, ItsSummaryIsTheReportsWhateverItsRulesAskFor) {
+  WriteFileAtomically(folder_ / "gate.yaml", "gates: [{name: e, test: error_share, world: sim, at_most: 0}]");
+  WriteTwoWorlds("run");
+  EXPECT_EQ(Gate("run", {"--out", Path("files")}).exit_code, 0);
+  EXPECT_EQ(Evac({"report", Path("run")}).exit_code, 0);
+  const std::string summary = ReadFile(folder_ / "files/summary.md");
+  EXPECT_THAT(summary, AllOf(HasSubstr("## Gate gate: pass"), HasSubstr("bootstrap B = 2000")));
+  EXPECT_EQ(summary, ReadFile(folder_ / "run/report/summary.md"));
+}
+
 TEST_F(GateCommand, SequentialBetsAreKeptInTheRunOnceForEachDataSet) {
   WriteFileAtomically(folder_ / "gate.yaml", "gates: [{name: bet, test: savi, world: sim}]");
   WriteRun("part", 9, 9);  // in progress: a part of the baseline's states
@@ -149,6 +183,24 @@ TEST_F(GateCommand, SequentialBetsAreKeptInTheRunOnceForEachDataSet) {
   ASSERT_EQ(looks.size(), 1u);
   EXPECT_EQ(looks[0].only_second, 9);
   EXPECT_GT(looks[0].e_value, 20);
+}
+
+/// It said "Gate gate: fail", and no decision was kept as release's.
+TEST_F(GateCommand, ACopyOfTheRulesUnderAnotherNameHasItsOwnDecisionAndLooks) {
+  for (const char* file : {"gate.yaml", "release.yaml"})
+    WriteFileAtomically(folder_ / file, "gates: [{name: bet, test: savi, world: sim}]");
+  WriteRun("part", 9, 9);
+  EXPECT_THAT(Gate("part").out, HasSubstr("Gate gate: fail."));
+  for (int asked = 0; asked < 2; ++asked) {
+    const CommandResult release =
+        Evac({"gate", Path("release.yaml"), Path("part"), "--baseline", Path("baseline.json")});
+    EXPECT_THAT(release.out, HasSubstr("Gate release: fail.")) << release.err;
+  }
+  const Store store = Store::Open(folder_ / "part", Store::Mode::kReadOnly);
+  ASSERT_EQ(store.GateRecords().size(), 2u);
+  EXPECT_EQ(store.GateRecords()[1].gate, "release");
+  ASSERT_EQ(store.Looks().size(), 2u) << "one of each gate";
+  EXPECT_THAT(store.Looks()[1].comparison, HasSubstr("gate release, rule bet"));
 }
 
 TEST_F(GateCommand, ARunThatTheJudgeHasNotJudgedIsNoBaseline) {
@@ -249,6 +301,17 @@ TEST_F(GateCommand, AFolderThatTheJudgeHasNotJudgedIsNoBaselineEither) {
   const CommandResult pinned = Evac({"gate", Path("gate.yaml"), Path("other"), "--baseline", Path("baseline.json")});
   EXPECT_EQ(pinned.exit_code, 2) << pinned.out;
   EXPECT_THAT(pinned.err, HasSubstr("judge: found human, wanted the baseline's, oracle: `evac gate pin --judge`"));
+}
+
+/// A run that was killed on its way was pinned, and passed, as if it were whole.
+TEST_F(GateCommand, APartOfARunIsPinnedWithAWarningAndPassesNothing) {
+  Store::Open(folder_ / "main", Store::Mode::kReadWrite).AddPlan({{"take_bottle", "sim", "visual_pick", "good", 80}});
+  const CommandResult pinned = Evac({"gate", "pin", Path("main"), "--out", Path("part.json")});
+  EXPECT_EQ(pinned.exit_code, 0) << pinned.err;
+  EXPECT_THAT(pinned.err, HasSubstr("60 of 80 episodes are there"));
+  const CommandResult gate = Gate("main");
+  EXPECT_EQ(gate.exit_code, 3) << gate.out << gate.err;
+  EXPECT_THAT(gate.out, AllOf(HasSubstr("60 of 80 episodes are there"), HasSubstr("evac resume")));
 }
 
 }  // namespace

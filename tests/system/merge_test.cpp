@@ -1,6 +1,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "core/file.h"
 #include "core/store.h"
 #include "tests/support/synthetic_recording.h"
 #include "tests/support/temp_folder.h"
@@ -71,6 +72,24 @@ TEST(Merge, ShardsJoinedAreTheRunThatWasNeverSplit) {
   }
   const CommandResult goes_on = RunCommand({Binary("evac"), "resume", (folder / "merged").string()});
   EXPECT_EQ(goes_on.exit_code, 0) << goes_on.err;
+}
+
+/// Half a run, and what was merged from it alone, were whole to merge and report.
+TEST(Merge, AHalfIsNoWholeRun) {
+  const TempFolder folder;
+  const CommandResult half = Merge({Half("1")}, folder / "half");
+  const CommandResult whole = Merge({Half("1"), Half("2")}, folder / "whole");
+  EXPECT_EQ(half.exit_code, 0) << half.err;
+  EXPECT_THAT(half.err, HasSubstr("of the suite's 5 episodes are there"));
+  EXPECT_EQ(whole.err.find("are there"), std::string::npos) << whole.err;
+  EXPECT_EQ(Store::Open(folder / "half", Store::Mode::kReadOnly).PageHashes().count("take_bottle"), 1u);
+  const auto summary = [](const fs::path& run) {
+    const CommandResult report = RunCommand({Binary("evac"), "report", run.string()});
+    EXPECT_EQ(report.exit_code, 0) << report.err;
+    return ReadFile(run / "report/summary.md");
+  };
+  EXPECT_THAT(summary(folder / "half"), HasSubstr("of 5 episodes of the suite are there"));
+  EXPECT_THAT(summary(folder / "whole"), HasSubstr("All 5 episodes ran to their end"));
 }
 
 TEST(Merge, DuplicatesThatAgreeAreTakenOnceAndNothingIsOverwritten) {

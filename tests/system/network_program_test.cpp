@@ -96,6 +96,27 @@ TEST(NetworkProgram, ANewForecastTakesThePlaceOfTheOldOneAndAllElseStays) {
   EXPECT_TRUE(same(world, "model.diffusion_model.input_blocks.0.0.weight"));
 }
 
+/// It stood beside a forecast that it was not measured with.
+TEST(NetworkProgram, WithANewForecastTheHoldoutOfTheOldOneIsNotSaid) {
+  const TempFolder folder;
+  WriteFileAtomically(folder / "page.yaml", PageWithForecast());
+  const std::string world = folder / "world.safetensors", measured = folder / "measured.safetensors";
+  const auto card = [&](std::vector<std::string> words, const std::string& out) {
+    words.insert(words.begin(), {Binary("evac"), "weights"});
+    words.insert(words.end(), {"--config", folder / "page.yaml"});
+    const CommandResult result = RunCommand(words);
+    EXPECT_EQ(result.exit_code, 0) << result.err;
+    return TensorFile::Open(out).metadata();
+  };
+  card({"init", world}, world);
+  WriteTensorFile(measured, TensorFile::Open(world).tensors(), {{"format", "pt"}, {"holdout", "0.07"}, {"steps", "9"}});
+  const std::string copy = folder / "copy.safetensors", other = folder / "other.safetensors";
+  EXPECT_EQ(card({"convert", measured, copy}, copy).at("holdout"), "0.07");
+  const TensorMetadata found = card({"convert", measured, other, "--forecast", world}, other);
+  EXPECT_FALSE(found.contains("holdout"));
+  EXPECT_EQ(found.at("steps"), "9");
+}
+
 /// It was taken over, and looked for the thing where no table is.
 TEST(NetworkProgram, AForecastOfAnotherPlaneIsNotTakenOver) {
   const TempFolder folder;

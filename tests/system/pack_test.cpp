@@ -119,6 +119,36 @@ TEST_F(PackCommand, LeavesBrokenRecordingsOutAndCountsThemByKind) {
   EXPECT_THAT(table, AllOf(HasSubstr("short_video"), HasSubstr("5 frames, wanted one for each of the 9 steps")));
 }
 
+/// They were in no shard, and neither counted nor in the table.
+TEST_F(PackCommand, CountsClipsWithoutTheArmsTrackAndNamesFoldersThatItDoesNotLookInto) {
+  for (const char* name : {"good", "dead", "day2/0001"}) Add(name, Good());
+  fs::remove(folder_ / "data/dead/proprio_stats.h5");
+  const CommandResult result = RunCommand(Words("out"));
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_THAT(result.err, AllOf(HasSubstr("1 recordings left out: 1 broken_track"),
+                                HasSubstr("data/day2: no recording lies in it, and none is looked for below it")));
+  EXPECT_THAT(ReadFile(folder_ / "out/left_out.csv"), AllOf(HasSubstr("data/dead"), HasSubstr("found head_color.mp4")));
+}
+
+/// All cameras were read to know the first one's name, and the way round was not named.
+TEST_F(PackCommand, ABrokenWristCameraIsInTheWayOfThoseAloneWhoPackIt) {
+  SyntheticClip clip = Good();
+  clip.cameras = {"head", "hand_left", "hand_right"};
+  for (const char* name : {"a", "b"}) {
+    Add(name, clip);
+    fs::remove(folder_ / "data" / name / "hand_left_color.mp4");
+  }
+  const CommandResult head = RunCommand(Words("head"));
+  ASSERT_EQ(head.exit_code, 0) << head.err;
+  EXPECT_EQ(Said("head").at("cameras"), "head");
+  WriteText(folder_ / "tiny.yaml", std::string(kTiny) + "views: 2\n");
+  const CommandResult two = RunCommand(Words("two"));
+  EXPECT_EQ(two.exit_code, 2);
+  EXPECT_THAT(two.err, AllOf(HasSubstr("no recording's first 2 cameras can be read"),
+                             HasSubstr("camera hand_left has no video"), HasSubstr("; --cameras names others")));
+  ASSERT_EQ(RunCommand(Words("two", {"--cameras", "head,hand_right"})).exit_code, 0);
+}
+
 TEST_F(PackCommand, ListsRecordingsWhateverTheirFoldersAreCalled) {
   Add("caf\xE9", Good());
   SyntheticClip cut = Good();

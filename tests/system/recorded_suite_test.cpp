@@ -437,6 +437,8 @@ TEST_F(LostState, FailsInAShardOfItsOwnToo) {
   while (!alone.Holds(Key("c").pair) || alone.Holds(Key("a").pair) || alone.Holds(Key("b").pair))
     alone = alone.number < alone.of ? Shard{alone.number + 1, alone.of} : Shard{1, alone.of + 1};
   EXPECT_EQ(Stops("run", {.shard = alone}), (std::map<std::string, StopReason>{{"c", StopReason::kWorldError}}));
+  const PlannedEpisodes three{suite_.tasks.front().id, "echo", "hold", "recorded", 3};
+  EXPECT_EQ(Open("run").Plan(), std::vector<PlannedEpisodes>{three}) << "a shard of them is not the whole";
 }
 
 /// Reasons were gone before the world was asked whether it can begin at all.

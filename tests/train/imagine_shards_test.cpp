@@ -28,11 +28,29 @@ nn::ModelConfig SmallConfig() {
 
 /// Encoded shards of clips of a first picture, two chunks and `left_over` frames, and a model of random weights.
 struct Scene {
-  explicit Scene(std::int64_t left_over = 0) : model(random, config) {
+  explicit Scene(std::int64_t left_over = 0, std::int64_t memory = SmallConfig().memory)
+      : config(WithMemory(memory)), model(random, config) {
     WriteSyntheticShards(folder / "shards", {.clips = 3, .frames = 1 + 2 * config.chunk + left_over, .views = 2});
     EncodeSyntheticShards(model.vae(), folder / "shards");
+    Open();
+  }
+  static nn::ModelConfig WithMemory(std::int64_t memory) {
+    nn::ModelConfig config = SmallConfig();
+    config.memory = memory;
+    return config;
+  }
+  void Open() {
     shards.emplace(folder / "shards", Split::kTrain);
     shards->OpenLatents(config.vae.z_channels, config.vae.Stride());
+  }
+  /// The pictures of each clip from `frame` on become grey; the latents stay.
+  void Grey(std::int64_t frame) {
+    const std::vector<Clip> clips = shards->clips();
+    ChangeSyntheticShard(folder / "shards", [&](const std::string& name, Tensor& tensor) {
+      if (name != "frames") return;
+      for (const Clip& clip : clips) tensor.narrow(0, clip.first + frame, clip.frames - frame).fill_(127);
+    });
+    Open();
   }
   Tensor Truth(const Clip& clip) const {
     return shards->shards()[clip.shard].latents.narrow(0, clip.first, clip.frames).to(at::kFloat);
@@ -42,7 +60,7 @@ struct Scene {
   }
 
   TempFolder folder;
-  nn::ModelConfig config = SmallConfig();
+  nn::ModelConfig config;
   nn::HashWeights random;
   nn::EvacModel model;
   std::optional<ShardSet> shards;
@@ -101,6 +119,22 @@ TEST(ImagineClips, RemembersWhatItImagined) {
   EXPECT_FALSE(at::allclose(found, second(at.Truth(clip)), 1e-3, 1e-3));
 }
 
+/// With a memory of one frame the image encoder was shown the recorded picture of it, chunk after chunk.
+TEST(ImagineClips, OfWhatWasRecordedOnlyTheFirstPictureIsShown) {
+  for (const std::int64_t memory : {1, 2}) {
+    Scene at(1, memory);
+    const std::vector<Tensor> before = at.Imagined();
+    at.Grey(1);
+    const std::vector<Tensor> later_ones_grey = at.Imagined();
+    at.Grey(0);
+    const std::vector<Tensor> all_grey = at.Imagined();
+    for (std::size_t i = 0; i < before.size(); ++i) {
+      EXPECT_TRUE(later_ones_grey[i].equal(before[i])) << memory << ", clip " << i;
+      EXPECT_FALSE(at::allclose(all_grey[i], before[i], 1e-4, 1e-4)) << memory << ": or nothing is shown";
+    }
+  }
+}
+
 TEST(ImagineClips, FramesLeftOverBehindTheLastWholeChunkAreImaginedToo) {
   const Scene at(2);
   const Clip& clip = at.shards->clips().front();
@@ -134,6 +168,32 @@ TEST(WriteImaginedLatents, StandWhereTrainingLooksForThem) {
   const Tensor found = imagined.shards().front().latents.narrow(0, clip.first, clip.frames).to(at::kFloat);
   EXPECT_TRUE(at::allclose(found, at.Imagined().back(), 1e-2, 1e-2)) << "halves";
   EXPECT_TRUE(imagined.shards().front().map_latents.equal(at.shards->shards().front().map_latents));
+}
+
+/// The hash weights, whose answers are beyond what halves hold.
+class Loud final : public nn::ParameterSource {
+ public:
+  Tensor Take(const std::string& key, at::IntArrayRef shape) override {
+    const Tensor tensor = weights_.Take(key, shape);
+    return key.starts_with("model.diffusion_model.out.") ? tensor * 1e9 : tensor;
+  }
+
+ private:
+  nn::HashWeights weights_;
+};
+
+/// They stood there as infinite, and a judge learned from them.
+TEST(WriteImaginedLatents, ThatAreNoNumbersAreRefusedWithShardAndClip) {
+  const Scene at;
+  Loud source;
+  const nn::EvacModel loud(source, at.config);
+  const std::filesystem::path to = at.folder / "imagined";
+  std::filesystem::create_directories(to);
+  EXPECT_THAT([&] { WriteImaginedLatents(loud, *at.shards, 0, to, "imagined", {}); },
+              testing::ThrowsMessage<TensorError>(
+                  testing::AllOf(testing::HasSubstr("shard_00000.safetensors: "),
+                                 testing::HasSubstr("numbers of what is imagined of clip 0 are not finite"))));
+  EXPECT_TRUE(std::filesystem::is_empty(to));
 }
 
 }  // namespace

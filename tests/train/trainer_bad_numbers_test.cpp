@@ -6,8 +6,10 @@
 #include <filesystem>
 #include <fstream>
 #include <functional>
+#include <iterator>
 #include <string>
 #include <utility>
+#include <vector>
 
 #include "tests/support/temp_folder.h"
 #include "tests/train/regression.h"
@@ -159,6 +161,69 @@ TEST(Trainer, BeforeMinutesArePlannedThePagesStepsMeanNothing) {
     ASSERT_TRUE(std::getline(rows, row));
     const std::size_t loss = row.find(','), rate = row.find(',', loss + 1);
     EXPECT_NEAR(std::stod(row.substr(rate + 1)), step == 0 ? 0.025 : 0.05, 1e-9) << row;
+  }
+}
+
+/// The checkpoint of four steps with a best, in memory: what is written in its place does not change it.
+TensorFile WholeCheckpoint(const std::filesystem::path& folder) {
+  Regression regression;
+  TrainerOptions options = QuickTrainer(4);
+  options.holdout_every = 2;
+  Trainer(regression.Parameters(), options, folder)
+      .Run({.loss = [&](const StepPlace& place) { return regression.Loss(place); }, .holdout = [] { return 7.0; }});
+  std::ifstream file(folder / "training.safetensors", std::ios::binary);
+  return TensorFile::Parse({std::istreambuf_iterator<char>(file), {}}, "whole");
+}
+
+std::int64_t StepOf(const std::filesystem::path& folder) {
+  Regression regression;
+  return Trainer(regression.Parameters(), QuickTrainer(4), folder).step();
+}
+
+/// A step of "12x" was 12, one of "abc" none, one of 2^63 the end of all numbers, to which another was added.
+TEST(Trainer, ACheckpointWhoseNumbersAreNoneIsRefusedByName) {
+  const TempFolder folder;
+  const TensorFile whole = WholeCheckpoint(folder.path());
+  const std::string path = (folder / "training.safetensors").string();
+  const auto write = [&](const char* key, const std::string& value) {
+    TensorMetadata metadata = whole.metadata();
+    metadata[key] = value;
+    WriteTensorFile(path, whole.tensors(), metadata);
+  };
+  const auto refused = [&](const char* key, const std::string& value, const std::string& wanted) {
+    write(key, value);
+    EXPECT_THAT([&] { StepOf(folder.path()); },
+                testing::ThrowsMessage<TensorError>(testing::HasSubstr(path + ": its metadata's '" + key + "' is '" +
+                                                                       value + "', wanted " + wanted)));
+  };
+  for (const char* value : {"", "abc", "12x", " 3", "-1", "1.5", "1e3", "1099511627777", "9223372036854775808"})
+    refused("step", value, "a whole number from 0 to 2^40");
+  for (const char* key : {"not_finite", "left_out", "holdouts_since_best", "best_step"})
+    refused(key, "-3", "a whole number from 0 to 2^40");
+  for (const char* key : {"smooth_loss", "best_score"}) {
+    refused(key, "", "a number");
+    refused(key, "0x1p+1 or so", "a number");
+  }
+  for (const char* loss : {"nan", "-nan", "inf", "0x1.8p-2"}) {
+    write("smooth_loss", loss);
+    EXPECT_EQ(StepOf(folder.path()), 4) << loss;
+  }
+}
+
+/// Of one number all weights became that number; of any other size the process ended as by its own fault.
+TEST(Trainer, ABestOfAnotherSizeIsRefused) {
+  const TempFolder folder;
+  const TensorFile whole = WholeCheckpoint(folder.path());
+  std::vector<TensorView> tensors = whole.tensors();
+  const auto best = std::ranges::find(tensors, std::string("best"), &TensorView::name);
+  ASSERT_NE(best, tensors.end());
+  for (const std::int64_t size : {1, 3}) {
+    best->shape = {size};
+    best->bytes = whole.Get("best").bytes.first(best->ByteCount());
+    WriteTensorFile(folder / "training.safetensors", tensors, whole.metadata());
+    EXPECT_THAT([&] { StepOf(folder.path()); },
+                testing::ThrowsMessage<TensorError>(
+                    testing::HasSubstr("training.safetensors: best is [" + std::to_string(size) + "], wanted [4]")));
   }
 }
 

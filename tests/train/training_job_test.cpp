@@ -31,6 +31,7 @@ TrainingJob JobOf(const Prepared& at) {
   job.start.init_except = {"model.diffusion_model.out."};
   job.init_sha256 = "5678";
   job.forecast_sha256 = "9abc";
+  job.recipe = "def0,def0";
   job.begun_with = " page 1234 init 5678";
   return job;
 }
@@ -46,6 +47,7 @@ TEST(TrainingJob, IsTheSameWhenReadAgain) {
   EXPECT_EQ(again.start.init_except, job.start.init_except);
   EXPECT_EQ(again.init_sha256, "5678");
   EXPECT_EQ(again.forecast_sha256, "9abc");
+  EXPECT_EQ(again.recipe, "def0,def0");
   TrainingJob codec;
   codec.kind = TrainingKind::kCodec;
   codec.config = at.config;
@@ -87,12 +89,13 @@ TEST(TrainingJob, CutOffOnItsWayItIsRefusedWhereverThatWas) {
   EXPECT_NO_THROW(ParseTrainingJob(whole, "job"));
 }
 
-/// What wrote them did not know which files they were written for.
+/// What wrote them did not know which files and shards they were written for.
 TEST(TrainingJob, OfAnEarlierVersionItIsReadAsBefore) {
   TrainingJob job = JobOf(Prepared(1));
-  job.init_sha256 = job.forecast_sha256 = "";
+  job.init_sha256 = job.forecast_sha256 = job.recipe = "";
   const std::string text = TextOf(job);
   EXPECT_EQ(text.find("init_sha256"), std::string::npos);
+  EXPECT_EQ(text.find("recipe"), std::string::npos);
   EXPECT_EQ(TextOf(ParseTrainingJob(text, "job")), text);
 }
 

@@ -171,6 +171,50 @@ TEST_F(WorldStartTest, WeightsThatLearnedFromAnotherNoiseAreRefused) {
   EXPECT_EQ(Train(other, start), "done") << "where it is meant";
 }
 
+/// Only heads of attention were compared: what the answer is counted from and what latents are scaled by were another
+/// network's, and no word said.
+TEST_F(WorldStartTest, WeightsThatMeanSomethingElseThanThePageSaysAreRefused) {
+  JobPlace plain = Place("plain", false);
+  plain.config.schedule.carry_plane_m.reset();  // which wants from_last_frame
+  plain.config.unet.in_channels -= plain.config.vae.z_channels + 1;
+  ASSERT_EQ(Train(plain, {.codec = Codec()}), "done");
+  WorldStart start{.codec = Codec(), .init = Weights("plain")};
+  nn::ModelConfig page = plain.config;
+  const auto check = [&] { CheckStart(page, start); };
+  const auto refused = [](const std::string& why) {
+    return ThrowsMessage<TensorError>(HasSubstr("was trained with " + why));
+  };
+  EXPECT_NO_THROW(check());
+  page.vae.scale_factor = 2;
+  EXPECT_THAT(check, refused("vae.scale_factor 1, the page of sizes says 2"));
+  page = plain.config;
+  page.schedule.from_last_frame = false;
+  EXPECT_THAT(check, refused("schedule.from_last_frame true, the page of sizes says false"));
+  start.init_except = {"model.diffusion_model.out."};
+  EXPECT_NO_THROW(check()) << "its answer is learned anew";
+  ASSERT_EQ(Train(Place("carried", false), {.codec = Codec()}), "done");
+  start = {.codec = Codec(), .init = Weights("carried")};
+  page = Config(false);
+  page.schedule.carry_plane_m = 0.75;
+  EXPECT_NO_THROW(check()) << "another robot's table";
+  start.init_widen = true;
+  EXPECT_THAT(check, refused("schedule.carry_plane_m 0, the page of sizes says 0.75")) << "it would begin as another";
+}
+
+/// Its card says the plane among the sizes, where a forecast's own file has it by itself: it was not looked at.
+TEST_F(WorldStartTest, AForecastOfAnotherPlaneInsideTheFirstWeightsIsRefused) {
+  WorldStart start{.codec = Codec()};
+  start.forecast = Forecast();
+  ASSERT_EQ(Train(Place("world"), start), "done");
+  start.init = Weights("world");
+  nn::ModelConfig page = Config(true);
+  page.schedule.carry_plane_m = 0.75;
+  EXPECT_NO_THROW(CheckStart(page, start)) << "another gives the forecast";
+  start.forecast.clear();
+  EXPECT_THAT([&] { CheckStart(page, start); },
+              ThrowsMessage<TensorError>(HasSubstr("schedule.carry_plane_m 0, the page of sizes says 0.75")));
+}
+
 TEST_F(WorldStartTest, StripStepsThatNoSamplerTakesAreRefusedBeforeAnythingIsWritten) {
   for (const std::int64_t steps : {0, 1, 1001}) {
     WorldOptions options = ShownTheFirst(1);
@@ -289,6 +333,38 @@ TEST_F(WorldStartTest, ATrainingGoesOnOnlyWithWhatItWasBegunWithAndAsManyThreads
     left = 100;
     place.threads = 5;
     EXPECT_EQ(train(place, 2), "done") << "no more than two work";
+  }
+}
+
+/// Eight parts of a step were eight whole models on one GPU, and the eighth did not fit.
+TEST(JobPlace, OnAGpuThePartsOfAStepFollowOneAnother) {
+  JobOptions options;
+  options.trainer.accumulate = 8;
+  JobPlace place;
+  place.threads = 16;
+  EXPECT_EQ(Workers(place, options), 8);
+  place.device = at::kCUDA;
+  EXPECT_EQ(Workers(place, options), 1);
+}
+
+/// `evac train --device cuda` began what `evac-train --device cuda` refused to go on with: "cuda:0" is another text.
+TEST(JobPlace, ATrainingOnAGpuGoesOnOnAnyOtherWithAnyThreads) {
+  JobPlace place;
+  place.threads = 16;
+  place.begun_with = " page a";
+  JobOptions whole, parts;
+  parts.trainer.accumulate = 4;
+  EXPECT_EQ(IdentityOf(place, whole), " workers 1 threads 16 page a") << "what trainings on a CPU go on by";
+  EXPECT_EQ(IdentityOf(place, parts), " workers 4 page a");
+  const std::string on_cpu = IdentityOf(place, whole);
+  place.device = at::kCUDA;
+  const std::string on_gpu = IdentityOf(place, whole);
+  EXPECT_NE(on_gpu, on_cpu);
+  place.threads = 3;
+  for (const int index : {0, 1}) {
+    place.device = at::Device(at::kCUDA, static_cast<at::DeviceIndex>(index));
+    EXPECT_EQ(IdentityOf(place, whole), on_gpu) << index;
+    EXPECT_EQ(IdentityOf(place, parts), on_gpu) << index << ": their number is an option's to say";
   }
 }
 

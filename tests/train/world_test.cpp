@@ -180,6 +180,36 @@ TEST(TrainWorld, MemoryIsImaginedSoManyChunksDeep) {
   EXPECT_THROW(loss(0, 1), TensorError);
 }
 
+/// The network remembered its own frame, and the image encoder saw the recorded one.
+TEST(TrainWorld, AMemoryOfOneFrameIsShownAsItWasImagined) {
+  Prepared at(1, 10);
+  at.config.memory = 1;
+  const auto loss = [&](double share) {
+    ShardSet shards(at.folder / "shards", Split::kTrain);
+    shards.OpenLatents(at.config.vae.z_channels, at.config.vae.Stride());
+    nn::RandomWeights random(3);
+    TrainableWeights weights(random);
+    const nn::EvacModel model(weights, at.config);
+    WorldOptions options = Quick(1);
+    options.world.windows.rollout_share = 1;
+    options.world.self_memory_share = share;
+    options.world.self_memory_chunks = 9;
+    options.Resolve();
+    options.world.windows.chunk = at.config.chunk;
+    options.world.windows.memory = at.config.memory;
+    return WorldTraining(model, shards, options.world).Loss({5, 0, 0, 1}).item<double>();
+  };
+  const double own = loss(1), recorded = loss(0);
+  ChangeSyntheticShard(at.folder / "shards", [](const std::string& name, Tensor& tensor) {
+    if (name != "frames") return;
+    for (std::int64_t row = 0; row < tensor.size(0); ++row) {
+      if (row % 10 != 0) tensor[row].fill_(127);  // all but the first of each clip
+    }
+  });
+  EXPECT_EQ(loss(1), own);
+  EXPECT_NE(loss(0), recorded) << "or nothing is shown";
+}
+
 TEST(TrainWorld, NoiseOnMemoryIsNoChangeOfTheScene) {
   const auto loss = [](const Prepared& at, const char* noise, double unless_changed) {
     ShardSet shards(at.folder / "shards", Split::kTrain);
@@ -304,6 +334,17 @@ TEST(Windows, RememberWhatRolloutsRemember) {
       const auto history = static_cast<std::int64_t>(wanted[j]);
       EXPECT_EQ(found[j], history < 4 ? 0 : history - 3) << "the history is frame 0 four times, then 1, 2, …";
     }
+  }
+}
+
+/// Of a memory of one frame it was the clip's first picture, which the network sees of no other window.
+TEST(Windows, ThatAreMeasuredShowWhatIsShownWhenImagining) {
+  const TempFolder folder;
+  WriteSyntheticShards(folder.path(), {.frames = 10});
+  const ShardSet shards(folder.path(), Split::kTrain);
+  for (const std::int64_t memory : {1, 4}) {
+    for (const Window& window : WindowSampler(shards, {.chunk = 3, .memory = memory, .history = 8}).Spread(100))
+      EXPECT_EQ(window.image, memory == 1 ? window.last : 0);
   }
 }
 

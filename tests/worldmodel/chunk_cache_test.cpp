@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <chrono>
 #include <fstream>
 
@@ -72,6 +73,27 @@ TEST(ChunkCache, WhatNobodyHasFinishedForADayIsRemovedAndWhatIsBeingWrittenIsNot
   const ChunkCache a_day_later({.folder = folder.path()});
   EXPECT_FALSE(fs::exists(partial));
   EXPECT_TRUE(fs::exists(old_entry)) << "whole, and below the limit";
+}
+
+/// Each process counted its own alone: two of them kept twice the limit.
+TEST(ChunkCache, TheLimitIsTheFoldersHoweverManyWriteThere) {
+  const TempFolder folder;
+  const ChunkCacheOptions options{.folder = folder.path(), .limit_gb = 20e-6};
+  ChunkCache one(options), another(options);
+  const auto bytes = [&] {
+    std::uintmax_t sum = 0;
+    for (const auto& entry : fs::directory_iterator(folder / "aa")) sum += entry.file_size();
+    return sum;
+  };
+  std::uintmax_t most = 0;
+  for (int i = 10; i < 13; ++i) {
+    one.Keep(KeyOf(i), SmallChunk());
+    another.Keep(KeyOf(i + 10), SmallChunk());
+    most = std::max(most, bytes());
+  }
+  EXPECT_LE(most, 22'000U) << "a tenth of the limit more, at most";
+  EXPECT_GE(most, 10'000U) << "or nothing is tested";
+  EXPECT_TRUE(another.Find(KeyOf(22)));
 }
 
 /// 2^40 frames of no numbers have no bytes, and were made one by one.

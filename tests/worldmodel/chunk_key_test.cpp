@@ -2,8 +2,11 @@
 
 #include <gmock/gmock.h>
 
+#include <fstream>
 #include <functional>
+#include <iterator>
 #include <set>
+#include <string>
 
 #include "core/version.h"
 #include "tests/worldmodel/imagined_support.h"
@@ -119,6 +122,21 @@ TEST_F(ChunkKeyTest, SaysWhichLibrariesAndKernelsCompute) {
   EXPECT_THAT(settings, testing::HasSubstr(nn::Arithmetic()));
   EXPECT_THAT(nn::Arithmetic(), testing::StartsWith("libtorch " + nn::LibtorchVersion() + " blas "));
   EXPECT_THAT(nn::Arithmetic(), testing::HasSubstr(" kernels "));
+}
+
+/// With OpenBLAS's SkylakeX and our x86-64-v4 there are three kinds of processors, and each multiplies bf16 otherwise.
+TEST_F(ChunkKeyTest, SaysByWhatTheProcessorMultipliesBf16) {
+  const std::string arithmetic = nn::Arithmetic();
+  const std::size_t at = arithmetic.find(" bf16 ");
+  ASSERT_NE(at, std::string::npos) << arithmetic;
+  const std::string units = arithmetic.substr(at + 6);
+  EXPECT_THAT(units, testing::AnyOf("none", "avx512bf16", "amx-bf16", "avx512bf16 amx-bf16"));
+  std::ifstream cpuinfo("/proc/cpuinfo");
+  const std::string said{std::istreambuf_iterator<char>(cpuinfo), {}};  // what the system lets nobody use it hides
+  for (const auto& [flag, unit] : {std::pair(" avx512_bf16", "avx512bf16"), std::pair(" amx_bf16", "amx-bf16")}) {
+    if (said.find(flag) == std::string::npos) continue;
+    EXPECT_THAT(units, testing::HasSubstr(unit));
+  }
 }
 
 }  // namespace

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 
+#include "worldmodel/nn/pictures.h"
+
 namespace evac::nn {
 namespace {
 
@@ -36,6 +38,10 @@ Tensor DecodeLatents(const EvacModel& model, const Tensor& latents) {
   return InBatches(
       latents.size(0), latents.size(2) * latents.size(3) * stride * stride,
       [&](std::int64_t from, std::int64_t count) { return model.vae().Decode(latents.narrow(0, from, count)); });
+}
+
+Tensor PicturesShown(const EvacModel& model, const Tensor& latents) {
+  return ToNetworkRange(ToBytes(DecodeLatents(model, latents)).to(at::kFloat) / 255);
 }
 
 }  // namespace evac::nn

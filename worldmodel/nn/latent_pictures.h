@@ -14,5 +14,7 @@ Tensor EncodeImages(const EvacModel& model, const Tensor& images, const Tensor& 
 Tensor EncodePoseMaps(const EvacModel& model, const Tensor& maps, const Tensor& noise);
 /// [N, z, h, w] → [N, 3, H, W], not clamped.
 Tensor DecodeLatents(const EvacModel& model, const Tensor& latents);
+/// The same as the image encoder is shown frames that were imagined: in [-1, 1], each number one of 256.
+Tensor PicturesShown(const EvacModel& model, const Tensor& latents);
 
 }  // namespace evac::nn

@@ -83,20 +83,30 @@ bool AreSame(FileWeights& one, FileWeights& other, const std::string& key, at::I
   return at::equal(a.to(coarser), b.to(coarser));
 }
 
+bool IsOfCodec(const std::string& key) { return key.starts_with("first_stage_model"); }
+
 /// What a world model's training leaves as it is: the codec, which says what latents mean, and the forecast, which says
-/// what the denoiser is shown. Between two of them a mean is neither. All are asked for the file that says most digits.
+/// what the denoiser is shown. Between two of them, or one and its rounding, a mean is neither.
+bool IsLeftAsItIs(const std::string& key) { return IsOfCodec(key) || key.starts_with(kForecastPrefix); }
+
+/// The first file whose numbers are floats, or the first of all.
+FileWeights& WithMostDigits(const std::vector<std::unique_ptr<FileWeights>>& files, const std::string& key) {
+  FileWeights* found = files.front().get();
+  for (const auto& each : files) {
+    if (each->Has(key) && found->Has(key) && HalfOf(*found, key) && !HalfOf(*each, key)) found = each.get();
+  }
+  return *found;
+}
+
 void RequireSameCodecAndForecast(const std::vector<std::unique_ptr<FileWeights>>& files, const ModelConfig& config) {
   for (const auto& [key, shape] : CheckpointKeys(config)) {
-    const bool is_codec = key.starts_with("first_stage_model");
-    if (!is_codec && !key.starts_with(kForecastPrefix)) continue;
-    FileWeights* wanted = files.front().get();
+    if (!IsLeftAsItIs(key)) continue;
+    FileWeights& wanted = WithMostDigits(files, key);
     for (const auto& each : files) {
-      if (each->Has(key) && wanted->Has(key) && HalfOf(*wanted, key) && !HalfOf(*each, key)) wanted = each.get();
-    }
-    for (const auto& each : files) {
-      if (each.get() != wanted && !AreSame(*wanted, *each, key, shape))
-        throw TensorError("the mean of weights: " + key + " is another in " + wanted->file().name() + " than in " +
-                          each->file().name() + ": wanted trainings with one " + (is_codec ? "codec" : "forecast"));
+      if (each.get() != &wanted && !AreSame(wanted, *each, key, shape))
+        throw TensorError("the mean of weights: " + key + " is another in " + wanted.file().name() + " than in " +
+                          each->file().name() + ": wanted trainings with one " +
+                          (IsOfCodec(key) ? "codec" : "forecast"));
     }
   }
 }
@@ -118,6 +128,7 @@ MeanWeights::MeanWeights(const std::vector<std::filesystem::path>& paths, const 
 }
 
 Tensor MeanWeights::Take(const std::string& key, at::IntArrayRef shape) {
+  if (IsLeftAsItIs(key)) return WithMostDigits(files_, key).Take(key, shape);
   Tensor sum;
   for (const auto& each : files_) {
     const Tensor tensor = each->Take(key, shape);

@@ -10,7 +10,8 @@ namespace evac::nn {
 
 /// The mean of several trainings of one network, parameter by parameter. Trainings that began from common weights and
 /// went on with other data err about other things, and their mean about fewer ("model soups", Wortsman et al. 2022,
-/// arXiv 2203.05482). What nothing reads is left out.
+/// arXiv 2203.05482). Codec and forecast, which all have in common, are as the first file of floats has them, or the
+/// first of all where each is of halves. What nothing reads is left out.
 class MeanWeights final : public ParameterSource {
  public:
   /// @param paths  at least two, of one size

@@ -22,7 +22,9 @@ Tensor DiscWeight(const Tensor& middle_px, const Tensor& like, double radius_px,
   return is_inside.to(at::kFloat) * (inside - 1) + 1;
 }
 
-void Check(const CodecTrainingOptions& o) {
+}  // namespace
+
+void CheckOptions(const CodecTrainingOptions& o) {
   constexpr const char* kTraining = "codec training";
   if (o.batch < 1) throw TensorError("codec training: batch is " + std::to_string(o.batch) + ", wanted at least 1");
   RequireShares(kTraining, {{"map_share", o.map_share}, {"contact_share", o.contact_share}});
@@ -33,12 +35,10 @@ void Check(const CodecTrainingOptions& o) {
                              {"foreground_radius", o.foreground_radius}});
 }
 
-}  // namespace
-
 CodecTraining::CodecTraining(const ShardSet& shards, const nn::VaeConfig& config, const CodecTrainingOptions& options,
                              at::Device device)
     : shards_(shards), config_(config), options_(options), device_(device) {
-  Check(options);
+  CheckOptions(options);
   for (std::size_t s = 0; s < shards.shards().size(); ++s) {
     const Tensor rows = shards.shards()[s].contact.nonzero().flatten();
     for (std::int64_t i = 0; i < rows.numel(); ++i) contacts_.push_back({s, rows.data_ptr<std::int64_t>()[i]});

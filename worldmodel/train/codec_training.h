@@ -22,6 +22,9 @@ struct CodecTrainingOptions {
   double contact_share = 0;       ///< of the frames that are picked among those in contact
 };
 
+/// What CodecTraining asks of its options. @throws TensorError for those that make no training
+void CheckOptions(const CodecTrainingOptions& options);
+
 /// Which pictures a step sees, as tensors.
 struct CodecBatch {
   Tensor pictures;  ///< [N, 3, H, W] in [-1, 1]

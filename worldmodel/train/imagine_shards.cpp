@@ -32,6 +32,16 @@ Tensor MemoryOf(const std::vector<Rollout*>& rollouts, const std::vector<Window>
   return at::cat(memories).contiguous();
 }
 
+/// With a memory of one frame the image encoder sees that one too, and beyond the first it was imagined.
+void ShowWhatWasImagined(const nn::EvacModel& model, const std::vector<Rollout*>& rollouts,
+                         const std::vector<Window>& windows, WorldBatch& batch) {
+  for (std::size_t i = 0; i < rollouts.size(); ++i) {
+    if (windows[i].image == 0) continue;
+    batch.images.narrow(0, static_cast<std::int64_t>(i) * batch.views, batch.views)
+        .copy_(nn::PicturesShown(model, rollouts[i]->latents[windows[i].image]));
+  }
+}
+
 /// Noise of each scene by itself: [BV, z, K, h, w].
 Tensor NoiseOf(const std::vector<Window>& windows, const std::vector<std::int64_t>& one_scene, std::uint64_t seed) {
   std::vector<Tensor> noises;
@@ -48,7 +58,8 @@ void Advance(const nn::EvacModel& model, const ShardSet& shards, const std::vect
   const nn::ModelConfig& config = model.config();
   std::vector<Window> windows;
   for (const Rollout* rollout : rollouts) windows.push_back(WindowOf(*rollout, config));
-  const WorldBatch batch = MakeWorldBatch(shards, windows);
+  WorldBatch batch = MakeWorldBatch(shards, windows);
+  ShowWhatWasImagined(model, rollouts, windows, batch);
   const nn::ChunkRequest request{MemoryOf(rollouts, windows),
                                  batch.images,
                                  batch.pose_maps.narrow(2, config.memory, config.chunk),
@@ -71,6 +82,35 @@ void Advance(const nn::EvacModel& model, const ShardSet& shards, const std::vect
         .copy_(imagined[static_cast<std::int64_t>(i)].permute({2, 0, 1, 3, 4}));
     rollouts[i]->done = windows[i].last + config.chunk;
   }
+}
+
+/// A shard's clips with their numbers among all of its.
+struct LongEnough {
+  std::vector<Clip> clips;
+  std::vector<std::int64_t> numbers;
+};
+
+LongEnough LongEnoughOf(const ShardSet& shards, std::size_t index, std::int64_t chunk) {
+  LongEnough found;
+  std::int64_t number = 0;
+  for (const Clip& clip : shards.clips()) {
+    if (clip.shard != index) continue;
+    if (clip.frames > chunk) {
+      found.clips.push_back(clip);
+      found.numbers.push_back(number);
+    }
+    ++number;
+  }
+  return found;
+}
+
+/// What is no number, or none that a half holds, would be learned from: a judge's weights are no numbers then.
+void RequireNumbers(const Tensor& latents, const std::filesystem::path& shard, std::int64_t clip) {
+  const Tensor wrong = latents.to(at::kFloat).isfinite().logical_not();
+  if (!wrong.any().item<bool>()) return;
+  throw TensorError(shard.string() + ": " + std::to_string(wrong.sum().item<std::int64_t>()) + " of " +
+                    std::to_string(wrong.numel()) + " numbers of what is imagined of clip " + std::to_string(clip) +
+                    " are not finite, wanted numbers that a half holds");
 }
 
 }  // namespace
@@ -106,14 +146,11 @@ void WriteImaginedLatents(const nn::EvacModel& model, const ShardSet& shards, st
                           const std::filesystem::path& folder, const std::string& products,
                           const ImagineOptions& options) {
   const Shard& shard = shards.shards().at(index);
-  std::vector<Clip> clips;
-  for (const Clip& clip : shards.clips()) {
-    if (clip.shard == index && clip.frames > model.config().chunk) clips.push_back(clip);
-  }
+  const auto [clips, numbers] = LongEnoughOf(shards, index, model.config().chunk);
   const Tensor latents = shard.latents.clone();
   const std::vector<Tensor> imagined = ImagineClips(model, shards, clips, options);
   for (std::size_t i = 0; i < clips.size(); ++i)
-    latents.narrow(0, clips[i].first, clips[i].frames).copy_(imagined[i]);
+    RequireNumbers(latents.narrow(0, clips[i].first, clips[i].frames).copy_(imagined[i]), shard.path, numbers[i]);
   TensorMetadata metadata = TensorFile::Open(LatentsPath(shard.path)).metadata();
   metadata["products"] = products;
   const Tensor maps = shard.map_latents.contiguous();

@@ -20,8 +20,8 @@ struct ImagineOptions {
 /// @param shards  with latents open, whole pictures or crops
 /// @param clips   of them, each of at least one picture and one chunk
 /// @returns per clip [frames, V, z, h, w], float: the first picture's latents as they are, the others imagined chunk by chunk,
-///   remembering what rollouts do (RolloutMemory). Where frames are left over behind the last whole chunk, the last
-///   chunk begins earlier.
+///   remembering what rollouts do (RolloutMemory), and shown nothing else that was recorded. Where frames are left over
+///   behind the last whole chunk, the last chunk begins earlier.
 /// @throws TensorError naming a clip's shard if it is too short
 std::vector<Tensor> ImagineClips(const nn::EvacModel& model, const ShardSet& shards, const std::vector<Clip>& clips,
                                  const ImagineOptions& options);
@@ -30,6 +30,7 @@ std::vector<Tensor> ImagineClips(const nn::EvacModel& model, const ShardSet& sha
 /// long enough imagined, the others' as they are. Maps' latents are copied. Whole or not at all.
 /// @param index  of the shard in the set
 /// @param products  as EncodeOptions has it, and who imagined
+/// @throws TensorError naming shard and clip if what is imagined is not finite as halves; nothing is written then
 void WriteImaginedLatents(const nn::EvacModel& model, const ShardSet& shards, std::size_t index,
                           const std::filesystem::path& folder, const std::string& products,
                           const ImagineOptions& options);

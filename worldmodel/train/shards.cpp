@@ -257,6 +257,15 @@ std::filesystem::path LatentsPath(const std::filesystem::path& shard) { return B
 
 std::filesystem::path VariantsPath(const std::filesystem::path& shard) { return Beside(shard, "variants_"); }
 
+std::string RecipesOf(const ShardFolders& folders) {
+  std::string recipes;
+  for (const std::filesystem::path& folder : folders) {
+    if (!recipes.empty()) recipes += ',';
+    recipes += Text(TensorFile::Open(ShardPaths(folder).front()), "recipe");
+  }
+  return recipes;
+}
+
 bool HasSplit(const std::filesystem::path& folder, Split split) {
   const std::vector<std::filesystem::path> shards = ShardPaths(folder);
   return std::any_of(shards.begin(), shards.end(),

@@ -119,6 +119,9 @@ bool MayBeScaledBy(const TensorMetadata& latents, double scale_factor);
 std::filesystem::path LatentsPath(const std::filesystem::path& shard);
 /// The file of its variants.
 std::filesystem::path VariantsPath(const std::filesystem::path& shard);
+/// The `recipe` of each packing, with commas between them, as ShardSet's metadata have it.
+/// @throws TensorError as ShardPaths, or if a first shard has none
+std::string RecipesOf(const ShardFolders& folders);
 /// Whether a packing has shards of a split. @throws TensorError as ShardPaths
 bool HasSplit(const std::filesystem::path& folder, Split split);
 /// Every shard of a folder, in order.

@@ -4,6 +4,7 @@
 #include <cstdio>
 #include <deque>
 #include <optional>
+#include <utility>
 
 #include "worldmodel/nn/weights.h"
 #include "worldmodel/train/weight_files.h"
@@ -20,6 +21,17 @@ std::string Decibel(double value) {
 void CheckSizes(const ShardSet& shards, const nn::ModelConfig& config) {
   nn::CheckShape("the shards' pictures", shards.shards().front().frames,
                  {-1, config.views, config.image_height_px, config.image_width_px, 3});
+}
+
+/// Those to learn from and the hold-out, which fit one another and the page; after the options.
+std::pair<ShardSet, ShardSet> OpenChecked(const JobPlace& place, const CodecOptions& options) {
+  CheckHoldoutSize(options.job);
+  CheckOptions(options.job.trainer);
+  CheckOptions(options.codec);
+  std::pair both(ShardSet(place.shards, Split::kTrain), ShardSet(place.shards, Split::kHoldout));
+  CheckSizes(both.first, place.config);
+  both.first.CheckLike(both.second);
+  return both;
 }
 
 void WriteCodec(const std::filesystem::path& path, const std::vector<NamedTensor>& weights,
@@ -52,13 +64,16 @@ struct CodecWorker {
 }  // namespace
 
 std::int64_t Workers(const JobPlace& place, const JobOptions& options) {
+  if (!place.device.is_cpu()) return 1;  // each has a copy of all that is trained, and the GPU would hold them all
   return std::clamp<std::int64_t>(place.threads, 1, options.trainer.accumulate);
 }
 
 std::string IdentityOf(const JobPlace& place, const JobOptions& options) {
   const std::int64_t workers = Workers(place, options);
-  return " workers " + std::to_string(workers) + (workers > 1 ? "" : " threads " + std::to_string(place.threads)) +
-         (place.device.is_cpu() ? "" : " device " + place.device.str()) + place.begun_with;
+  std::string text = " workers " + std::to_string(workers);
+  if (!place.device.is_cpu()) return text + " device " + at::Device(place.device.type()).str() + place.begun_with;
+  if (workers == 1) text += " threads " + std::to_string(place.threads);
+  return text + place.begun_with;
 }
 
 void CheckHoldoutSize(const JobOptions& options) {
@@ -66,12 +81,12 @@ void CheckHoldoutSize(const JobOptions& options) {
     throw TensorError("training: holdout_size is " + std::to_string(options.holdout_size) + ", wanted at least 1");
 }
 
+void CheckCodecTraining(const JobPlace& place, const CodecOptions& options) { OpenChecked(place, options); }
+
 TrainerSummary TrainCodec(const JobPlace& place, const CodecOptions& given, const std::filesystem::path& init) {
   CodecOptions options = given;
-  CheckHoldoutSize(options.job);
-  const ShardSet shards(place.shards, Split::kTrain), holdout(place.shards, Split::kHoldout);
-  CheckSizes(shards, place.config);
-  shards.CheckLike(holdout);
+  const auto both = OpenChecked(place, options);
+  const ShardSet &shards = both.first, &holdout = both.second;
   nn::RandomWeights random(options.job.trainer.seed);
   std::optional<CheckpointWeights> start;
   if (!init.empty()) start.emplace(init);

@@ -11,7 +11,7 @@ struct JobPlace {
   std::filesystem::path out;     ///< see Trainer; and the weights when it ends
   nn::ModelConfig config;
   int threads = 1;  ///< parts of a step (`accumulate`) that are computed side by side, each on one core; or libtorch's
-                    ///< own, where no parts are
+                    ///< own, where no parts are, and on a GPU
   std::function<bool()> interrupted = {};
   std::function<void(const TrainerProgress&)> on_progress = {};
   std::function<void(const std::string& sentence)> say = {};
@@ -19,14 +19,20 @@ struct JobPlace {
   at::Device device = at::kCPU;  ///< where it is computed; what is random is the same everywhere, sums are not
 };
 
-/// How many threads share the parts of a step; what the sums' last digits depend on.
+/// How many threads share the parts of a step, each with a copy of what is trained; what the sums' last digits depend
+/// on. On a GPU it is one, whose parts follow one another: memory is what they are for there.
 std::int64_t Workers(const JobPlace& place, const JobOptions& options);
-/// What of a place decides the numbers of each step: its threads, and what it was begun with.
+/// What of a place decides the numbers of each step: its threads on a CPU, else the kind of device ("cuda" of "cuda:1"),
+/// and what it was begun with.
 std::string IdentityOf(const JobPlace& place, const JobOptions& options);
 /// @throws TensorError if the shards' pose maps were drawn in another way than the page says, with both
 void CheckPoseMaps(const ShardSet& shards, const nn::ModelConfig& config);
 /// @throws TensorError if a hold-out of no picture or window is wanted
 void CheckHoldoutSize(const JobOptions& options);
+
+/// All that TrainCodec looks at before it reads `init`: for a training that is carried elsewhere (training_job.h).
+/// @throws TensorError for options that make no training, and for shards that do not fit one another or the page
+void CheckCodecTraining(const JobPlace& place, const CodecOptions& options);
 
 /// Trains the codec and writes OUT/codec.safetensors: its parameters alone, latents normalised, what they are worth in
 /// the metadata (psnr, psnr_object, psnr_maps: dB, hold-out; psnr_object is "unknown" where no shard knows its place). An

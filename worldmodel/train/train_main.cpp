@@ -104,6 +104,14 @@ void RequireSame(const char* option, const std::filesystem::path& given, const s
                       " is another one than the job was written for: SHA-256 " + found + ", wanted " + wanted);
 }
 
+/// What one packing holds out another might learn from: of the job's own that was asked where it was written.
+void RequireSameShards(const ShardFolders& shards, const std::string& wanted) {
+  if (wanted.empty()) return;  // the job is of an earlier version
+  if (const std::string found = RecipesOf(shards); found != wanted)
+    throw TensorError("SHARDS: they are others than the job was written for, or in another order: recipe " + found +
+                      ", wanted " + wanted);
+}
+
 /// One process in OUT, as long as it lives: it holds OUT/lock as `evac train` does (core/store_lock.h, which is not
 /// built here), so that the two do not write one another's files either.
 class Hold {
@@ -192,6 +200,7 @@ int Train(const Arguments& arguments) {
   RequireSame("--codec", arguments.codec, job.start.codec_sha256, CodecSha256);
   RequireSame("--init", arguments.init, job.init_sha256, Sha256OfFile);
   RequireSame("--forecast", arguments.forecast, job.forecast_sha256, Sha256OfFile);
+  RequireSameShards(arguments.shards, job.recipe);
   for (JobOptions* options : {&job.codec.job, &job.world.job}) {
     if (arguments.steps == 0) continue;
     options->trainer.steps = arguments.steps;

@@ -3,6 +3,7 @@
 #include <cstdio>
 #include <deque>
 #include <memory>
+#include <utility>
 
 #include "worldmodel/nn/weight_keys.h"
 #include "worldmodel/nn/weights.h"
@@ -129,6 +130,42 @@ void CheckStripSteps(const WorldOptions& options, const nn::ModelConfig& config)
                       std::to_string(config.schedule.steps) + ", the steps of the page's schedule");
 }
 
+/// @returns the options as they are meant
+WorldOptions Checked(const JobPlace& place, WorldOptions options, const WorldStart& start) {
+  options.Resolve();
+  options.world.windows.chunk = place.config.chunk;
+  options.world.windows.memory = place.config.memory;
+  CheckHoldoutSize(options.job);
+  CheckViewWeights(options.world, place.config);
+  CheckStripSteps(options, place.config);
+  CheckStart(place.config, start);
+  CheckOptions(options.job.trainer);
+  CheckOptions(options.world, place.config);
+  return options;
+}
+
+/// Those to learn from and the hold-out, with their latents: they fit one another, the page and the start.
+std::pair<ShardSet, ShardSet> OpenChecked(const JobPlace& place, const WorldStart& start) {
+  std::pair both(ShardSet(place.shards, Split::kTrain), ShardSet(place.shards, Split::kHoldout));
+  auto& [shards, holdout] = both;
+  for (ShardSet* set : {&shards, &holdout}) {
+    set->OpenLatents(place.config.vae.z_channels, place.config.vae.Stride(), place.config.vae.scale_factor);
+    CheckShards(*set, place.config, start);
+  }
+  CheckHoldout(holdout, shards);
+  shards.CheckLike(holdout);
+  if (place.config.object_forecast)
+    CheckForecastFor(start.forecast.empty() ? start.init : start.forecast,
+                     WhatForecastIsFor(shards.metadata(), place.config));
+  return both;
+}
+
+/// What is measured is the same, whatever was learned from.
+WorldTrainingOptions OfMeasuring(WorldTrainingOptions options) {
+  options.windows.successes_only = false;
+  return options;
+}
+
 std::string Number(double value) {
   char text[32];
   std::snprintf(text, sizeof text, "%.6g", value);
@@ -165,26 +202,18 @@ TensorMetadata WhatFor(const TensorMetadata& shards) {
   return card;
 }
 
+void CheckWorldTraining(const JobPlace& place, const WorldOptions& given, const WorldStart& start) {
+  const WorldOptions options = Checked(place, given, start);
+  const auto both = OpenChecked(place, start);
+  WindowSampler(both.first, options.world.windows);  // there are some
+  WindowSampler(both.second, OfMeasuring(options.world).windows);
+}
+
 TrainerSummary TrainWorld(const JobPlace& place, const WorldOptions& given, const WorldStart& start,
                           const std::function<void(std::int64_t step, const Strips&)>& look) {
-  WorldOptions options = given;
-  options.Resolve();
-  options.world.windows.chunk = place.config.chunk;
-  options.world.windows.memory = place.config.memory;
-  CheckHoldoutSize(options.job);
-  CheckViewWeights(options.world, place.config);
-  CheckStripSteps(options, place.config);
-  CheckStart(place.config, start);
-  ShardSet shards(place.shards, Split::kTrain), holdout(place.shards, Split::kHoldout);
-  for (ShardSet* set : {&shards, &holdout}) {
-    set->OpenLatents(place.config.vae.z_channels, place.config.vae.Stride(), place.config.vae.scale_factor);
-    CheckShards(*set, place.config, start);
-  }
-  CheckHoldout(holdout, shards);
-  shards.CheckLike(holdout);
-  if (place.config.object_forecast)
-    CheckForecastFor(start.forecast.empty() ? start.init : start.forecast,
-                     WhatForecastIsFor(shards.metadata(), place.config));
+  WorldOptions options = Checked(place, given, start);
+  const auto both = OpenChecked(place, start);
+  const ShardSet &shards = both.first, &holdout = both.second;
   Sources sources(start, place.config, options.job.trainer.seed);
   OnlyRead read(sources.routed, place.config);
   std::deque<WorldWorker> workers;
@@ -192,9 +221,7 @@ TrainerSummary TrainWorld(const JobPlace& place, const WorldOptions& given, cons
     workers.emplace_back(read, shards, place.config, options, place.device);
   const TrainableWeights& weights = workers.front().weights;
   const nn::EvacModel& model = workers.front().model;
-  WorldTrainingOptions all = options.world;
-  all.windows.successes_only = false;  // what is measured is the same, whatever was learned from
-  const WorldTraining measuring(model, holdout, all, place.device);
+  const WorldTraining measuring(model, holdout, OfMeasuring(options.world), place.device);
   const std::vector<Window> windows = measuring.sampler().Spread(options.job.holdout_size),
                             drawn = measuring.sampler().Spread(kStripWindows);
   options.job.trainer.identity = IdentityOf(SettingsOf(options)) + shards.metadata().at("recipe") + " " +

@@ -20,8 +20,9 @@ struct WorldStart {
 
 /// @throws TensorError if the sizes have an `object_forecast` and nothing gives one, or one is given that they have not;
 ///   if an exception begins no key that `init` gives; if a key of `init` that is not excepted is missing, is none of the
-///   network's or has another shape, by name; or if its noise schedule is another (nn::CompareSchedule), or heads of
-///   attention are (nn::CompareSizes).
+///   network's or has another shape, by name; or if its noise schedule is another (nn::CompareSchedule), or, where its
+///   card says it (nn::CompareSizes), heads of attention, `vae.scale_factor`, `schedule.from_last_frame` (not where the
+///   last layer is excepted) or, with `init_widen` or where `init` gives the forecast, `schedule.carry_plane_m`.
 void CheckStart(const nn::ModelConfig& config, const WorldStart& start);
 
 /// What weights are for, as the shards that they learned from say, for the weights' metadata: period_s, cameras, arms,
@@ -38,6 +39,13 @@ TensorMetadata WhatForecastIsFor(const TensorMetadata& shards, const nn::ModelCo
 /// @throws TensorError naming the file and what differs: period, cameras, arms (and which are read), how maps are drawn, or
 ///   the plane
 void CheckForecastFor(const std::filesystem::path& forecast, const TensorMetadata& what_for);
+
+/// All that TrainWorld looks at before it reads weights and builds the network: for a training that is carried elsewhere
+/// (training_job.h), and would be refused there.
+/// @throws TensorError for options that make no training, a start that does not fit (CheckStart), a forecast of others
+///   (CheckForecastFor), and shards that do not fit one another or the page, that have no clip long enough, or no latents
+///   of the start's codec
+void CheckWorldTraining(const JobPlace& place, const WorldOptions& options, const WorldStart& start);
 
 /// Trains the denoiser and its resamplers (EVAC's first stage of training is the codec) and writes
 /// OUT/weights.safetensors: the whole network, the codec included, averaged weights of the best hold-out.

@@ -37,7 +37,9 @@ void CheckMeasuring(const TrainerOptions& o) {
           "0 where holdout_every is 0: nothing is measured");
 }
 
-void Check(const TrainerOptions& o) {
+}  // namespace
+
+void CheckOptions(const TrainerOptions& o) {
   Require(o.steps > 0, "steps", static_cast<double>(o.steps), "at least 1");
   Require(o.minutes >= 0, "minutes", o.minutes, "at least 0");
   Require(o.learning_rate > 0, "learning_rate", o.learning_rate, "a number above 0");
@@ -56,6 +58,8 @@ void Check(const TrainerOptions& o) {
   Require(o.checkpoint_every_s >= 0, "checkpoint_every_s", o.checkpoint_every_s, "at least 0");
   CheckMeasuring(o);
 }
+
+namespace {
 
 template <typename... Args>
 std::string Text(const char* format, Args... args) {
@@ -105,7 +109,7 @@ TensorMetadata TrainerSummary::CardOfSteps() const {
 
 Trainer::Trainer(std::vector<NamedTensor> parameters, const TrainerOptions& options, std::filesystem::path folder)
     : parameters_(std::move(parameters)), options_(options), folder_(std::move(folder)), steps_(options.steps) {
-  Check(options_);
+  CheckOptions(options_);
   if (options_.optimiser == "muon") matrices_ = MatricesOf(parameters_.parameters());
   const auto zeros = [&] { return at::zeros_like(parameters_.values()); };
   state_ = {parameters_.values(), parameters_.gradients(), zeros(), zeros(), {}};

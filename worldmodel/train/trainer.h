@@ -41,6 +41,9 @@ struct TrainerOptions {
   std::string identity;  ///< what else decides the numbers: data, network, loss. A checkpoint of another is refused
 };
 
+/// What Trainer asks of its options. @throws TensorError for those that make no training
+void CheckOptions(const TrainerOptions& options);
+
 /// The learning rate of a step: warm-up, constant, decay.
 double LearningRateAt(const TrainerOptions& options, std::int64_t step, std::int64_t steps);
 
@@ -101,8 +104,9 @@ struct TrainerSummary {
 class Trainer {
  public:
   /// @param parameters  floats; they stay where their holders see them (FlatParameters)
-  /// @throws TensorError for options that make no training, or if the folder holds another training's checkpoint, or
-  /// none and a metrics.csv or holdout.csv of somebody's, or of a training whose checkpoint is gone
+  /// @throws TensorError for options that make no training, or if the folder holds another training's checkpoint, one
+  /// that is damaged (a step that is no number, tensors of other sizes), or none and a metrics.csv or holdout.csv of
+  /// somebody's, or of a training whose checkpoint is gone
   Trainer(std::vector<NamedTensor> parameters, const TrainerOptions& options, std::filesystem::path folder);
 
   /// From now on the parts of a step (`accumulate`) are shared out among the trainer's own loss and its replicas', each

@@ -4,6 +4,7 @@
 #include <system_error>
 
 #include "worldmodel/nn/mapped_tensors.h"
+#include "worldmodel/nn/number_text.h"
 #include "worldmodel/train/trainer.h"
 
 namespace evac::train {
@@ -11,6 +12,7 @@ namespace {
 
 constexpr const char* kFile = "training.safetensors";
 constexpr const char* kFormat = "evac-training 1";
+constexpr std::int64_t kMostSteps = std::int64_t{1} << 40;
 constexpr const char* kTables = ", and its metrics.csv and holdout.csv";
 
 /// All 53 bits, so that a number read again is the number that was written.
@@ -31,11 +33,27 @@ class Metadata {
   }
   /// Of a key that checkpoints of earlier versions may lack.
   std::int64_t WholeOr0(const char* key) const { return Has(key) ? Whole(key) : 0; }
-  std::int64_t Whole(const char* key) const { return std::strtoll(Text(key).c_str(), nullptr, 10); }
-  double Number(const char* key) const { return std::strtod(Text(key).c_str(), nullptr); }
+  std::int64_t Whole(const char* key) const {
+    std::int64_t found = 0;
+    if (!nn::ParseNumber(Text(key), found) || found < 0 || found > kMostSteps)
+      Refuse(key, "a whole number from 0 to 2^40");
+    return found;
+  }
+  /// As Exact writes it. A loss or a score may be infinite, or "nan".
+  double Number(const char* key) const {
+    const std::string text = Text(key);
+    char* end = nullptr;
+    const double found = std::strtod(text.c_str(), &end);
+    if (text.empty() || end != text.c_str() + text.size()) Refuse(key, "a number");
+    return found;
+  }
   const std::string& file() const { return file_.name(); }
 
  private:
+  [[noreturn]] void Refuse(const char* key, const char* wanted) const {
+    throw TensorError(file_.name() + ": its metadata's '" + key + "' is '" + Text(key) + "', wanted " + wanted);
+  }
+
   const TensorFile& file_;
 };
 
@@ -100,7 +118,8 @@ bool Trainer::Load() {
   holdouts_since_best_ = metadata.WholeOr0("holdouts_since_best");
   // An earlier version took a first hold-out for the best though it was no number.
   if (!metadata.Has("best_score") || !std::isfinite(metadata.Number("best_score"))) return true;
-  best_ = file.Get("best").clone().to(state_.values.device());
+  best_ = state_.values.clone();
+  CopyFrom(file, "best", best_);
   best_score_ = metadata.Number("best_score");
   best_step_ = metadata.Whole("best_step");
   return true;

@@ -25,6 +25,7 @@ bool SetOther(TrainingJob& job, const std::string& name, const std::string& valu
   else if (name == "init_except") job.start.init_except.push_back(value);
   else if (name == "init_sha256") job.init_sha256 = value;
   else if (name == "forecast_sha256") job.forecast_sha256 = value;
+  else if (name == "recipe") job.recipe = value;
   else if (name == kLastLine) job.begun_with = value;
   else if (name == "init_widen") return nn::ParseFlag(value, job.start.init_widen);
   else if (name == "wants_init") return nn::ParseFlag(value, job.wants_init);
@@ -73,6 +74,7 @@ std::string TextOf(const TrainingJob& given) {
   flag("wants_forecast", job.wants_forecast);
   if (!job.init_sha256.empty()) text += "init_sha256 " + job.init_sha256 + "\n";
   if (!job.forecast_sha256.empty()) text += "forecast_sha256 " + job.forecast_sha256 + "\n";
+  if (!job.recipe.empty()) text += "recipe " + job.recipe + "\n";
   return text + kLastLine + " " + job.begun_with + "\n";
 }
 

@@ -22,6 +22,7 @@ struct TrainingJob {
   bool wants_init = false, wants_forecast = false;  ///< weights that the training begins with
   /// Of these files, SHA-256, as `start.codec_sha256` is of the codec's tensors (sha256.h); empty: not asked.
   std::string init_sha256, forecast_sha256;
+  std::string recipe;  ///< of the shards (RecipesOf); empty: not asked
   std::string begun_with;  ///< JobPlace::begun_with
 
   const JobOptions& options() const { return kind == TrainingKind::kCodec ? codec.job : world.job; }

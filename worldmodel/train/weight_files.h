@@ -24,8 +24,9 @@ class CheckpointWeights final : public nn::ParameterSource {
 };
 
 /// The same, of a model that is shown more than the one in the file was: what the first layer's weights lack for the
-/// channels that are new is 0, so that the new model begins as the old one was. New channels come last, but before that
-/// of the object's forecast, where the file's model has one (nn::DenoiserInput).
+/// channels that are new is 0, so that the new model begins as the old one was, where its answers are counted from the
+/// same (CheckStart asks the card). New channels come last, but before that of the object's forecast, where the file's
+/// model has one (nn::DenoiserInput).
 class WidenedWeights final : public nn::ParameterSource {
  public:
   /// @param object_forecast  whether the new model is shown one

@@ -124,6 +124,7 @@ std::vector<Window> WindowSampler::Spread(std::int64_t count) const {
   for (std::int64_t i = 0; i < std::min(count, all); ++i) {
     const Start& start = all_.rollout[static_cast<std::size_t>(i * all / std::min(count, all))];
     windows.push_back({start.clip, RolloutMemory(start.last, options_.memory), start.last, options_.chunk, 0});
+    windows.back().image = windows.back().memory.front();
   }
   return windows;
 }

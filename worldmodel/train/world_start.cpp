@@ -77,6 +77,19 @@ void CheckKeys(const nn::ModelConfig& config, const WorldStart& start, const Ten
                       " (--init-except PREFIX leaves out what is not to be taken over)");
 }
 
+/// Sizes that no shape shows and that say what weights mean. The rest may be another robot's.
+std::vector<std::string> SizesOfMeaning(const nn::ModelConfig& config, const WorldStart& start) {
+  static const std::string kBase = "schedule.from_last_frame", kPlane = "schedule.carry_plane_m";
+  std::vector<std::string> sizes = {"unet.num_head_channels", "unet.init_attention_heads", "action_resampler.",
+                                    "image_resampler.",       "image_encoder.",            "vae.scale_factor"};
+  // What the answer is counted from; a last layer that is drawn anew answers nothing yet.
+  const bool keeps_answer = !BeginsWithAny("model.diffusion_model.out.2.weight", start.init_except);
+  if (keeps_answer) sizes.push_back(kBase);
+  const bool gives_forecast = config.object_forecast && start.forecast.empty();
+  if (gives_forecast || (keeps_answer && start.init_widen)) sizes.push_back(kPlane);
+  return sizes;
+}
+
 /// Weights know the noise that they learned from.
 void CheckSchedule(const nn::ModelConfig& config, const WorldStart& start, const nn::MappedTensors& init) {
   for (const char* buffer : {"alphas_cumprod", "scale_arr"}) {
@@ -112,9 +125,7 @@ void CheckStart(const nn::ModelConfig& config, const WorldStart& start) {
   const nn::MappedTensors init(TensorFile::OpenCheckpoint(start.init));
   CheckExceptions(config, start, init.file());
   CheckKeys(config, start, init.file());
-  nn::CompareSizes(init.file(), config,  // the rest may be another robot's
-                   {"unet.num_head_channels", "unet.init_attention_heads", "action_resampler.", "image_resampler.",
-                    "image_encoder."});
+  nn::CompareSizes(init.file(), config, SizesOfMeaning(config, start));
   CheckSchedule(config, start, init);
 }
 

@@ -5,6 +5,7 @@
 
 #include "worldmodel/nn/frame_actions.h"
 #include "worldmodel/nn/hand_views.h"
+#include "worldmodel/nn/latent_pictures.h"
 #include "worldmodel/nn/weight_keys.h"
 #include "worldmodel/train/forecast_training.h"
 #include "worldmodel/train/option_limits.h"
@@ -37,7 +38,9 @@ void CheckRanges(const WorldTrainingOptions& o) {
   RequireAboveZero(kTraining, {{"object_radius", o.object_radius}, {"step_weight_cap", o.step_weight_cap}});
 }
 
-void Check(const WorldTrainingOptions& o, const nn::ModelConfig& config) {
+}  // namespace
+
+void CheckOptions(const WorldTrainingOptions& o, const nn::ModelConfig& config) {
   if (o.batch < 1) throw TensorError("world training: batch is " + std::to_string(o.batch) + ", wanted at least 1");
   if (o.windows.chunk != config.chunk || o.windows.memory != config.memory)
     throw TensorError("world training: windows of " + std::to_string(o.windows.memory) + " + " +
@@ -55,8 +58,6 @@ void Check(const WorldTrainingOptions& o, const nn::ModelConfig& config) {
     throw TensorError("world training: noise / signal from " + std::to_string(o.ratio_from) + " to " +
                       std::to_string(o.ratio_to) + ", wanted 0 < from < to");
 }
-
-}  // namespace
 
 bool IsTrained(const std::string& key, const WorldTrainingOptions& options) {
   if (key.starts_with("model.diffusion_model.") || key.starts_with("image_proj_model.")) return true;
@@ -80,7 +81,7 @@ struct WorldTraining::Drops {
 WorldTraining::WorldTraining(const nn::EvacModel& model, const ShardSet& shards, const WorldTrainingOptions& options,
                              at::Device device)
     : model_(model), shards_(shards), options_(options), sampler_(shards, options.windows), device_(device) {
-  Check(options_, model.config());
+  CheckOptions(options_, model.config());
 }
 
 Tensor WorldTraining::PerRow(const std::vector<float>& values, std::int64_t dims) const {
@@ -243,6 +244,7 @@ Tensor WorldTraining::ImagineOnce(const WorldBatch& batch, Dice& dice) const {
 
 void WorldTraining::RememberOwn(const std::vector<Window>& windows, double share, std::int64_t chunks,
                                 WorldBatch& batch, Dice& dice) const {
+  const at::NoGradGuard no_gradients;
   std::vector<Window> before;
   std::vector<std::int64_t> scenes;
   const std::int64_t chunk = options_.windows.chunk, views = batch.views;
@@ -270,6 +272,9 @@ void WorldTraining::RememberOwn(const std::vector<Window>& windows, double share
           .select(2, static_cast<std::int64_t>(j))
           .copy_(imagined.narrow(0, from, views).select(2, k));
     }
+    if (memory.size() > 1) continue;  // of one frame, it is what the image encoder sees when imagining
+    const Tensor newest = imagined.narrow(0, static_cast<std::int64_t>(i) * views, views).select(2, chunk - 1);
+    batch.images.narrow(0, scenes[i] * views, views).copy_(nn::PicturesShown(model_, newest));
   }
 }
 

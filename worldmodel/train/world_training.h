@@ -55,6 +55,10 @@ struct WorldTrainingOptions {
                                    ///< is told; false: of the likeliest, as it is asked later
 };
 
+/// What WorldTraining asks of its options. @throws TensorError for those that make no training of such a model, or that
+/// are out of range (option_limits.h)
+void CheckOptions(const WorldTrainingOptions& options, const nn::ModelConfig& config);
+
 /// Whether training moves a parameter; what nothing reads stays.
 bool IsTrained(const std::string& key, const WorldTrainingOptions& options);
 /// The keys that training moves, of a model.
@@ -92,7 +96,8 @@ class WorldTraining {
   /// Where the thing is likely to be, if the network is shown that; what says so is not trained here.
   Tensor ObjectMapsOf(const WorldBatch& batch) const;
   Tensor TokensOf(const WorldBatch& batch) const;
-  /// Puts what the network imagines of the chunk before each window into the window's memory.
+  /// Puts what the network imagines of the chunk before each window into the window's memory; into the picture that
+  /// the image encoder sees as well, where memory is one frame.
   /// @param share  of the windows; their own memory is put in first, `chunks` - 1 deep
   void RememberOwn(const std::vector<Window>& windows, double share, std::int64_t chunks, WorldBatch& batch,
                    Dice& dice) const;

@@ -49,6 +49,20 @@ TEST(RateDifference, WithoutDataNothingIsKnown) {
   EXPECT_THROW(TangoDifference({{1, 2}, 4}, 1.0), Error);
 }
 
+TEST(RateDifference, AsManyPairsAsThereAreLeaveOutTheEndOfTheirInterval) {
+  for (const auto& [b, c, n] : {std::tuple{0, 4, 10}, {9, 2, 40}, {0, 0, 25}, {0, 1, 1}}) {
+    const PairedOutcomes seen{{b, c}, n};
+    const double end = TangoDifference(seen).interval->high;
+    EXPECT_NEAR(*PairsUntilTangoLeavesOut(end, seen), n, 1e-6) << b << " " << c << " " << n;
+    EXPECT_LT(*PairsUntilTangoLeavesOut((1 + end) / 2, seen), n) << "further away fewer do";
+  }
+  EXPECT_NEAR(*PairsUntilTangoLeavesOut(-0.1, {{0, 5}, 5}), 4.695, 1e-3);
+  EXPECT_NEAR(*PairsUntilTangoLeavesOut(-0.1, {{0, 1}, 1}), 4.695, 1e-3) << "as many, whatever was seen of them";
+  EXPECT_EQ(PairsUntilTangoLeavesOut(0.1, {}).reason(), "no pairs");
+  EXPECT_FALSE(PairsUntilTangoLeavesOut(-0.25, {{0, 1}, 4})) << "it is the difference itself";
+  EXPECT_THROW(PairsUntilTangoLeavesOut(1, {{0, 1}, 4}), Error);
+}
+
 TEST(EffectivePairs, CopiesOfOnePairCountOnceAndIndependentOnesAllOfThem) {
   using Clusters = std::vector<PairedOutcomes>;
   const PairedOutcomes single = EffectivePairs(Clusters{{{1, 0}, 1}, {{0, 1}, 1}, {{0, 0}, 1}});

@@ -9,6 +9,7 @@
 #include "core/statistics/betting.h"
 #include "core/statistics/planning.h"
 #include "core/statistics/ppi.h"
+#include "core/statistics/rate_difference.h"
 #include "core/statistics/sequential.h"
 #include "core/statistics/sequential_planning.h"
 
@@ -204,6 +205,17 @@ TEST(Planning, WhatNoSizeCanShowIsUndefinedAndNonsenseIsRefused) {
 TEST(Planning, NonInferiorityNeedsTheSizesOfTheDesign) {
   EXPECT_NEAR(static_cast<double>(TrialsForNonInferiority(0.7, 0.1).n), 260, 3);
   EXPECT_NEAR(static_cast<double>(PairsForNonInferiority(0.2, 0.1).n), 124, 1);
+}
+
+/// Where nothing fails 0 episodes were named, and below 25 pairs the interval reaches the margin even without a flip.
+TEST(Planning, NoFewerAreNamedThanShowItWhereNothingFlips) {
+  for (const double rate : {0.0, 1.0}) EXPECT_EQ(TrialsForNonInferiority(rate, 0.1).n, 25) << "it was 0";
+  EXPECT_EQ(PairsForNonInferiority(0.01, 0.1).n, 25) << "it was 7";
+  EXPECT_GT(TangoDifference({{0, 0}, 25}, 0.9).interval->low, -0.1);
+  EXPECT_LE(TangoDifference({{0, 0}, 24}, 0.9).interval->low, -0.1);
+  EXPECT_EQ(PairsForNonInferiority(0, 0.1, {.alpha = 0.01}).n, 49);
+  EXPECT_GT(TangoDifference({{0, 0}, 49}, 0.98).interval->low, -0.1);
+  EXPECT_LE(TangoDifference({{0, 0}, 48}, 0.98).interval->low, -0.1);
 }
 
 /// How often the look at `n` pairs decides, of many such runs.
