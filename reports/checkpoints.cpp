@@ -12,7 +12,7 @@
 namespace evac {
 namespace {
 
-/// Checkpoints by policy name.
+/// Checkpoints by policy name, both in the order declared.
 std::vector<std::pair<std::string, std::vector<std::string>>> FamiliesOf(const RunSummary& summary) {
   std::vector<std::pair<std::string, std::vector<std::string>>> families;
   for (const PolicyInfo& policy : summary.data.policies) {
@@ -65,34 +65,8 @@ bool DifferInTheirLastNumberAlone(const std::vector<std::string>& checkpoints) {
          });
 }
 
-/// Takes the digits that `text` begins with off it. @returns them without leading zeros
-std::string_view TakeNumber(std::string_view& text) {
-  const auto end = static_cast<std::size_t>(std::ranges::find_if_not(text, IsDigit) - text.begin());
-  std::string_view number = text.substr(0, end);
-  text.remove_prefix(end);
-  number.remove_prefix(std::min(number.find_first_not_of('0'), number.size()));
-  return number;
-}
-
-/// By their bytes, but for numbers, which are compared as such: v1.9, v1.10, v2.0.
-bool IsBefore(std::string_view a, std::string_view b) {
-  while (!a.empty() && !b.empty()) {
-    if (IsDigit(a.front()) && IsDigit(b.front())) {
-      const std::string_view one = TakeNumber(a), two = TakeNumber(b);
-      if (one != two) return one.size() == two.size() ? one < two : one.size() < two.size();
-    } else if (a.front() != b.front()) {
-      return static_cast<unsigned char>(a.front()) < static_cast<unsigned char>(b.front());
-    } else {
-      a.remove_prefix(1);
-      b.remove_prefix(1);
-    }
-  }
-  return a.empty() && !b.empty();
-}
-
-std::vector<CheckpointPoint> PointsInOrder(std::vector<std::string> checkpoints, bool& has_steps) {
+std::vector<CheckpointPoint> PointsInOrder(const std::vector<std::string>& checkpoints, bool& has_steps) {
   has_steps = DifferInTheirLastNumberAlone(checkpoints);
-  if (!has_steps) std::ranges::stable_sort(checkpoints, IsBefore);
   std::vector<CheckpointPoint> points;
   for (const std::string& checkpoint : checkpoints) {
     points.push_back({checkpoint, has_steps ? *StepOf(checkpoint) : static_cast<double>(points.size()), {}});

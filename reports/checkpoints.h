@@ -14,8 +14,8 @@ namespace evac {
 /// One checkpoint of a policy on one task.
 struct CheckpointPoint {
   std::string checkpoint;
-  double step = 0;             ///< the number its name ends with; where not all names have one, with the same before
-                               ///< it, its place among the names, numbers in these as numbers: v1.10, v2.0
+  double step = 0;             ///< the number its name ends with; its place in the suite where not all names have one,
+                               ///< with the same before it (v1.9, v2.0; 2026-01-31, 2026-02-01)
   std::vector<Estimate> rate;  ///< [worlds of the curve]; undefined where it has no episode
 };
 

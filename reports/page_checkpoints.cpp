@@ -34,7 +34,7 @@ std::string CheckpointsPart(const ReportData& report) {
       html += policy.empty() ? "" : "</div>";
       html += fmt::format("<h3>{}</h3><p class=\"quiet\">{}</p><div class=\"multiples\">", Breakable(curve.policy),
                           curve.has_steps ? "In the order of the numbers that end their names."
-                                          : "In the order of their names, numbers as numbers.");
+                                          : "In the order of the suite: their names differ by more than a number at the end.");
       policy = curve.policy;
     }
     html += Curve(curve);

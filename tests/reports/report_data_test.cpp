@@ -200,13 +200,16 @@ TEST(Checkpoints, ADecimalBeforeAUnitIsOfTheNumberAndElsewhereOfAVersion) {
 }
 
 /// 31 January stood after 1 February, and v1.9 after v2.0: "the last against the first" said the opposite.
-TEST(Checkpoints, OfDatesAndVersionsAreOrderedByAllTheirNumbers) {
+TEST(Checkpoints, WhoseNamesDifferByMoreThanANumberAtTheEndStandInTheOrderOfTheSuite) {
   for (const auto& [first, last] : {std::pair{"2026-01-31", "2026-02-01"},
                                     {"v1.9", "v2.0"},
                                     {"v9.1", "v10.0"},
+                                    {"tuned", "base"},
                                     {"epoch=9-step=90", "epoch=10-step=100"}}) {
     const SampleRun run({{"a", "pick", last, "sss", "sss"}, {"a", "pick", first, "fff", "fff"}});
-    const std::vector<CheckpointCurve> curves = CheckpointsOf(run.Summary());
+    RunData data = ReadRun(run.store());
+    std::ranges::sort(data.policies, {}, [&](const PolicyInfo& policy) { return policy.checkpoint == last; });
+    const std::vector<CheckpointCurve> curves = CheckpointsOf(Summarise(data, {}));
     ASSERT_EQ(curves.size(), 1u);
     EXPECT_FALSE(curves[0].has_steps);
     EXPECT_THAT(TrendInWords(curves[0], 0), HasSubstr(fmt::format("In real, from {} to {}: 0 % → 100 %", first, last)));
