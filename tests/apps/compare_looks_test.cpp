@@ -52,21 +52,26 @@ class CompareLooks : public testing::Test {
     return (folder_ / name).string();
   }
 
+  static void AddJudged(Store& store, const EpisodeKey& key, Label label) {
+    EpisodeRecord record;
+    record.episode.key = key;
+    record.episode.stop = StopReason::kStill;
+    store.Add(record);
+    Verdict verdict;
+    verdict.episode_id = key.Id();
+    verdict.judge = "oracle";
+    verdict.label = label;
+    store.AddVerdict(verdict);
+  }
+
   /// One more world for a run, in which its policy did well in one initial state.
   static void AddWorld(const std::string& folder, const std::string& checkpoint, const std::string& state) {
     Store store = Store::Open(folder, Store::Mode::kReadWrite);
     store.AddWorld({.name = "tale", .type = "mujoco", .is_real = false, .profile_hash = "ba5"});
-    EpisodeRecord record;
-    record.episode.key = samples::Key(1, "tale");
-    record.episode.key.pair.initial_state = state;
-    record.episode.key.pair.checkpoint = checkpoint;
-    record.episode.stop = StopReason::kStill;
-    store.Add(record);
-    Verdict verdict;
-    verdict.episode_id = record.episode.key.Id();
-    verdict.judge = "oracle";
-    verdict.label = Label::kSuccess;
-    store.AddVerdict(verdict);
+    EpisodeKey key = samples::Key(1, "tale");
+    key.pair.initial_state = state;
+    key.pair.checkpoint = checkpoint;
+    AddJudged(store, key, Label::kSuccess);
   }
 
   static nlohmann::json Bet(const std::string& a, const std::string& b, const std::string& judge = "oracle") {
@@ -108,17 +113,10 @@ TEST_F(CompareLooks, ARunThatOnlyBeganBetsOnThePairsThatItHas) {
   {
     Store store = Store::Open(b, Store::Mode::kReadWrite);  // a task that a has not come to
     store.AddTask(samples::SomeTask("take_toast"));
-    EpisodeRecord record;
-    record.episode.key = samples::Key(1, "sim");
-    record.episode.key.pair.task = "take_toast";
-    record.episode.key.pair.checkpoint = "poor";
-    record.episode.stop = StopReason::kStill;
-    store.Add(record);
-    Verdict verdict;
-    verdict.episode_id = record.episode.key.Id();
-    verdict.judge = "oracle";
-    verdict.label = Label::kFailure;
-    store.AddVerdict(verdict);
+    EpisodeKey key = samples::Key(1, "sim");
+    key.pair.task = "take_toast";
+    key.pair.checkpoint = "poor";
+    AddJudged(store, key, Label::kFailure);
   }
   const std::string out = Printed(AddCompare, {"compare", a, b, "--sequential", "--json"});
   const nlohmann::json world = nlohmann::json::parse(out).at("worlds").at(0), bets = world.at("sequential");
