@@ -131,8 +131,7 @@ class Evaluation {
       RunningPolicy policy(suite_policy, suite_, store_.folder(), IsInterrupted);
       store_.AddPolicy({suite_policy.name, suite_policy.checkpoint, policy.declaration()});
       Probe(policy, *world, suite_world, suite_policy);
-      EndIfInterrupted();  // a probe that was broken off says nothing, and failed rows go for what runs again
-      MakeRoom(to_run);
+      EndIfInterrupted();  // a probe that was broken off says nothing
       JobQueue jobs(to_run);
       const Summary summary = RunEpisodes(policy.policy(), *world, jobs, store_, Options(suite_world, policy));
       store_.Count(suite_policy.name + "@" + suite_policy.checkpoint, policy.counters());
@@ -154,17 +153,6 @@ class Evaluation {
     std::vector<Job> jobs = JobsOf(suite_, shard_, world, policy);
     std::erase_if(jobs, [&](const Job& job) { return store_.Has(job.key) && !to_retry_.contains(job.key); });
     return jobs;
-  }
-
-  /// For failed episodes to be run again. Their reasons are lost with them: not before world and policy were tried.
-  void MakeRoom(const std::vector<Job>& jobs) {
-    bool is_any = false;
-    for (const Job& job : jobs) {
-      if (!to_retry_.contains(job.key)) continue;
-      store_.RemoveFailed(job.key);
-      is_any = true;
-    }
-    if (is_any) store_.RemoveOrphans();
   }
 
   /// On what a world, or a policy in it, is tried: each task's first job of the suite, whatever the shard and whatever is

@@ -21,7 +21,7 @@ struct Shard {
 
 struct EvaluateOptions {
   Shard shard = {};
-  bool retry_failed = false;  ///< the shard's failed episodes run again: each is removed once its world and policy were tried
+  bool retry_failed = false;  ///< the shard's failed episodes run again: each keeps its row until the new try is over
   std::string go_on = "";     ///< the command that goes on with this run, without its shard; empty: `evac resume` alone does
   std::string part_of = "";   ///< the command whose part this run is ("evac fidelity"): it goes on with the run itself
 };

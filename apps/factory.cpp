@@ -81,21 +81,23 @@ LcmAddress NewAddress(const std::string& name) {
 }
 
 /// Every task of the suite must fit, not only the one that was greeted with.
-void CheckAllTasks(const Suite& suite, const PolicySpec& declared) {
+/// @param who  "policy good@v1", as the suite calls it
+void CheckAllTasks(const Suite& suite, const std::string& who, const PolicySpec& declared) {
   for (const Task& task : suite.tasks) {
     const PolicySpec wanted = HarnessSpec(task, suite.chunk_size);
     if (!Compare(wanted, declared).empty()) {
-      throw InvalidInput("policy {}@{} does not fit task {}:\n{}", declared.name, declared.checkpoint, task.id, SideBySide(wanted, declared));
+      throw InvalidInput("{} does not fit task {}:\n{}", WhoDeclares(who, declared), task.id,
+                         SideBySide(wanted, declared));
     }
   }
 }
 
 /// Of a task page everybody is told what it says; what is made up for a recording (FillInRecordedTask) is for people.
-void CheckInstruction(const Suite& suite, const PolicySpec& declared) {
+void CheckInstruction(const Suite& suite, const std::string& who, const PolicySpec& declared) {
   if (!suite.recording || suite.recorded_task.instruction || !declared.needs.contains("instruction")) return;
-  throw InvalidInput("{}: field instruction: found none, wanted what is to be done, in words: policy {}@{} needs an "
+  throw InvalidInput("{}: field instruction: found none, wanted what is to be done, in words: {} needs an "
                      "instruction, and recordings say none",
-                     suite.path.string(), declared.name, declared.checkpoint);
+                     suite.path.string(), WhoDeclares(who, declared));
 }
 
 /// What a page puts into each other does not come to rest: nothing of the machine's that a second try would mend.
@@ -173,7 +175,8 @@ RunningPolicy::RunningPolicy(const SuitePolicy& policy, const Suite& suite, cons
   options.start_s = suite.transport.start_s;
   options.keep_longer_chunks = suite.latency.kind != PolicyLatency::Kind::kOff;
   options.raw_images = suite.transport.images == "raw";
-  options.who = fmt::format("policy {}@{}", policy.name, policy.checkpoint);
+  const std::string who = fmt::format("policy {}@{}", policy.name, policy.checkpoint);
+  options.who = who;
   if (policy.command.empty()) {
     options.address = {policy.join_url, policy.join_token};
   } else {
@@ -186,8 +189,8 @@ RunningPolicy::RunningPolicy(const SuitePolicy& policy, const Suite& suite, cons
   }
   link_.emplace(std::move(options));
   spec_ = link_->Handshake(HarnessSpec(suite.tasks.front(), suite.chunk_size), suite.transport.start_s);
-  CheckAllTasks(suite, spec_);
-  CheckInstruction(suite, spec_);
+  CheckAllTasks(suite, who, spec_);
+  CheckInstruction(suite, who, spec_);
   CheckFiles();
 }
 

@@ -7,11 +7,12 @@
 #include <algorithm>
 #include <chrono>
 #include <ctime>
-#include <iterator>
+#include <memory>
 #include <thread>
 
 #include "apps/interrupts.h"
 #include "apps/judge_with_progress.h"
+#include "core/file.h"
 #include "core/seed.h"
 #include "core/store_calls.h"
 #include "judges/vlm_judge.h"
@@ -32,17 +33,39 @@ bool HasVerdict(const std::map<std::string, Verdict>& verdicts, const std::strin
   return verdicts.contains(judge) || verdicts.contains(judge + kVlmSmall);
 }
 
-/// How many requests the next call makes about an episode, probes and all. @param verdicts  that it has
-long RequestsAbout(const Episode& episode, const std::map<std::string, Verdict>& verdicts, const VlmConfig& config,
-                   const VlmJudgeArguments& arguments) {
+/// What earlier calls about a run paid for, found under what the server said of itself last. Writes nothing.
+class EarlierAnswers {
+ public:
+  EarlierAnswers(const VlmConfig& config, const std::filesystem::path& run) : config_(config) {
+    const std::filesystem::path file = run / CallCache::kFile;
+    if (!std::filesystem::exists(StatusOf(file))) return;
+    cache_ = std::make_unique<CallCache>(file);
+    const auto fingerprint = cache_->Fingerprint(config.base_url, config.sampling.model);
+    if (!fingerprint) cache_.reset();
+    fingerprint_ = fingerprint.value_or("");
+  }
+
+  long Lacking(const Task& task, const std::vector<VlmFrame>& frames, VlmProbe probe) const {
+    return UnansweredOf(task, frames, config_, {.probe = probe, .fingerprint = fingerprint_}, cache_.get());
+  }
+
+ private:
+  const VlmConfig& config_;
+  std::unique_ptr<CallCache> cache_;  ///< null: no call was made
+  std::string fingerprint_;
+};
+
+/// Which questions the next call has about an episode. @param verdicts  that it has
+std::vector<VlmProbe> QuestionsAbout(const Episode& episode, const std::map<std::string, Verdict>& verdicts,
+                                     const VlmConfig& config, const VlmJudgeArguments& arguments) {
   const std::string judge = config.JudgeName();
   const auto asks = [&](const std::string& name) { return arguments.again || !HasVerdict(verdicts, name); };
-  const long wordings = std::ssize(kVlmWordings);
-  long requests = asks(judge) ? wordings : 0;
-  if (!IsProbed(episode, config.probe_share)) return requests;
-  if (asks(judge + ":flip")) ++requests;
-  if (arguments.retest && asks(judge + ":retest")) requests += wordings;
-  return requests;
+  std::vector<VlmProbe> questions;
+  if (asks(judge)) questions.push_back(VlmProbe::kNone);
+  if (!IsProbed(episode, config.probe_share)) return questions;
+  if (asks(judge + ":flip")) questions.push_back(VlmProbe::kFlip);
+  if (arguments.retest && asks(judge + ":retest")) questions.push_back(VlmProbe::kRetest);
+  return questions;
 }
 
 /// What the same call without --dry-run would ask for.
@@ -50,12 +73,17 @@ ExitCode SayWhatItWouldCost(const VlmConfig& config, const Store& store, const V
   std::map<std::string, Task> tasks;
   for (Task& task : store.Tasks()) tasks.emplace(task.id, std::move(task));
   auto current = store.CurrentVerdicts();
+  const EarlierAnswers earlier(config, store.folder());
   long requests = 0, tokens = 0, clips = 0;
   for (const Episode& episode : store.Episodes()) {
     if (IsFailure(episode.stop) || episode.video.empty()) continue;
-    const long asked = RequestsAbout(episode, current[episode.key.Id()], config, arguments);
-    if (asked == 0) continue;
-    const auto frames = ReadVlmFrames(store.folder() / episode.video, tasks.at(episode.key.pair.task), config.clip);
+    const auto questions = QuestionsAbout(episode, current[episode.key.Id()], config, arguments);
+    if (questions.empty()) continue;
+    const Task& task = tasks.at(episode.key.pair.task);
+    const auto frames = ReadVlmFrames(store.folder() / episode.video, task, config.clip);
+    long asked = 0;
+    for (const VlmProbe probe : questions) asked += earlier.Lacking(task, frames, probe);
+    if (asked == 0) continue;  // all of it is in the cache
     ++clips;
     requests += asked;
     tokens += asked * (EstimatedTokens(frames) + kTextTokens);

@@ -1,10 +1,12 @@
 #include "apps/progress_display.h"
 
 #include <fmt/format.h>
+#include <sys/ioctl.h>
 #include <unistd.h>
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <utility>
 
 namespace evac {
@@ -17,6 +19,29 @@ constexpr auto kBetweenDraws = std::chrono::milliseconds(100);
 void Print(std::FILE* out, const std::string& text) {
   std::fwrite(text.data(), 1, text.size(), out);
   std::fflush(out);
+}
+
+/// What may be drawn in place, one column and one line being left free: what wraps or scrolls away is not drawn over.
+struct Room {
+  std::size_t lines, columns;
+};
+
+/// Of the terminal's window as it is now; as much as is wanted where nobody knows.
+Room RoomOf(std::FILE* out) {
+  constexpr std::size_t kAny = std::numeric_limits<std::size_t>::max();
+  winsize window{};
+  const bool is_known = ::ioctl(::fileno(out), TIOCGWINSZ, &window) == 0 && window.ws_row > 0 && window.ws_col > 0;
+  return is_known ? Room{window.ws_row - 1U, window.ws_col - 1U} : Room{kAny, kAny};
+}
+
+/// The first letters of UTF-8, each a column wide.
+std::string Cut(const std::string& line, std::size_t columns) {
+  std::size_t letters = 0;
+  for (std::size_t i = 0; i < line.size(); ++i) {
+    const bool begins = (static_cast<unsigned char>(line[i]) & 0xC0) != 0x80;
+    if (begins && letters++ == columns) return line.substr(0, i);
+  }
+  return line;
 }
 
 std::string Bar(double share, int width) {
@@ -62,11 +87,12 @@ void ProgressDisplay::Show(const Progress& progress, Clock::time_point now) {
   if (now - last_line_ < (terminal_ ? Clock::duration(kBetweenDraws) : Clock::duration(kBetweenLines))) return;
   last_line_ = now;
   if (!terminal_) return Say(pairing_ + ": " + Headline(progress, now));
-  std::string text = fmt::format("{}\n  {}\n", Headline(progress, now), pairing_);
+  std::vector<std::string> lines = {Headline(progress, now), "  " + pairing_};
   for (const Progress::LaneState& lane : progress.lanes) {
-    text += fmt::format("  {} {}\n", Bar(static_cast<double>(lane.chunks) / std::max(1, lane.max_chunks), 12), lane.episode_id);
+    const double share = static_cast<double>(lane.chunks) / std::max(1, lane.max_chunks);
+    lines.push_back(fmt::format("  {} {}", Bar(share, 12), lane.episode_id));
   }
-  Draw(text, 2 + static_cast<int>(progress.lanes.size()));
+  Draw(std::move(lines));
 }
 
 void ProgressDisplay::Say(const std::string& sentence) {
@@ -74,10 +100,18 @@ void ProgressDisplay::Say(const std::string& sentence) {
   Print(out_, sentence + "\n");
 }
 
-void ProgressDisplay::Draw(const std::string& text, int lines) {
+void ProgressDisplay::Draw(std::vector<std::string> lines) {
   Erase();
+  const Room room = RoomOf(out_);
+  if (lines.size() > room.lines) {
+    const std::size_t left_out = lines.size() - room.lines + 1;
+    lines.resize(room.lines);
+    if (lines.size() > 2) lines.back() = fmt::format("  and {} more", left_out);  // lanes: two lines stand above them
+  }
+  std::string text;
+  for (const std::string& line : lines) text += Cut(line, room.columns) + "\n";
   Print(out_, text);
-  drawn_lines_ = lines;
+  drawn_lines_ = static_cast<int>(lines.size());
 }
 
 void ProgressDisplay::Erase() {
@@ -97,7 +131,8 @@ void CountDisplay::Show(std::size_t done, std::size_t of, Clock::time_point now)
     const double each_s = std::chrono::duration<double>(now - started_).count() / static_cast<double>(done);
     text += fmt::format(", {} left", Duration(each_s * static_cast<double>(of - done)));
   }
-  Print(out_, terminal_ ? "\r\033[K" + text + (is_last ? "\n" : "") : text + "\n");
+  if (!terminal_) return Print(out_, text + "\n");
+  Print(out_, "\r\033[K" + Cut(text, RoomOf(out_).columns) + (is_last ? "\n" : ""));
 }
 
 }  // namespace evac

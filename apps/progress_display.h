@@ -3,13 +3,15 @@
 #include <chrono>
 #include <cstdio>
 #include <string>
+#include <vector>
 
 #include "harness/rollout.h"
 
 namespace evac {
 
 /// Shows a run while it works: done, failed, rate, time left and every lane on a terminal (redrawn in place), plain lines now
-/// and then in a log. Writes to stderr: stdout stays for results.
+/// and then in a log. In a small window it draws what fits: the lines' beginnings, the first lanes, and how many more there
+/// are. Writes to stderr: stdout stays for results.
 class ProgressDisplay {
  public:
   using Clock = std::chrono::steady_clock;
@@ -27,7 +29,7 @@ class ProgressDisplay {
 
  private:
   std::string Headline(const Progress& progress, Clock::time_point now) const;
-  void Draw(const std::string& text, int lines);
+  void Draw(std::vector<std::string> lines);
   void Erase();
 
   int total_, done_before_;
@@ -40,7 +42,8 @@ class ProgressDisplay {
   Clock::time_point started_, last_line_;
 };
 
-/// "12 of 96 clips, 40 s left": redrawn in place on a terminal, a line now and then in a log.
+/// "12 of 96 clips, 40 s left": redrawn in place on a terminal, as far as its window is wide; a line now and then in a
+/// log.
 class CountDisplay {
  public:
   using Clock = std::chrono::steady_clock;

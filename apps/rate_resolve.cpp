@@ -94,14 +94,22 @@ std::map<std::string, bool> StagesOf(const std::vector<StudyStore::Ballot>& ball
   return stages;
 }
 
-/// At the end of a label's reason: whose it is.
-std::string Signature(const std::string& study) { return fmt::format(" (study {})", study); }
+/// What a study is told from others by: two may have one name.
+struct WhichStudy {
+  std::string name, id;
+};
 
-bool IsOfAnotherStudy(const Verdict& verdict, const std::string& study) {
-  return verdict.reason.find(" (study ") != std::string::npos && !verdict.reason.ends_with(Signature(study));
+/// At the end of a reason: whose it is.
+std::string Signature(const WhichStudy& study) { return fmt::format(" (study {}, id {})", study.name, study.id); }
+
+/// Earlier versions signed with the name alone: such a verdict is taken for this study's if the name is.
+bool IsOfAnotherStudy(const Verdict& verdict, const WhichStudy& study) {
+  const std::string& reason = verdict.reason;
+  const bool is_ours = reason.ends_with(Signature(study)) || reason.ends_with(fmt::format(" (study {})", study.name));
+  return reason.find(" (study ") != std::string::npos && !is_ours;
 }
 
-std::string ReasonOf(const RatedClip& clip, const std::string& study) {
+std::string ReasonOf(const RatedClip& clip, const WhichStudy& study) {
   const Majority& majority = clip.resolution.majority;
   return fmt::format("{}: {} success, {} failure, {} cannot tell{}", clip.resolution.how, majority.successes,
                      majority.valid - majority.successes, majority.unsure, Signature(study));
@@ -118,7 +126,7 @@ struct Told {
 class Speaker {
  public:
   Speaker(const StudyStore& study, const ResolveOptions& options)
-      : study_(study.info().name), options_(options), facts_(FactsOf(study)), voters_(VotersOf(study)) {}
+      : study_{study.info().name, study.Id()}, options_(options), facts_(FactsOf(study)), voters_(VotersOf(study)) {}
 
   std::vector<Told> AllOf(const RatedClip& clip) const {
     std::vector<Told> told;
@@ -139,7 +147,7 @@ class Speaker {
   }
 
  private:
-  std::string NameOf(std::int64_t rater) const { return fmt::format("human:{}:r{}", study_, rater); }
+  std::string NameOf(std::int64_t rater) const { return fmt::format("human:{}:r{}", study_.name, rater); }
 
   Verdict Begun(const RatedClip& clip, const std::string& judge) const {
     Verdict verdict;
@@ -164,6 +172,7 @@ class Speaker {
     Verdict verdict = Begun(clip, NameOf(ballot.rater));
     verdict.label = LabelFromName(ballot.label);
     verdict.stages = StagesOf({ballot}, verdict.label, facts_.at(clip.clip.rubric_hash));
+    verdict.reason = "a single vote" + Signature(study_);
     return verdict;
   }
 
@@ -175,7 +184,7 @@ class Speaker {
     return told;
   }
 
-  std::string study_;
+  WhichStudy study_;
   const ResolveOptions& options_;
   std::map<std::string, RubricFacts> facts_;
   Voters voters_;
@@ -202,9 +211,17 @@ void RequireSameVideo(const Store& store, const std::map<std::string, std::strin
                        store.folder().string(), told.verdict.episode_id, found->second, told.source_sha256);
 }
 
+/// r1 of one study is not r1 of another: under the name that both have, one person would say what the other one said.
+void RequireOwnRater(const Store& store, const Verdict& there, const WhichStudy& study) {
+  if (!there.judge.starts_with("human:")) return;
+  throw InvalidInput("{}: the vote of {} on episode {} is of another study that is named '{}' too; wanted a study of "
+                     "another name (evac rate new --name), or this one without --each-rater",
+                     store.folder().string(), there.judge, there.episode_id, study.name);
+}
+
 /// What a run does not say yet. A study takes back what it said itself only.
-/// @throws InvalidInput if an episode is not the one that raters saw
-New NewFor(const Store& store, const std::vector<Told>& all, const std::string& study) {
+/// @throws InvalidInput if an episode is not the one that raters saw, or a rater's name is another study's
+New NewFor(const Store& store, const std::vector<Told>& all, const WhichStudy& study) {
   const auto current = store.CurrentVerdicts();
   std::map<std::string, std::string> videos;
   for (const Episode& episode : store.Episodes()) videos[episode.key.Id()] = episode.video_sha256;
@@ -216,6 +233,7 @@ New NewFor(const Store& store, const std::vector<Told>& all, const std::string& 
     const bool is_anothers = is_known && IsOfAnotherStudy(of_episode->second.at(verdict.judge), study);
     if (told.takes_back && (!is_known || is_anothers)) continue;
     RequireSameVideo(store, videos, told);
+    if (is_anothers) RequireOwnRater(store, of_episode->second.at(verdict.judge), study);
     if (is_known && IsSame(of_episode->second.at(verdict.judge), verdict)) continue;
     fresh.verdicts.push_back(verdict);
     fresh.of_other_studies += is_anothers;
@@ -241,13 +259,13 @@ Resolved ResolveStudy(const StudyStore& study, const ResolveOptions& options) {
       by_run[clip.clip.run].push_back(std::move(told));
     }
   }
-  const std::string name = study.info().name;
+  const WhichStudy which{study.info().name, study.Id()};
   // Before any is written.
-  for (const auto& [run, all] : by_run) NewFor(Store::Open(run, Store::Mode::kReadOnly), all, name);
+  for (const auto& [run, all] : by_run) NewFor(Store::Open(run, Store::Mode::kReadOnly), all, which);
   std::int64_t of_other_studies = 0;
   for (const auto& [run, all] : by_run) {
     Store store = Store::Open(run, Store::Mode::kReadWrite);
-    const New fresh = NewFor(store, all, name);
+    const New fresh = NewFor(store, all, which);
     store.AddVerdicts(fresh.verdicts);
     resolved.written += std::ssize(fresh.verdicts);
     of_other_studies += fresh.of_other_studies;

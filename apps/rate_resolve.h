@@ -24,11 +24,13 @@ struct Resolved {
 /// calibrate --against human`, `evac report --judge human` and everything else finds them. Clips that are not decided
 /// are written as cannot_tell with the reason, never as failures. What is there already is not written again. Where a
 /// run has a verdict of votes that count no more (their raters left, or undid them), cannot_tell takes its place.
-/// Of two studies that give labels under one name to one episode the later one's holds, and a warning says so.
+/// Of two studies that give labels under one name to one episode the later one's holds, and a warning says so; their
+/// reasons tell them apart by name and id, those of earlier versions by the name alone.
 /// Stages are written where somebody told of them: a sheet does not, nor who saw a success and marked none.
 /// @throws InvalidInput for a name of other judges, or if a run has moved, or holds another video than raters saw of an
-/// episode that gets a verdict (then nothing is written), or a task was rated by several rubrics and they were not to be
-/// mixed, or the study is damaged (StudyStore::RequireWhole).
+/// episode that gets a verdict, or votes of another study of the same name under a rater's name (then nothing is
+/// written), or a task was rated by several rubrics and they were not to be mixed, or the study is damaged
+/// (StudyStore::RequireWhole).
 Resolved ResolveStudy(const StudyStore& study, const ResolveOptions& options);
 
 }  // namespace evac

@@ -1,14 +1,12 @@
 #include "core/run_extent.h"
 
-#include <algorithm>
 #include <map>
 #include <string>
 #include <tuple>
 
 namespace evac {
 
-RunExtent ExtentOf(std::span<const PlannedEpisodes> plan, const std::vector<Episode>& episodes,
-                   const std::function<bool(const PlannedEpisodes&)>& is_meant) {
+std::vector<PlannedEpisodes> MissingOf(std::span<const PlannedEpisodes> plan, const std::vector<Episode>& episodes) {
   using Cell = std::tuple<std::string, std::string, std::string, std::string>;
   std::map<Cell, std::int64_t> there;
   if (plan.empty()) return {};  // a run may be of a million
@@ -16,14 +14,22 @@ RunExtent ExtentOf(std::span<const PlannedEpisodes> plan, const std::vector<Epis
     const auto& [pair, world] = episode.key;
     ++there[{pair.task, world, pair.policy, pair.checkpoint}];
   }
-  RunExtent extent;
+  std::vector<PlannedEpisodes> missing;
   for (const PlannedEpisodes& one : plan) {
-    if (is_meant && !is_meant(one)) continue;
     const std::int64_t left = one.episodes - there[{one.task, one.world, one.policy, one.checkpoint}];
-    extent.planned += one.episodes;
-    extent.missing += std::max<std::int64_t>(0, left);
+    if (left > 0) missing.emplace_back(one).episodes = left;
   }
-  return extent;
+  return missing;
+}
+
+RunExtent ExtentOf(std::span<const PlannedEpisodes> plan, const std::vector<Episode>& episodes,
+                   const std::function<bool(const PlannedEpisodes&)>& is_meant) {
+  const auto count = [&](std::span<const PlannedEpisodes> parts) {
+    std::int64_t sum = 0;
+    for (const PlannedEpisodes& one : parts) sum += !is_meant || is_meant(one) ? one.episodes : 0;
+    return sum;
+  };
+  return {count(plan), count(MissingOf(plan, episodes))};
 }
 
 }  // namespace evac

@@ -19,4 +19,7 @@ struct RunExtent {
 RunExtent ExtentOf(std::span<const PlannedEpisodes> plan, const std::vector<Episode>& episodes,
                    const std::function<bool(const PlannedEpisodes&)>& is_meant = {});
 
+/// The parts of the plan that are not whole, with how many episodes of each are missing.
+std::vector<PlannedEpisodes> MissingOf(std::span<const PlannedEpisodes> plan, const std::vector<Episode>& episodes);
+
 }  // namespace evac

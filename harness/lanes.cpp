@@ -64,6 +64,8 @@ std::vector<EpisodeRecord> Lanes::TakeFinished() {
   std::vector<EpisodeRecord> finished;
   for (auto& lane : lanes_) {
     if (!lane || !lane->over()) continue;
+    const EpisodeKey& key = lane->job().key;
+    if (store_.Has(key)) store_.RemoveFailed(key);  // before the new video takes the place of the old one's
     finished.push_back(lane->Finish());
     lane.reset();
   }

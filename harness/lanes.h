@@ -24,7 +24,8 @@ class Lanes {
   /// refuses is thrown here, and ends the run.
   void Observe(World& world);
 
-  /// The episodes that are over, their videos finished; their lanes are free.
+  /// The episodes that are over, their videos finished; their lanes are free. Failed ones that these ran again for are
+  /// removed from the store.
   std::vector<EpisodeRecord> TakeFinished();
 
   std::vector<Progress::LaneState> State() const;

@@ -312,6 +312,10 @@ std::vector<std::string> NotesOn(const std::vector<Store>& stores) {
   for (const Store& store : stores) {
     const fs::path calls = store.folder() / CallCache::kFile;
     if (fs::exists(calls)) notes.push_back(fmt::format("{} is not merged: its answers stay there", calls.string()));
+    const fs::path logs = store.folder() / "logs";
+    std::error_code ignored;
+    if (fs::is_directory(logs, ignored))
+      notes.push_back(fmt::format("{} is not merged: what the policies printed stays there", logs.string()));
   }
   return notes;
 }

@@ -12,15 +12,17 @@ namespace evac {
 struct MergeSummary {
   int episodes = 0;    ///< in the merged run
   int duplicates = 0;  ///< copies that did not fail beside the one that was taken, and the same as it
-  /// A sentence each: several versions of evac, calls that stay behind, episodes of the suite that no shard has.
+  /// A sentence each: several versions of evac, calls and logs that stay behind, episodes of the suite that no shard
+  /// has.
   std::vector<std::string> notes = {};
 };
 
-/// Joins runs of one suite, such as the shards of `evac run --shard`, into a new one with everything they hold:
+/// Joins runs of one suite, such as the shards of `evac run --shard`, into a new one with what they hold:
 /// episodes, videos (copied and checked against their hashes), initial scenes, verdicts, trials on a real robot,
 /// counters, and what the suite asks for. Sequential looks and gates' decisions stay behind: they were looks at a part,
 /// and are none at the whole. So does what model servers were asked and answered (CallCache): a judge of the merged run
-/// asks again. The run's evac_version is that of all shards, or each of theirs once, with commas between.
+/// asks again; and what policies printed (logs/), which shards have under the same names. The run's evac_version is that
+/// of all shards, or each of theirs once, with commas between.
 ///
 /// An episode that several shards hold must be the same in all, to the bytes of its video; a failed one yields to one
 /// that did not fail, with what was said of it. Verdicts on every other copy are kept, those of a later shard after those

@@ -103,6 +103,7 @@ void PolicyProcess::Restart(Clock::time_point asked) {
   const std::lock_guard lock(mutex_);
   if (alive_pipe_ < 0 || started_ > asked) return;
   ::close(std::exchange(alive_pipe_, -1));  // the guardian ends it; Supervise sees a death
+  was_silent_ = true;
 }
 
 std::optional<std::string> PolicyProcess::WhyGone() const {
@@ -130,7 +131,8 @@ void PolicyProcess::Supervise() {
 
     std::unique_lock lock(mutex_);
     if (stopping_) return;
-    if (IsHopeless(status) || static_cast<int>(deaths.size()) > options_.restarts)
+    const bool is_hopeless = IsHopeless(status) && !was_silent_;
+    if (is_hopeless || static_cast<int>(deaths.size()) > options_.restarts)
       return GiveUp(static_cast<int>(deaths.size()), status);
     if (stopping_changed_.wait_for(lock, std::chrono::duration<double>(back_off_s), [this] { return stopping_; }))
       return;
@@ -165,6 +167,7 @@ int PolicyProcess::RunOnce() {
     throw InternalError("cannot start {}: {}", options_.command.front(), std::strerror(errno));
   }
   alive_pipe_ = alive[1];
+  was_silent_ = false;
   started_ = Clock::now();
   lock.unlock();
 
@@ -178,8 +181,9 @@ int PolicyProcess::RunOnce() {
 
 /// With `mutex_` held.
 void PolicyProcess::GiveUp(int deaths, int status) {
-  why_gone_ = fmt::format("its process ended {} within {} s, at last with {}: {} ({})",
-                          deaths == 1 ? "once" : fmt::format("{} times", deaths), options_.window_s, HowItEnded(status),
+  const std::string how = was_silent_ ? "by evac because it was silent" : "with " + HowItEnded(status);
+  why_gone_ = fmt::format("its process ended {} within {} s, at last {}: {} ({})",
+                          deaths == 1 ? "once" : fmt::format("{} times", deaths), options_.window_s, how,
                           LastLine(options_.log, log_before_), options_.log.string());
 }
 

@@ -51,7 +51,8 @@ class PolicyProcess {
   void Restart(std::chrono::steady_clock::time_point asked);
 
   /// Why it is not coming back: "its process ended 6 times within 60 s, at last with exit code 3: <its last line>
-  /// (policy.log)". Nothing while it runs or is about to be restarted, and after Stop. Thread-safe.
+  /// (policy.log)"; of one that Restart ended "at last by evac because it was silent". Nothing while it runs or is about
+  /// to be restarted, and after Stop. Thread-safe.
   std::optional<std::string> WhyGone() const;
 
   int restarts() const;  ///< so far. Thread-safe.
@@ -65,8 +66,9 @@ class PolicyProcess {
   mutable std::mutex mutex_;
   std::condition_variable stopping_changed_;
   bool stopping_ = false;
-  int alive_pipe_ = -1;  ///< closing it asks the guardian to end
+  int alive_pipe_ = -1;                            ///< closing it asks the guardian to end
   std::chrono::steady_clock::time_point started_;  ///< when that process was
+  bool was_silent_ = false;                        ///< that process: Restart ended it
   int restarts_ = 0;
   std::int64_t log_before_ = 0;  ///< bytes that the log had when the process was last started
   std::optional<std::string> why_gone_;

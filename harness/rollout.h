@@ -44,7 +44,8 @@ struct Summary {
 /// The only loop: pairs a policy with a world until no job is left. Each finished episode is stored at once, with its video.
 ///
 /// An episode's result is the same, bit for bit, for any number of lanes, any company, order or resume, as long as the
-/// policy and the world keep their contracts. A failed episode is a row with a reason; it ends no other.
+/// policy and the world keep their contracts. A failed episode is a row with a reason; it ends no other. One that the
+/// store has and that runs again keeps its row until the new try is over.
 /// @throws Error if nothing can be kept any more: the disk is full or gone; if a file of the suite's was written to since
 ///   it was read; what `check_policy` throws. No episode is blamed for that, and none that was running is kept.
 Summary RunEpisodes(Policy& policy, World& world, JobQueue& jobs, Store& store, const RolloutOptions& options);

@@ -64,6 +64,12 @@ SuiteWorld ReadWorld(const Config& page) {
   return world;
 }
 
+/// A token becomes a part of channels' names, between two '_'.
+bool IsToken(const std::string& token) {
+  return !token.empty() && token.size() <= 32 &&
+         std::all_of(token.begin(), token.end(), [](unsigned char c) { return std::isalnum(c) || c == '-'; });
+}
+
 SuitePolicy ReadPolicy(const Config& page) {
   page.AllowOnly({"name", "checkpoint", "command", "join", "files"});
   SuitePolicy policy;
@@ -82,6 +88,7 @@ SuitePolicy ReadPolicy(const Config& page) {
     join.AllowOnly({"url", "token"});
     policy.join_url = join.Get<std::string>("url");
     policy.join_token = join.Get<std::string>("token");
+    join.Require(IsToken(policy.join_token), "token", "1 … 32 letters, digits and '-'");
     return policy;
   }
   policy.command = page.Get<std::vector<std::string>>("command");
@@ -198,6 +205,18 @@ void RequireDistinct(const std::vector<Item>& items, const Config& suite, const 
   }
 }
 
+/// One process that is joined twice would be compared with itself. Who sends to an address and port is heard there,
+/// whatever else the URL says.
+void RequireDistinctJoins(const Suite& suite, const Config& page) {
+  std::vector<SuitePolicy> joined = suite.policies;
+  std::erase_if(joined, [](const SuitePolicy& policy) { return !policy.command.empty(); });
+  const auto place_of = [](const SuitePolicy& policy) {
+    return fmt::format("join: {{url: {}, token: {}}}", policy.join_url.substr(0, policy.join_url.find('?')),
+                       policy.join_token);
+  };
+  RequireDistinct(joined, page, "policies", place_of, "processes: each needs a port or a token of its own");
+}
+
 /// A world may try fewer initial states than the suite has; the real one no fewer than what starts from its frames.
 void CheckStates(const Suite& suite, const Config& page) {
   if (suite.recording) return;  // how many there are is not known yet
@@ -241,6 +260,7 @@ void CheckWhole(const Suite& suite, const Config& page) {
   RequireDistinct(suite.tasks, page, "tasks", [](const Task& task) { return task.id; });
   RequireDistinct(suite.policies, page, "policies",
                   [](const SuitePolicy& policy) { return policy.name + "@" + policy.checkpoint; });
+  RequireDistinctJoins(suite, page);
   RequireDistinct(suite.seeds, page, "seeds", [](std::uint64_t seed) { return std::to_string(seed); }, "seeds");
   page.Require(std::ranges::all_of(suite.judges, [](const std::string& judge) { return judge == "oracle"; }), "judges",
                "[oracle] or none: others judge a run that is there, `evac judge`");

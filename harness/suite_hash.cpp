@@ -29,13 +29,19 @@ bool StartsWithAny(const std::string& line, std::initializer_list<const char*> p
   return std::any_of(prefixes.begin(), prefixes.end(), [&](const char* prefix) { return line.starts_with(prefix); });
 }
 
+/// What Python writes beside the modules that it imports, when it first does.
+constexpr const char* kPythonsCache = "__pycache__";
+
 /// Each file below a folder, through links too. @param above  folders that this one lies in: a link back to one is not followed
-void AddFilesBelow(const fs::path& folder, const std::string& name, std::set<fs::path> above, std::vector<NamedFile>& files) {
+/// @param but  folders of that name are not looked into
+void AddFilesBelow(const fs::path& folder, const std::string& name, const std::string& but, std::set<fs::path> above,
+                   std::vector<NamedFile>& files) {
   if (!above.insert(fs::canonical(folder)).second) return;
   std::error_code error, ignored;
   for (fs::directory_iterator at(folder, error), end; !error && at != end; at.increment(error)) {
     const std::string own = name + at->path().filename().string();
-    if (at->is_directory(ignored)) AddFilesBelow(at->path(), own + "/", above, files);
+    if (at->is_directory(ignored) && at->path().filename() != but)
+      AddFilesBelow(at->path(), own + "/", but, above, files);
     if (at->is_regular_file(ignored)) files.push_back({own, at->path()});
   }
   if (error) throw InvalidInput("{}: cannot be read: {}", folder.string(), error.message());
@@ -49,6 +55,7 @@ bool IsFolder(const fs::path& path) {
 /// Which files below a folder are none of its own.
 struct LeftAside {
   std::string file = {};               ///< one by its name in the folder
+  std::string folder = {};             ///< all below folders of that name, wherever in it they lie
   std::set<fs::path> recordings = {};  ///< folders; of what lies below them all that no recording is read from
 };
 
@@ -65,7 +72,7 @@ bool LiesInOneOf(const std::set<fs::path>& folders, fs::path folder) {
 std::vector<NamedFile> FilesOfTree(const fs::path& path, const LeftAside& aside) {
   if (!IsFolder(path)) return {{"", path}};
   std::vector<NamedFile> files;
-  AddFilesBelow(path, "", {}, files);
+  AddFilesBelow(path, "", aside.folder, {}, files);
   fs::path last;  // of one folder there may be thousands
   bool is_recording = false;
   std::erase_if(files, [&](const NamedFile& file) {
@@ -164,7 +171,8 @@ LeftAside LeftAsideOf(const Suite& suite) {
 std::string FilesOf(const SuitePolicy& policy, const HashedFiles& known = {}) {
   std::ostringstream text;
   for (std::size_t i = 0; i < policy.files.size(); ++i)
-    text << "file " << i << " of " << policy.name << "@" << policy.checkpoint << " " << HashOfTree(policy.files[i], known) << "\n";
+    text << "file " << i << " of " << policy.name << "@" << policy.checkpoint << " "
+         << HashOfTree(policy.files[i], known, {.folder = kPythonsCache}) << "\n";
   return text.str();
 }
 
@@ -233,17 +241,20 @@ std::string HashOf(const Config& page, const Suite& suite, bool whole) {
 }  // namespace
 
 std::vector<std::string> FilesInNoHash(const Suite& suite, const SuitePolicy& policy) {
+  const fs::path suites_folder = fs::absolute(suite.path).parent_path().lexically_normal() / "";
   std::vector<std::string> found;
   for (std::size_t i = 1; i < policy.command.size(); ++i) {
     const std::string& word = policy.command[i];
     const std::string value = word.substr(word.starts_with("--") ? word.find('=') + 1 : 0);
-    const fs::path named = (fs::absolute(suite.path).parent_path() / value).lexically_normal();
+    const fs::path named = (suites_folder / value).lexically_normal();
     std::error_code ignored;
     const bool is_listed = std::ranges::any_of(policy.files, [&](const std::string& file) {
       const fs::path listed = fs::absolute(file).lexically_normal() / "";
       return (named / "").string().starts_with(listed.string());  // it, or below it
     });
-    if (!is_listed && fs::is_regular_file(named, ignored)) found.push_back(value);
+    const bool is_there =
+        fs::is_regular_file(named, ignored) || (fs::is_directory(named, ignored) && named / "" != suites_folder);
+    if (!is_listed && is_there) found.push_back(value);
   }
   return found;
 }
@@ -310,7 +321,7 @@ std::map<fs::path, HashedFile> HashFiles(const Suite& suite) {
     }
   };
   for (const SuitePolicy& policy : suite.policies) {
-    for (const std::string& file : policy.files) add(file, {});
+    for (const std::string& file : policy.files) add(file, {.folder = kPythonsCache});
   }
   if (suite.recording) {
     const LeftAside aside = LeftAsideOf(suite);

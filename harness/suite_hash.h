@@ -41,7 +41,8 @@ std::map<std::filesystem::path, HashedFile> HashFiles(const Suite& suite);
 /// content, a recording also by what its task is called, from which seeds are drawn. In a recording's own folders those
 /// files count that ReadRecording may read (IsReadOfRecording), all of them if a policy is told where it lies. Left out:
 /// lanes, threads, error_budget and the transport's times, which change how fast and how patiently, not what; a
-/// collection's `lock`.
+/// collection's `lock`; folders called __pycache__ in those that a policy's `files` list, into which Python writes as
+/// it starts.
 std::string SuiteHash(const Config& page, const Suite& suite);
 
 /// The same without the worlds of type evac, the policies and how many initial states there are: suites that differ in
@@ -49,11 +50,11 @@ std::string SuiteHash(const Config& page, const Suite& suite);
 std::string RealityHash(const Config& page, const Suite& suite);
 
 /// SHA-256 of all that decides what a policy does, as its suite says it: its name and checkpoint, its command or where it
-/// listens, and its `files` by content.
+/// listens, and its `files` by content (as in the suite's hash, without Python's __pycache__).
 std::string PolicyHash(const SuitePolicy& policy);
 
-/// The arguments of a policy's command that name files which its `files` do not list. They may decide what it does, and
-/// they may be what it writes: only the suite's author knows.
+/// The arguments of a policy's command that name files or folders which its `files` do not list, but for the suite's
+/// own folder. They may decide what it does, and they may be what it writes: only the suite's author knows.
 std::vector<std::string> FilesInNoHash(const Suite& suite, const SuitePolicy& policy);
 
 }  // namespace evac

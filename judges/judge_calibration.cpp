@@ -65,11 +65,40 @@ JudgeQualityRow OnOtherClips(const std::vector<JudgedItem>& items) {
   return QualityOn(items, "other clips", [](const JudgedItem& item) { return !item.is_real; });
 }
 
+/// How many successes and failures a judge told, whatever the truth knows of them.
+struct Told {
+  std::map<std::string, std::int64_t> by_task, by_world;
+};
+
+Told ToldBy(const std::string& judge, const Store& store) {
+  Told told;
+  const std::map<std::string, Verdicts> current = store.CurrentVerdicts();
+  for (const Episode& episode : store.Episodes()) {
+    const auto verdicts = current.find(episode.key.Id());
+    if (verdicts == current.end()) continue;
+    const auto own = verdicts->second.find(judge);
+    if (own == verdicts->second.end() || !IsDecided(own->second.label)) continue;
+    ++told.by_task[episode.key.pair.task];
+    ++told.by_world[episode.key.world];
+  }
+  return told;
+}
+
+/// Every task that a gate may count it on: those of the items, and those of which no episode is one.
+std::set<std::string> TasksOf(const std::vector<JudgedItem>& items, const Told& told) {
+  std::set<std::string> tasks;
+  for (const JudgedItem& item : items) tasks.insert(item.task);
+  for (const auto& [task, count] : told.by_task) tasks.insert(task);
+  return tasks;
+}
+
 /// What is missing before a judge can be accepted or refused on each task.
-std::vector<std::string> Missing(const std::vector<JudgedItem>& items, const JudgeAcceptance& wanted) {
+std::vector<std::string> Missing(const std::vector<JudgedItem>& items, const Told& told,
+                                 const JudgeAcceptance& wanted) {
   std::vector<std::string> missing;
   if (items.empty()) missing.push_back("no episode has a verdict of both");
-  for (const JudgeQualityRow& row : RowsBy(items, "task", &JudgedItem::task)) {
+  for (const std::string& task : TasksOf(items, told)) {
+    const JudgeQualityRow row = RowOf(items, "task", task, &JudgedItem::task);
     const std::int64_t successes = TrueSuccesses(row.confusion);
     const std::int64_t failures = row.confusion.total() - successes;
     if (row.confusion.total() < wanted.min_items_per_task || std::min(successes, failures) < wanted.min_per_class)
@@ -91,18 +120,9 @@ std::vector<std::string> Missing(const std::vector<JudgedItem>& items, const Jud
 }
 
 /// Worlds where a gate would count what the judge told, and nobody knows how far it is right.
-std::vector<std::string> Unmeasured(const Store& store, const std::string& judge,
-                                    const std::vector<JudgedItem>& items) {
-  std::map<std::string, std::int64_t> told;  // successes and failures, by world
-  const std::map<std::string, Verdicts> current = store.CurrentVerdicts();
-  for (const Episode& episode : store.Episodes()) {
-    const auto verdicts = current.find(episode.key.Id());
-    if (verdicts == current.end()) continue;
-    const auto own = verdicts->second.find(judge);
-    if (own != verdicts->second.end() && IsDecided(own->second.label)) ++told[episode.key.world];
-  }
+std::vector<std::string> Unmeasured(const Told& told, const std::vector<JudgedItem>& items) {
   std::vector<std::string> sentences;
-  for (const auto& [world, count] : told) {
+  for (const auto& [world, count] : told.by_world) {
     const bool is_measured = std::ranges::any_of(items, [&](const JudgedItem& item) {
       return item.world == world && IsDecided(item.judge) && IsDecided(item.truth);
     });
@@ -284,8 +304,9 @@ JudgeCalibrationReport CalibrateJudge(const Store& store, const std::string& jud
                                     std::pair("policy", &JudgedItem::policy)}) {
     for (JudgeQualityRow& row : RowsBy(items, kind, field)) report.rows.push_back(std::move(row));
   }
-  report.missing = Missing(items, wanted);
-  for (std::string& sentence : Unmeasured(store, judge, items)) report.missing.push_back(std::move(sentence));
+  const Told told = ToldBy(judge, store);
+  report.missing = Missing(items, told, wanted);
+  for (std::string& sentence : Unmeasured(told, items)) report.missing.push_back(std::move(sentence));
   report.refusals = Refusals(items, wanted);
   report.probes = ProbesOf(store, judge);
   return report;

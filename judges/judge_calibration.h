@@ -58,7 +58,8 @@ struct JudgeCalibrationReport {
   std::string judge, truth;
   std::vector<JudgeQualityRow> rows{};  ///< all, per task, per world, per policy
   std::vector<std::string> refusals{};  ///< why a gate may not count it
-  std::vector<std::string> missing{};   ///< why nothing can be said yet: too few items, or none of a world it judged
+  /// Why nothing can be said yet: too few items of a task where it told successes or failures, or none of such a world.
+  std::vector<std::string> missing{};
   std::map<std::string, ProbeAgreement> probes{};  ///< of its probes ("flip", "retest"); none where they never ran
 };
 JudgeCalibrationReport CalibrateJudge(const Store& store, const std::string& judge, const std::string& truth,

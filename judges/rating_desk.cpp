@@ -25,6 +25,15 @@ DeskAnswer OldTab() { return Refused(409, "tab", "this study is open in another 
 
 std::string PublicName(const StudyRater& rater) { return fmt::format("r{}", rater.id); }
 
+/// Clips that other adjudicators have before them.
+std::set<std::int64_t> DecidedOnByOthers(const StudyStore& store, const StudyRater& rater, std::int64_t now_ms) {
+  std::set<std::int64_t> clips;
+  for (const Presentation& p : store.Leases(now_ms)) {
+    if (p.rater != rater.id && p.showing == Showing::kAdjudication) clips.insert(p.clip);
+  }
+  return clips;
+}
+
 /// Hands out places one after the other.
 class OrderWriter {
  public:
@@ -179,11 +188,20 @@ DeskAnswer RatingDesk::Open(const StudyRater& rater, const PresentationBody& bod
   return Shown(rater, *p, now_ms);
 }
 
+/// The one that was begun goes on; then come those that nobody has before them. The later of two words holds: a clip is
+/// two adjudicators' only where no other is left.
 DeskAnswer RatingDesk::NextDispute(const StudyRater& rater, const NextBody& body, std::int64_t now_ms) {
   std::map<std::int64_t, Presentation> mine;
   int next = 0;
   for (Presentation& p : store_.PresentationsOf(rater.id)) next = p.order_index + 1, mine[p.clip] = std::move(p);
-  const std::vector<std::int64_t> disputes = store_.Disputes();
+  std::vector<std::int64_t> disputes = store_.Disputes();
+  const std::set<std::int64_t> taken = DecidedOnByOthers(store_, rater, now_ms);
+  std::ranges::stable_sort(disputes, {}, [&](std::int64_t clip) {
+    const auto own = mine.find(clip);
+    const bool is_begun = own != mine.end() && own->second.shown_ms;
+    if (is_begun && (own->second.lease_until_ms > now_ms || !taken.contains(clip))) return 0;
+    return taken.contains(clip) ? 2 : 1;
+  });
   for (const std::int64_t clip : disputes) {
     auto found = mine.find(clip);
     if (found == mine.end()) {

@@ -42,7 +42,8 @@ class RatingDesk {
   /// This tab writes from now on; every other one gets 409 "tab".
   DeskAnswer TakeTab(const StudyRater& rater);
 
-  /// The next clip, leased; {"done": true} if there is none. An adjudicator gets disputes.
+  /// The next clip, leased; {"done": true} if there is none. An adjudicator gets disputes, while there are others none
+  /// that another one has under a lease.
   DeskAnswer Next(const StudyRater& rater, const NextBody& body, std::int64_t now_ms);
   /// A clip that was shown before, to change its verdict.
   DeskAnswer Open(const StudyRater& rater, const PresentationBody& body, std::int64_t now_ms);

@@ -16,7 +16,7 @@ DeskAnswer Refused(int status, const char* error, const std::string& sentence) {
 
 Json StagesOf(int bits) {
   Json stages = Json::array();
-  for (int k = 0; k < 16; ++k) {
+  for (int k = 0; k < kMostStages; ++k) {
     if (bits >> k & 1) stages.push_back(k);
   }
   return stages;

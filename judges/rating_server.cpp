@@ -131,7 +131,7 @@ struct RatingServer::Impl {
     if (IsLoopback(options.host) && !is_named && !IsThisMachine(HostName(asked.host)))
       return Refused(403, "host", "another site's name points here");
     if (asked.method != "POST") return std::nullopt;
-    if (!asked.origin.empty() && asked.origin != "http://" + asked.host && asked.origin != "https://" + asked.host)
+    if (!asked.origin.empty() && !IsOurs(asked.origin, asked.host))
       return Refused(403, "origin", "the request comes from another site");
     if (!asked.fetch_site.empty() && asked.fetch_site != "same-origin")
       return Refused(403, "origin", "the request comes from another site");
@@ -143,6 +143,12 @@ struct RatingServer::Impl {
   /// Exactly: "127.0.0.1.evil.example" is somebody else's.
   bool IsThisMachine(const std::string& name) const {
     return name == "localhost" || name == "127.0.0.1" || name == "::1" || name == options.host;
+  }
+
+  /// A proxy as it comes gives its own name for this server as the host: then --url alone says what browsers see.
+  bool IsOurs(const std::string& origin, const std::string& host) const {
+    return origin == "http://" + host || origin == "https://" + host ||
+           (!options.public_url.empty() && origin == options.public_url);
   }
 
   std::string PublicHost() const {

@@ -6,6 +6,7 @@
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <set>
+#include <tuple>
 
 #include "core/error.h"
 #include "core/file.h"
@@ -16,6 +17,7 @@
 #include "core/store_lock.h"
 #include "core/video.h"
 #include "judges/rating_clip.h"
+#include "judges/rating_words.h"
 
 namespace evac {
 namespace {
@@ -79,25 +81,50 @@ void DemandRubrics(const std::vector<Candidate>& candidates) {
   }
 }
 
-/// The states of each task that are drawn.
-std::map<std::string, std::set<std::string>> DrawnStates(const std::vector<Candidate>& candidates,
-                                                         const StudyOptions& options) {
-  std::map<std::string, std::set<std::string>> drawn;
+/// A verdict that marks a later one could not be stored.
+void DemandFewStages(const std::vector<Candidate>& candidates) {
+  for (const Candidate& candidate : candidates) {
+    const std::size_t stages = candidate.task.rubric.stages.size();
+    if (stages > kMostStages)
+      throw InvalidInput("{}: the rubric of task {} has {} stages, wanted at most {}", candidate.clip.run,
+                         candidate.clip.task, stages, kMostStages);
+  }
+}
+
+using StatesOfTasks = std::map<std::string, std::set<std::string>>;  // by task
+
+StatesOfTasks StatesIn(const std::optional<StudyStore>& store) {
+  StatesOfTasks states;
+  if (!store) return states;
+  for (const StudyClip& clip : store->Clips()) states[clip.task].insert(clip.initial_state);
+  return states;
+}
+
+/// The states of each task that are drawn: those that the study has, then the others by a number of each of them alone,
+/// so that states that came since change nothing about who was drawn before.
+StatesOfTasks DrawnStates(const std::vector<Candidate>& candidates, const StatesOfTasks& there,
+                          const StudyOptions& options) {
+  StatesOfTasks drawn;
   for (const Candidate& candidate : candidates) drawn[candidate.clip.task].insert(candidate.clip.initial_state);
-  for (auto& [task, all] : drawn) {
-    std::vector<std::string> states(all.begin(), all.end());
-    SplitMix64 draws(SeedFor(SeedFor(options.seed, "states"), task));
-    for (std::size_t i = states.size(); i > 1; --i) std::swap(states[i - 1], states[draws.Below(i)]);
-    states.resize(std::min(states.size(), static_cast<std::size_t>(options.states)));
-    all = {states.begin(), states.end()};
+  for (auto& [task, states] : drawn) {
+    const std::uint64_t seed = SeedFor(SeedFor(options.seed, "states"), task);
+    const auto known = there.find(task);
+    std::vector<std::tuple<bool, std::uint64_t, std::string>> ranked;  // whether it is new, its number, its name
+    for (const std::string& state : states)
+      ranked.emplace_back(known == there.end() || !known->second.contains(state), SeedFor(seed, state), state);
+    std::ranges::sort(ranked);
+    ranked.resize(std::min(ranked.size(), static_cast<std::size_t>(options.states)));
+    states.clear();
+    for (const auto& [is_new, number, state] : ranked) states.insert(state);
   }
   return drawn;
 }
 
 /// Once for all runs: drawn for each, pairs that lie in two of them would break.
-void LeaveOutWhatIsNotDrawn(std::vector<Candidate>& candidates, const StudyOptions& options) {
+void LeaveOutWhatIsNotDrawn(std::vector<Candidate>& candidates, const StatesOfTasks& there,
+                            const StudyOptions& options) {
   if (options.states == 0) return;
-  const auto drawn = DrawnStates(candidates, options);
+  const auto drawn = DrawnStates(candidates, there, options);
   std::erase_if(candidates, [&](const Candidate& c) { return !drawn.at(c.clip.task).contains(c.clip.initial_state); });
 }
 
@@ -426,15 +453,16 @@ StudyMade MakeStudy(const fs::path& folder, const StudyOptions& options,
   std::vector<Candidate>& candidates = collector.candidates;
   if (candidates.empty()) throw InvalidInput("{}: no episode with a video to rate", options.runs.front().string());
   DemandRubrics(candidates);
-  LeaveOutWhatIsNotDrawn(candidates, options);
-  if (!options.gold_from.empty()) ChooseKnown(candidates, options);
+  DemandFewStages(candidates);
 
   MakeFolders(folder);
   const RunLock lock(folder / "new.lock");  // the server's is another: waves may come while people rate
   const bool is_new = !StudyStore::IsIn(folder);
   std::optional<StudyStore> store;
+  if (!is_new) store = StudyStore::Open(folder, StudyStore::Mode::kReadWrite);
+  LeaveOutWhatIsNotDrawn(candidates, StatesIn(store), options);
+  if (!options.gold_from.empty()) ChooseKnown(candidates, options);
   if (!is_new) {
-    store = StudyStore::Open(folder, StudyStore::Mode::kReadWrite);
     CheckSameHeight(store->info(), options, folder);
     LeaveOutWhatIsThere(candidates, *store);
     if (candidates.empty()) {

@@ -22,7 +22,7 @@ struct StudyOptions {
   std::optional<int> height_px = {};  ///< of the first view, 64 … 1080; nothing: kStudyHeight_px, of a study that is
                                       ///< there what it was begun with
   int states = 0;  ///< so many initial states per task of those that have a clip, drawn by the seed once for all runs,
-                   ///< with all their clips; 0: all
+                   ///< with all their clips; those that the study has are drawn first; 0: all
   std::string gold_from =
       {};                    ///< a judge of the runs whose verdicts are known to be right; empty: no gold, no practice
   int examples = 4;          ///< clips shown with their label before the session, if there is gold; rated by nobody
@@ -50,8 +50,8 @@ struct StudyMade {
 /// @throws InvalidInput if a run is not there, no episode has a video, an option is out of range, or earlier waves were
 /// put through another codec, or through none, or are of another height than is asked for; or if a task's views do not
 /// fit into the study's clips even 64 px high; or if an episode whose clip is in the study has another video by now, or
-/// another process makes a wave of it; or if a task has no rubric (kNoRubric), or a run no row of an episode's task or
-/// world.
+/// another process makes a wave of it; or if a task has no rubric (kNoRubric) or more than kMostStages stages, or a run
+/// no row of an episode's task or world.
 StudyMade MakeStudy(const std::filesystem::path& folder, const StudyOptions& options,
                     const std::function<void(std::size_t, std::size_t)>& progress);
 

@@ -241,7 +241,7 @@ Parsed<HumanVerdict> ParseVerdict(std::string_view text) {
   verdict.tab_epoch = fields.Integer("tab_epoch", 0, INT64_MAX - 1, true);
   verdict.label = fields.OneOf("label", {"success", "failure", "cannot_tell"});
   if (fields.Has("supersedes")) verdict.supersedes = fields.Integer("supersedes", 1, INT64_MAX - 1);
-  verdict.stages = static_cast<int>(fields.Integer("stages", 0, (1 << 16) - 1));
+  verdict.stages = static_cast<int>(fields.Integer("stages", 0, (1 << kMostStages) - 1));
   if (fields.Has("progress")) verdict.progress = fields.Real("progress", 0, 1);
   verdict.flags = FlagsOf(fields);
   verdict.cause = fields.OneOf("cause", FailureCauses(), false);

@@ -25,6 +25,8 @@ struct JoinBody {
 };
 Parsed<JoinBody> ParseJoin(std::string_view text);
 
+inline constexpr int kMostStages = 16;  ///< of a task that is rated: a verdict says of so many which were reached
+
 /// What a tab asks for: its epoch and what it holds already.
 struct NextBody {
   std::int64_t tab_epoch = 0;

@@ -19,7 +19,8 @@ constexpr int kTries = 6, kTriesOfTimeout = 2, kTroublesBeforePause = 10;
 constexpr double kLongestRetryAfter_s = 120, kLongestWait_s = 30, kPause_s = 60;
 
 bool IsRejection(int status) { return status == 400 || status == 413 || status == 415 || status == 422; }
-bool IsWrongAddress(int status) { return status == 401 || status == 403 || status == 404; }
+/// Nothing more is answered: a wrong key or address, or the credit is used up.
+bool IsFinal(int status) { return status == 401 || status == 402 || status == 403 || status == 404; }
 bool MayPass(int status) { return status == 429 || status >= 500; }
 
 /// What a server says of an error: its message if it is in the usual place, else the body's beginning.
@@ -63,6 +64,12 @@ bool IsPassing(const HttpReply& reply, const VlmSaid& said) {
   if (reply.trouble == HttpReply::Trouble::kTooLarge) return false;
   if (reply.trouble != HttpReply::Trouble::kNone) return true;
   return reply.status == 200 ? said.trouble == VlmOutcome::kHttpError : MayPass(reply.status);
+}
+
+/// A status that speaks neither of the request nor of an answer: who goes on would store one error after another.
+bool IsUnforeseen(const HttpReply& reply) {
+  return reply.trouble == HttpReply::Trouble::kNone && reply.status != 200 && !IsRejection(reply.status) &&
+         !IsFinal(reply.status);
 }
 
 }  // namespace
@@ -119,8 +126,8 @@ VlmSaid VlmClient::Ask(const json& request) {
     said.prompt_tokens = before.prompt_tokens + said.completion.prompt_tokens.value_or(0);
     said.completion_tokens = before.completion_tokens + said.completion.completion_tokens.value_or(0);
     const bool is_passing = IsPassing(reply, said);
-    Count(said, is_passing, *pauses_before);
-    if (IsWrongAddress(reply.status)) End(fmt::format("{}: {}", options_.base_url, said.message));
+    Count(said, is_passing || IsUnforeseen(reply), *pauses_before);
+    if (IsFinal(reply.status)) End(fmt::format("{}: {}", options_.base_url, said.message));
     if (!is_passing || attempt == kTries) break;
     if (said.trouble == VlmOutcome::kTimeout && attempt == kTriesOfTimeout) break;
     Wait(reply.retry_after_s, attempt);

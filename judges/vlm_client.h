@@ -41,7 +41,7 @@ struct VlmClientOptions {
 struct VlmSaid {
   std::optional<VlmOutcome> trouble;  ///< nothing: `completion.text` is what the model wrote
   std::string message;                ///< of the trouble
-  bool was_rejected = false;  ///< 400, 413 or 422: the request itself; `message` holds what the server said of it
+  bool was_rejected = false;  ///< 400, 413, 415 or 422: the request itself; `message` holds what the server said of it
   VlmCompletion completion;
   int attempts = 0;
   long prompt_tokens = 0, completion_tokens = 0;  ///< of all tries, as far as the server counted them
@@ -53,8 +53,9 @@ struct VlmSaid {
 ///   5xx, a broken answer   the same without Retry-After. After ten in a row: one pause of 60 s; over if one
 ///                          that was sent after it fails again.
 ///   timeouts               tried twice
-///   400, 413, 422          not again: was_rejected
-///   401, 403, 404          over
+///   400, 413, 415, 422     not again: was_rejected
+///   401, 402, 403, 404     over
+///   any other status       not again; counts as one of the ten in a row
 ///   interrupted            over; what was sent is waited for
 /// Over means: nothing more is sent, everything stored stays, WhyOver says why. Thread-safe.
 class VlmClient {

@@ -8,6 +8,7 @@
 #include <chrono>
 #include <cmath>
 #include <future>
+#include <iterator>
 
 #include "core/error.h"
 #include "core/hash.h"
@@ -21,6 +22,7 @@ using Clock = std::chrono::steady_clock;
 
 constexpr long kFewestTokensPerFrame = 60;
 constexpr double kFewestOfEstimate = 0.75;  // of patches of 28 px; some models' have 32
+constexpr const char* kNoAnswer = "no answer in the cache";
 constexpr VlmClipOptions kSmall{.frames = 8, .tail_frames = 0, .long_side_px = 336};
 
 /// What a server says of a request that holds more than it takes, in capitals or not. vLLM: "At most 8 image(s) may be
@@ -51,6 +53,17 @@ VlmClipOptions Smaller(const VlmClipOptions& refused) {
           .tail_frames = kSmall.tail_frames,
           .long_side_px = std::min(kSmall.long_side_px, refused.long_side_px),
           .jpeg_quality = std::min(kSmall.jpeg_quality, refused.jpeg_quality)};
+}
+
+/// Of a call, in the cache: all that decides the answer.
+std::string KeyOf(const json& request, const VlmJudgeOptions& options) {
+  return Sha256Hex(fmt::format("{}\n{}\n{}\n{}", kVlmVersion, options.fingerprint,
+                               options.probe == VlmProbe::kRetest ? "again" : "", request.dump()));
+}
+
+std::vector<VlmWording> WordingsOf(VlmProbe probe) {
+  if (probe == VlmProbe::kFlip) return {VlmWording::kFlipped};
+  return {std::begin(kVlmWordings), std::end(kVlmWordings)};
 }
 
 std::size_t Bytes(const std::vector<VlmFrame>& frames) {
@@ -134,8 +147,12 @@ Verdict VlmJudge::Rate(const Task& task, const Episode& episode) {
   std::string name = Name();
   const std::filesystem::path video = options_.run_folder / episode.video;
   std::vector<VlmAnswer> answers;
-  Clip clip{task, ReadVlmFrames(video, task, config_.clip)};
-  answers = AllWordings(clip);
+  const Clip clip{task, ReadVlmFrames(video, task, config_.clip)};
+  if (options_.offline && UnansweredOf(task, clip.frames, config_, options_, &cache_) > 0) {
+    clip.is_too_large = true;  // perhaps: of a request that was refused the cache knows no answer
+  } else {
+    answers = AllWordings(clip);
+  }
   if (clip.is_too_large) {
     const Clip small{task, ReadVlmFrames(video, task, Smaller(config_.clip))};
     if (IsLess(small.frames, clip.frames)) {
@@ -143,6 +160,7 @@ Verdict VlmJudge::Rate(const Task& task, const Episode& episode) {
       name += kVlmSmall;
     }
   }
+  if (answers.empty()) throw InvalidInput(kNoAnswer).Called("not_judged");
   Verdict verdict = VerdictOf(answers);
   verdict.episode_id = episode.key.Id();
   verdict.judge = name;
@@ -152,9 +170,8 @@ Verdict VlmJudge::Rate(const Task& task, const Episode& episode) {
 
 /// Side by side: a server answers several at once sooner than one after another.
 std::vector<VlmAnswer> VlmJudge::AllWordings(const Clip& clip) {
-  if (options_.probe == VlmProbe::kFlip) return {AnswerOf(clip, VlmWording::kFlipped)};
   std::vector<std::future<VlmAnswer>> asked;
-  for (const VlmWording wording : kVlmWordings)
+  for (const VlmWording wording : WordingsOf(options_.probe))
     asked.push_back(std::async(std::launch::async, [this, &clip, wording] { return AnswerOf(clip, wording); }));
   for (const auto& answer : asked) answer.wait();
   std::vector<VlmAnswer> answers;
@@ -164,13 +181,10 @@ std::vector<VlmAnswer> VlmJudge::AllWordings(const Clip& clip) {
 
 VlmAnswer VlmJudge::AnswerOf(const Clip& clip, VlmWording wording) {
   const json request = VlmRequest(clip.task, clip.frames, wording, config_.sampling);
-  JudgeCall call{.key = Sha256Hex(fmt::format("{}\n{}\n{}\n{}", kVlmVersion, options_.fingerprint,
-                                              options_.probe == VlmProbe::kRetest ? "again" : "", request.dump())),
-                 .judge = Name(),
-                 .attempts = 0};
+  JudgeCall call{.key = KeyOf(request, options_), .judge = Name(), .attempts = 0};
   if (const auto known = cache_.Find(call.key))
     return ParseVerdictText(known->response, QuestionOf(clip.task, clip.frames, wording));
-  if (options_.offline) throw InvalidInput("no answer in the cache").Called("not_judged");
+  if (options_.offline) throw InvalidInput(kNoAnswer).Called("not_judged");
   const auto before = Clock::now();
   const VlmAnswer answer = Asked(clip, wording, call);
   call.latency_ms = std::chrono::duration_cast<std::chrono::milliseconds>(Clock::now() - before).count();
@@ -227,6 +241,14 @@ VlmSaid VlmJudge::AskWhole(const json& request, JudgeCall& call) {
   longer["max_tokens"] = 2 * request.at("max_tokens").get<int>();
   VlmSaid again = ask(longer);
   return again.attempts > 0 ? again : said;  // the budget may have ended between the two
+}
+
+long UnansweredOf(const Task& task, const std::vector<VlmFrame>& frames, const VlmConfig& config,
+                  const VlmJudgeOptions& options, const CallCache* cache) {
+  long unanswered = 0;
+  for (const VlmWording wording : WordingsOf(options.probe))
+    unanswered += !cache || !cache->Find(KeyOf(VlmRequest(task, frames, wording, config.sampling), options));
+  return unanswered;
 }
 
 void CheckThatItSees(VlmClient& client, const VlmSampling& sampling) {

@@ -3,6 +3,7 @@
 #include <filesystem>
 #include <functional>
 #include <string>
+#include <vector>
 
 #include "core/judge.h"
 #include "core/store_calls.h"
@@ -25,7 +26,7 @@ enum class VlmProbe {
 struct VlmJudgeOptions {
   std::filesystem::path run_folder{};
   VlmProbe probe = VlmProbe::kNone;
-  bool offline = false;                ///< answers from the cache alone; an episode without one is left out
+  bool offline = false;                ///< answers from the cache alone, else of small images; without any: left out
   std::string fingerprint{};           ///< of the server: VlmClient::Fingerprint
   std::function<std::string()> now{};  ///< ISO 8601, for the cache's history; must be given
 };
@@ -63,6 +64,12 @@ class VlmJudge : public Judge {
 /// One verdict from the answers to all wordings.
 /// @param answers  one or more; of the flip probe one
 Verdict VerdictOf(const std::vector<VlmAnswer>& answers);
+
+/// How many requests about these frames the cache has no answer to: what such a judge would send for them.
+/// @param options  whose probe and fingerprint decide which answers are looked for
+/// @param cache  null: there is none
+long UnansweredOf(const Task& task, const std::vector<VlmFrame>& frames, const VlmConfig& config,
+                  const VlmJudgeOptions& options, const CallCache* cache);
 
 /// Sends coloured pictures with numbers and wants the numbers back: some servers drop images and answer all the same.
 /// @throws InvalidInput if they do not come back.

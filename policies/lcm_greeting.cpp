@@ -55,8 +55,8 @@ void LcmGreeting::RefuseTwoPolicies(const PolicySpec& harness,
   if (declarations.empty()) declarations[first.server] = first;
   if (declarations.size() == 1) return;
   throw InvalidInput(
-      "{} policies answer on {} with token {} ({}, {} …): stop all but one, or give each a token of its own",
-      declarations.size(), address.url, address.token, declarations.begin()->second.policy.name,
+      "{}{} policies answer on {} with token {} ({}, {} …): stop all but one, or give each a token of its own",
+      Before(who), declarations.size(), address.url, address.token, declarations.begin()->second.policy.name,
       std::next(declarations.begin())->second.policy.name);
 }
 

@@ -23,7 +23,7 @@ struct LcmGreeting {
 
   /// @param declarations  by server; filled by whoever handles the link's messages.
   /// @returns the one policy's declaration.
-  /// @throws InvalidInput, beginning with `who`, if nobody answers within `wait_s` or the policy is gone; if two answer.
+  /// @throws InvalidInput, beginning with `who`, if nobody answers within `wait_s`, the policy is gone, or two answer.
   spec_t Await(const PolicySpec& harness, double wait_s, std::map<std::string, declaration_t>& declarations) const;
 
   /// Asks for declarations, once.

@@ -40,6 +40,7 @@ void LcmLane::Begin(const Observation& observation, std::optional<int> jpeg_qual
     PutImage(observation.images[sent[i]], jpeg_quality, message);
   }
   send_at = answerable_at = Clock::now();
+  slept_s = 0;
   wait_s = repeat_after_s;
   sendings = 0;
 }
@@ -50,6 +51,11 @@ void LcmLane::Started(const std::string& by, double repeat_after_s) {
   sendings = 0;
   wait_s = repeat_after_s;
   send_at = answerable_at = Clock::now();
+  slept_s = 0;
+}
+
+double LcmLane::Waited_s() const {
+  return std::max(0.0, std::chrono::duration<double>(Clock::now() - answerable_at).count() - slept_s);
 }
 
 LcmLane MakeLcmLane(const LcmEpisode& episode, const Task& task, const PolicySpec& policy) {

@@ -30,12 +30,15 @@ struct LcmLane {
   double wait_s = 0;      ///< from the last sending to the next
   Clock::time_point send_at;
   Clock::time_point answerable_at;  ///< when it was first sent: its start is acknowledged by then
+  double slept_s = 0;               ///< how long this process was stopped since then
 
   /// The request that comes next, not sent yet. @param jpeg_quality  nothing: raw images.
   /// @throws InternalError if the observation lacks an image.
   void Begin(const Observation& observation, std::optional<int> jpeg_quality, double repeat_after_s);
   /// The policy has acknowledged the start: the request itself goes out now.
   void Started(const std::string& by, double repeat_after_s);
+  /// Since it was first sent, awake.
+  double Waited_s() const;
 };
 
 /// Who begins what.

@@ -99,19 +99,24 @@ struct LcmPolicy::Impl {
         next = std::min(next, lane->send_at);
       }
       if (is_complete) return;
-      const Clock::time_point before = Clock::now();
-      const double wait_s = std::max(0.0, Seconds(next - before).count());
+      awake_at = Clock::now();
+      wait_s = std::max(0.0, Seconds(next - awake_at).count());
       link.Handle(wait_s);
-      LeaveOutWhatWasSlept(before, wait_s);
+      LeaveOutWhatWasSlept();
       GiveUpWhereHopeless(asked);
     }
   }
 
-  /// Who was stopped (SIGSTOP) has not waited for anybody meanwhile: the policy may have been stopped with it.
-  void LeaveOutWhatWasSlept(Clock::time_point before, double wait_s) {
-    constexpr double kAwake_s = 1;  // for the messages that were handled
-    const double slept_s = Seconds(Clock::now() - before).count() - wait_s;
-    if (slept_s > kAwake_s) last_answer = std::min(Clock::now(), After(last_answer, slept_s));
+  /// Who was stopped (SIGSTOP) has not waited for anybody meanwhile: the policy may have been stopped with it. To be
+  /// asked before each message is looked at, which may be what ended the sleep.
+  void LeaveOutWhatWasSlept() {
+    constexpr double kAwake_s = 1;  // for the message that was handled before
+    const double asleep_s = Seconds(Clock::now() - awake_at).count() - wait_s;
+    awake_at = Clock::now();
+    wait_s = 0;
+    if (asleep_s <= kAwake_s) return;
+    slept_s += asleep_s;
+    for (auto& [scene, lane] : lanes) lane.slept_s += asleep_s;
   }
 
   void GiveUpWhereHopeless(std::span<LcmLane* const> asked) {
@@ -130,7 +135,7 @@ struct LcmPolicy::Impl {
   /// Since the policy could have begun with this one: while it answers others, whoever comes last is not late. So how many
   /// lanes ask at a time changes no result.
   double Waited_s(const LcmLane& lane) const {
-    return Seconds(Clock::now() - std::max(lane.answerable_at, last_answer)).count();
+    return std::min(lane.Waited_s(), Seconds(Clock::now() - last_answer).count() - slept_s);
   }
 
   /// Of all who wait: while one's start is not acknowledged, the policy may be busy with it, and answers nobody.
@@ -153,12 +158,13 @@ struct LcmPolicy::Impl {
     lane.answer = Failure{StopReason::kPolicyTimeout,
                           fmt::format("no answer to {} within {:.1f} s (sent {} times; deadline {} s){}", what,
                                       waited_s, lane.sendings, deadline_s, heard)};
-    RestartIfSilentSince(lane.answerable_at);
+    RestartIfSilentSince(std::max(lane.answerable_at, last_answer));
   }
 
-  /// One that was started again since then owes no answer: of those that it leaves waiting, the first restarts it.
+  /// One that was started again since then owes no answer: of those that it leaves waiting, the first restarts it. What
+  /// answered some of those who asked together, and no more after them, hangs as one that answered nobody does.
   void RestartIfSilentSince(Clock::time_point asked) {
-    const auto is_later = [asked](const std::optional<Clock::time_point>& when) { return when && *when >= asked; };
+    const auto is_later = [asked](const std::optional<Clock::time_point>& when) { return when && *when > asked; };
     if (!options.restart || is_later(last_heard) || is_later(restarted)) return;
     restarted = Clock::now();
     options.restart(asked);
@@ -184,6 +190,7 @@ struct LcmPolicy::Impl {
 
   /// After the handshake, one that was started again must declare itself too before its episodes begin.
   void TakeStarted(const episode_started_t& started) {
+    LeaveOutWhatWasSlept();
     last_heard = Clock::now();
     LcmLane* lane = Find(started.episode);
     if (lane == nullptr || lane->has_started) return;  // the answer to a repeated start
@@ -192,7 +199,7 @@ struct LcmPolicy::Impl {
       return Greeting().SayHello(*harness);
     }
     lane->Started(started.server, options.repeat_after_s);
-    last_answer = lane->answerable_at;
+    Answered(lane->answerable_at);
     if (lane->answer) return;
     const std::string changes = policy ? Changes(*policy, FromWire(declarations.at(started.server).policy)) : "";
     if (!changes.empty())
@@ -202,6 +209,7 @@ struct LcmPolicy::Impl {
   }
 
   void TakeChunk(const chunk_t& reply) {
+    LeaveOutWhatWasSlept();
     last_heard = Clock::now();
     if (IsReordered(reply)) ++counters["reordered_replies"];
     LcmLane* lane = Find(reply.episode);
@@ -214,9 +222,13 @@ struct LcmPolicy::Impl {
     if (lane->answer) return void(++counters[lane->gave_up ? "late_replies" : "duplicate_replies"]);
     if (!reply.unknown_episode && reply.server != lane->server) return void(++counters["foreign_replies"]);
     lane->answer = AnswerOf(reply, *lane);
-    last_answer = Clock::now();
-    if (auto* chunk = std::get_if<ActionChunk>(&*lane->answer))
-      chunk->thinking_s = Seconds(Clock::now() - lane->answerable_at).count();
+    Answered(Clock::now());
+    if (auto* chunk = std::get_if<ActionChunk>(&*lane->answer)) chunk->thinking_s = lane->Waited_s();
+  }
+
+  void Answered(Clock::time_point when) {
+    last_answer = when;
+    slept_s = 0;
   }
 
   bool IsReordered(const chunk_t& reply) {
@@ -270,7 +282,10 @@ struct LcmPolicy::Impl {
   std::set<std::int64_t> gave_up;                     ///< episodes that ended by timeout
   std::map<std::string, std::int64_t> last_sequence;  ///< by server
   std::optional<Clock::time_point> last_heard, restarted;
-  Clock::time_point last_answer;  ///< to a start or a request of this Act, or when it began; later by what was slept
+  Clock::time_point last_answer;  ///< to a start or a request of this Act, or when it began
+  double slept_s = 0;             ///< how long this process was stopped since then
+  Clock::time_point awake_at;     ///< it was not stopped just then …
+  double wait_s = 0;              ///< … and was to wait so long for the next message
   int noise = 0;  ///< undecodable replies since the last Act
   Counters counters;
 };
@@ -289,7 +304,7 @@ LcmPolicy::~LcmPolicy() {
 PolicySpec LcmPolicy::Handshake(const PolicySpec& harness, double wait_s) {
   const PolicySpec policy = FromWire(impl_->Greeting().Await(harness, wait_s, impl_->declarations));
   if (!Compare(harness, policy).empty()) {
-    throw InvalidInput("policy {}@{} does not fit this run:\n{}", policy.name, policy.checkpoint,
+    throw InvalidInput("{} does not fit this run:\n{}", WhoDeclares(impl_->options.who, policy),
                        SideBySide(harness, policy));
   }
   impl_->harness = harness;
@@ -311,7 +326,7 @@ std::vector<Acted> LcmPolicy::Act(std::span<const SceneObservation> batch) {
   const auto jpeg_quality = impl_->options.raw_images ? std::nullopt : std::optional(impl_->options.jpeg_quality);
   std::vector<LcmLane*> asked;
   impl_->noise = 0;
-  impl_->last_answer = Clock::now();
+  impl_->Answered(Clock::now());
   for (const SceneObservation& scene : batch) {
     const auto lane = impl_->lanes.find(scene.scene);
     if (lane == impl_->lanes.end()) throw InternalError("scene {} was asked to act before its Reset", scene.scene);

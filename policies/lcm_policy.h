@@ -27,13 +27,14 @@ struct LcmPolicyOptions {
   Pacing pacing{};
   /// Asked while waiting: why nobody will ever answer (PolicyProcess::WhyGone), so that nobody waits for the deadline.
   std::function<std::optional<std::string>()> why_gone{};
-  /// Called when the policy was silent for a whole deadline, once for all who wait, with the time at which it was asked:
-  /// it hangs, unless it was started since (PolicyProcess::Restart). May be empty.
+  /// Called when the policy was silent for a whole deadline, once for all who wait, with the time since which it was:
+  /// when it was asked, or gave its last answer to another of the same Act. It hangs, unless it was started since
+  /// (PolicyProcess::Restart). May be empty.
   std::function<void(std::chrono::steady_clock::time_point asked)> restart{};
   /// Asked while waiting: the user wants an end. Who waits gets a Failure at once; nobody is to keep it. May be empty.
   std::function<bool()> interrupted{};
   bool keep_longer_chunks = false;  ///< a chunk longer than the harness executes stays whole (policy latency needs it)
-  std::string who{};        ///< "policy good@v1": begins what a handshake says that nobody answers. May be empty
+  std::string who{};        ///< "policy good@v1", the suite's entry: begins what a handshake refuses. May be empty
   std::string if_silent{};  ///< what helps then, its end; empty: how a policy that runs elsewhere joins
 };
 
@@ -73,7 +74,8 @@ class LcmPolicy : public Policy {
   void Reset(SceneId scene, const Task& task, std::uint64_t seed) override;
 
   /// All scenes' requests are sent before the first answer is awaited. Chunks longer than the harness's are cut to it.
-  /// ActionChunk::thinking_s is the time from a request's first sending to its answer.
+  /// ActionChunk::thinking_s is the time from a request's first sending to its answer, without what this process was
+  /// stopped for meanwhile (SIGSTOP): the policy may have been stopped with it.
   std::vector<Acted> Act(std::span<const SceneObservation> batch) override;
 
   /// repeats, stale_replies (of an earlier request), duplicate_replies, late_replies (after the deadline),

@@ -138,6 +138,11 @@ std::string Changes(const PolicySpec& before, const PolicySpec& now) {
   return changes;
 }
 
+std::string WhoDeclares(const std::string& who, const PolicySpec& declared) {
+  if (who.empty()) return fmt::format("policy {}@{}", declared.name, declared.checkpoint);
+  return fmt::format("{}, which declares itself as {}@{},", who, declared.name, declared.checkpoint);
+}
+
 std::string SideBySide(const PolicySpec& harness, const PolicySpec& policy) {
   std::vector<Row> rows = Rows(harness, policy);
   rows.insert(rows.begin(), Row{"", "this run", "the policy", ""});

@@ -61,6 +61,10 @@ std::string Changes(const PolicySpec& before, const PolicySpec& now);
 /// Both declarations as a table, a row per field, a `*` before each row that does not fit and the reasons below.
 std::string SideBySide(const PolicySpec& harness, const PolicySpec& policy);
 
+/// "policy good@v1, which declares itself as probe@c1,": begins what is wrong with a declaration. @param who  "policy
+/// good@v1", as the suite calls it; empty: nobody but the policy itself says a name
+std::string WhoDeclares(const std::string& who, const PolicySpec& declared);
+
 /// As the store keeps it: every field under its name. Bytes that are no UTF-8 are shown as U+FFFD.
 std::string ToJson(const PolicySpec& spec);
 

@@ -21,7 +21,7 @@ constexpr const char* kStyle = R"css(
 constexpr std::size_t kShown = 6;  ///< pairs of clips of each sort
 
 std::string Percent(const Number& number) {
-  return number ? fmt::format("{:.0f} %", 100 * *number)
+  return number ? evac::Percent(*number)
                 : fmt::format("<span class=\"quiet\" title=\"{}\">–</span>", Escaped(number.reason()));
 }
 std::string Decimal(const Number& number, int digits) {
@@ -29,12 +29,18 @@ std::string Decimal(const Number& number, int digits) {
   const std::string text = fmt::format("{:.{}f}", *number, digits);
   return text.find_first_not_of("-0.") == std::string::npos && text.starts_with('-') ? text.substr(1) : text;  // no "-0.00"
 }
-std::string WithInterval(const Estimate& estimate, double factor, int digits, const char* unit) {
-  std::string text = estimate.value ? fmt::format("{:.{}f}{}", factor * *estimate.value, digits, unit)
-                                    : Decimal(estimate.value, digits);
+std::string WithInterval(const Estimate& estimate) {
+  std::string text = Decimal(estimate.value, 2);
   if (estimate.value && estimate.interval)
-    text += fmt::format(" <span class=\"quiet\">[{:.{}f}, {:.{}f}]</span>", factor * estimate.interval->low, digits,
-                        factor * estimate.interval->high, digits);
+    text += fmt::format(" <span class=\"quiet\">[{:.2f}, {:.2f}]</span>", estimate.interval->low,
+                        estimate.interval->high);
+  return text;
+}
+std::string ShareWithInterval(const Estimate& share) {
+  std::string text = Percent(share.value);
+  if (share.value && share.interval)
+    text += fmt::format(" <span class=\"quiet\">[{}, {}]</span>", PercentDigits(share.interval->low),
+                        PercentDigits(share.interval->high));
   return text;
 }
 
@@ -53,8 +59,8 @@ std::string TableHead(const std::vector<std::string>& columns) {
 std::string MatchRow(const std::string& name, const OutcomeMatch& match) {
   return fmt::format("<tr><th scope=\"row\">{}</th><td class=\"num\">{}</td><td class=\"num\">{}</td><td class=\"num\">{}</td>"
                      "<td class=\"num\">{}</td><td class=\"num\">{}</td></tr>", Escaped(name), PairsText(match),
-                     WithInterval(match.agreement, 100, 0, " %"), WithInterval(match.hallucinated, 100, 0, " %"),
-                     WithInterval(match.missed, 100, 0, " %"), WithInterval(match.kappa, 1, 2, ""));
+                     ShareWithInterval(match.agreement), ShareWithInterval(match.hallucinated),
+                     ShareWithInterval(match.missed), WithInterval(match.kappa));
 }
 
 /// Of the closed loop's wrong outcomes: the model's own, and those of policies that saw something else.
@@ -144,11 +150,11 @@ std::string Headline(const Fidelity& fidelity) {
   const CorrelationGroup& correlation = fidelity.model.correlation;
   return fmt::format("<p>{} of a task and a policy. Pearson {}; MMRV within tasks, the mean over them, {} (reality against itself {}); agreement "
                      "{} (reality against itself {}). {} s per chunk. Judge {}: kappa with the truth {}, with the object painted over {}.</p>",
-                     Counted(static_cast<std::int64_t>(fidelity.cells.size()), "cell"), WithInterval(correlation.pearson, 1, 2, ""), Decimal(fidelity.mmrv, 3),
-                     Decimal(fidelity.mmrv_again, 3), WithInterval(fidelity.closed.agreement, 100, 0, " %"),
-                     WithInterval(fidelity.closed_again.agreement, 100, 0, " %"), Decimal(fidelity.input.seconds_per_chunk, 2),
+                     Counted(static_cast<std::int64_t>(fidelity.cells.size()), "cell"), WithInterval(correlation.pearson), Decimal(fidelity.mmrv, 3),
+                     Decimal(fidelity.mmrv_again, 3), ShareWithInterval(fidelity.closed.agreement),
+                     ShareWithInterval(fidelity.closed_again.agreement), Decimal(fidelity.input.seconds_per_chunk, 2),
                      fidelity.input.judge.name.empty() ? "nobody" : Escaped(fidelity.input.judge.name),
-                     WithInterval(fidelity.input.judge.kappa, 1, 2, ""), Decimal(fidelity.input.judge.kappa_masked, 2));
+                     WithInterval(fidelity.input.judge.kappa), Decimal(fidelity.input.judge.kappa_masked, 2));
 }
 
 /// Outcomes, and how pictures drift apart.

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 
+#include "core/run_extent.h"
 #include "core/statistics/many_comparisons.h"
 #include "core/statistics/planning.h"
 #include "core/statistics/sequential_planning.h"
@@ -138,7 +139,9 @@ GateResult Decide(const GateRules& rules, const GateCandidate& candidate, const 
   decision.baseline_hash = baseline ? baseline->sha256 : "";
   decision.data_hash = data.store_hash;
   decision.sizes = SizesOf(rules, baseline);
-  const GateInput input{candidate.run, {data, baseline}, rules.name, candidate.looks};
+  const RunData& there = candidate.run.data;
+  const GateInput input{
+      candidate.run, {data, baseline, MissingOf(there.plan, there.episodes)}, rules.name, candidate.looks};
   std::vector<Evidence> evidences;
   for (const GateRule& rule : rules.rules) evidences.push_back(Examine(rule, input));
   Correct(rules.correction, evidences);

@@ -22,7 +22,7 @@ namespace {
 constexpr double kPower = 0.8;             // of the sizes that "more" promises
 constexpr double kShownConfidence = 0.95;  // of the two rates
 
-std::string Margin(const GateRule& rule) { return fmt::format("{:g} points", 100 * rule.margin); }
+std::string Margin(const GateRule& rule) { return GivenPoints(rule.margin); }
 
 double PassConfidence(const GateRule& rule) { return 1 - 2 * rule.alpha; }
 
@@ -207,16 +207,20 @@ void CompareUnpaired(const GateRule& rule, const GateSides& sides, Evidence& evi
 /// Of what the suite asks for, the part that the rule is about.
 RunExtent ExtentOfRule(const GateRule& rule, const RunSummary& run, const std::string& world) {
   return ExtentOf(run.data.plan, run.data.episodes, [&](const PlannedEpisodes& one) {
-    const bool is_meant = one.world == world || (rule.test == GateTest::kCorrelation && one.world == run.reference);
-    return is_meant && (rule.task.empty() || one.task == rule.task) &&
-           (rule.policy.empty() || PolicyLabel(one.policy, one.checkpoint) == rule.policy);
+    return IsOfRule(one, rule, world) || (rule.test == GateTest::kCorrelation && IsOfRule(one, rule, run.reference));
   });
+}
+
+/// Of what a rule is about, where none of it has run.
+std::string NothingYet(const GateRule& rule, const GateSides& sides) {
+  return fmt::format("{}{} in {}", sides.candidate.policy.empty() ? "all policies" : sides.candidate.policy,
+                     rule.task.empty() ? "" : " on " + rule.task, sides.world);
 }
 
 /// A run that is not whole is no sample of itself: tasks, worlds and policies have their turns one after another. A bet
 /// may be looked at while it runs; of errors there may be too many already, whatever comes.
 void BlockPart(const GateRule& rule, const GateInput& input, const GateSides& sides, Evidence& evidence) {
-  if (rule.test == GateTest::kSavi) return;
+  if (rule.test == GateTest::kSavi && !sides.candidate.cells.empty()) return;
   const RunExtent extent = ExtentOfRule(rule, input.run, sides.world);
   if (extent.missing == 0) return;
   const double errors = static_cast<double>(sides.candidate.errors), planned = static_cast<double>(extent.planned);
@@ -227,9 +231,19 @@ void BlockPart(const GateRule& rule, const GateInput& input, const GateSides& si
   evidence.more = "The run is not whole: evac resume runs the others, evac merge adds those of other shards.";
 }
 
+/// The episodes whose errors the rule minds: the candidate's, and where they are held against the real world its too.
+GateSide TriedBy(const GateRule& rule, const GateInput& input, const GateSides& sides) {
+  GateSide side = sides.candidate;
+  if (rule.test != GateTest::kCorrelation) return side;
+  for (const PinnedCell& cell : input.data.candidate.cells) {
+    if (cell.world == input.run.reference && (rule.task.empty() || cell.task == rule.task)) side.Add(cell);
+  }
+  return side;
+}
+
 /// What stands before any test.
-void Block(const GateRule& rule, const GateSides& sides, Evidence& evidence) {
-  const GateSide& side = sides.candidate;
+void Block(const GateRule& rule, const GateInput& input, const GateSides& sides, Evidence& evidence) {
+  const GateSide side = TriedBy(rule, input, sides);
   const double share = side.episodes > 0 ? static_cast<double>(side.errors) / static_cast<double>(side.episodes) : 0;
   if (!evidence.counted && share > rule.max_error_share) {
     evidence.blocked = fmt::format("{} of {} episodes ({}) could not go on, more than {}", side.errors, side.episodes,
@@ -255,7 +269,10 @@ Evidence Examine(const GateRule& rule, const GateInput& input) {
   decision.world = sides.world;
   decision.policy = sides.candidate.policy;
   decision.baseline_policy = sides.baseline.policy;
-  if (rule.ComparesPairs()) {
+  if (sides.candidate.cells.empty()) {
+    decision.statement = NothingYet(rule, sides);
+    decision.p = Undefined{"no episode is there yet"};
+  } else if (rule.ComparesPairs()) {
     ComparePairs(rule, input, sides, evidence);
   } else if (rule.Compares()) {
     CompareUnpaired(rule, sides, evidence);
@@ -263,7 +280,7 @@ Evidence Examine(const GateRule& rule, const GateInput& input) {
     ExamineQuality(rule, input.run, sides, evidence);
   }
   BlockPart(rule, input, sides, evidence);
-  if (evidence.blocked.empty()) Block(rule, sides, evidence);
+  if (evidence.blocked.empty()) Block(rule, input, sides, evidence);
   return evidence;
 }
 

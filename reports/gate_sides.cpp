@@ -45,9 +45,7 @@ GateSide SideOf(const PinnedResult& result, const GateRule& rule, const std::str
     if ((!policy.empty() && cell.policy != policy) || (!world.empty() && cell.world != world) ||
         (!rule.task.empty() && cell.task != rule.task))
       continue;
-    side.cells.push_back(&cell);
-    side.episodes += static_cast<std::int64_t>(cell.outcomes.size());
-    side.errors += std::ranges::count(cell.outcomes, Outcome::kError, &PinnedOutcome::outcome);
+    side.Add(cell);
   }
   return side;
 }
@@ -120,11 +118,26 @@ void DemandSameIfKnown(const std::string& key, const std::map<std::string, std::
   if (here != found.end() && there != wanted.end()) DemandSame(here->second, there->second, what);
 }
 
+/// A run may have been broken off, or be one shard of several: what is not there may come.
+bool IsAwaited(const GateRule& rule, const GateData& data, const std::string& world) {
+  return std::ranges::any_of(data.missing, [&](const PlannedEpisodes& part) { return IsOfRule(part, rule, world); });
+}
+
+/// Those with episodes; where there is none of the one that the rule names, or none at all, those still to come too.
+std::vector<std::string> PoliciesOf(const GateRule& rule, const GateData& data) {
+  std::vector<std::string> known = data.candidate.Policies();
+  if (!known.empty() && (rule.policy.empty() || std::ranges::find(known, rule.policy) != known.end())) return known;
+  std::set<std::string> all(known.begin(), known.end());
+  for (const PlannedEpisodes& part : data.missing) all.insert(PolicyLabel(part.policy, part.checkpoint));
+  return {all.begin(), all.end()};
+}
+
 void DemandComparable(const GateSides& sides, const GateRule& rule, const GateData& data, const std::string& what) {
   if (!rule.ComparesPairs()) {
     DemandOneTask(sides.candidate, "", what);
     DemandOneTask(sides.baseline, " in the baseline", what);
-    DemandSame(sides.candidate.cells.front()->task, sides.baseline.cells.front()->task, what + "task");
+    if (!sides.candidate.cells.empty())
+      DemandSame(sides.candidate.cells.front()->task, sides.baseline.cells.front()->task, what + "task");
   }
   for (const PinnedCell* cell : sides.candidate.cells) {
     if (data.baseline->tasks.contains(cell->task))
@@ -140,7 +153,7 @@ void DemandComparable(const GateSides& sides, const GateRule& rule, const GateDa
   if (!rule.ComparesPairs()) return;
   const std::string& world = sides.world;
   DemandSame(data.candidate.worlds.at(world), data.baseline->worlds.at(world), what + "profile of world " + world);
-  DemandSameStates(sides, rule.test == GateTest::kSavi, what);
+  DemandSameStates(sides, rule.test == GateTest::kSavi || IsAwaited(rule, data, world), what);
 }
 
 std::vector<Count> Values(const std::map<std::pair<std::string, std::string>, Count>& map) {
@@ -186,14 +199,25 @@ void Add(bool now, bool then, PairedOutcomes& outcomes) {
 
 }  // namespace
 
+void GateSide::Add(const PinnedCell& cell) {
+  cells.push_back(&cell);
+  episodes += static_cast<std::int64_t>(cell.outcomes.size());
+  errors += std::ranges::count(cell.outcomes, Outcome::kError, &PinnedOutcome::outcome);
+}
+
+bool IsOfRule(const PlannedEpisodes& part, const GateRule& rule, const std::string& world) {
+  return part.world == world && (rule.task.empty() || part.task == rule.task) &&
+         (rule.policy.empty() || PolicyLabel(part.policy, part.checkpoint) == rule.policy);
+}
+
 GateSides SidesOf(const GateRule& rule, const GateData& data) {
   const std::string what = fmt::format("gate rule '{}': ", rule.name);
   GateSides sides;
   sides.world = Chosen(rule.world, Keys(data.candidate.worlds), what + "world");
   const bool may_be_all = !rule.Compares() && rule.test != GateTest::kCiLower && rule.policy.empty();
-  const std::string policy = may_be_all ? "" : Chosen(rule.policy, data.candidate.Policies(), what + "policy");
+  const std::string policy = may_be_all ? "" : Chosen(rule.policy, PoliciesOf(rule, data), what + "policy");
   sides.candidate = SideOf(data.candidate, rule, sides.world, policy);
-  if (sides.candidate.cells.empty())
+  if (sides.candidate.cells.empty() && !IsAwaited(rule, data, sides.world))
     throw InvalidInput("{}found no episode of {}{} in {}, wanted some", what, policy.empty() ? "any policy" : policy,
                        rule.task.empty() ? "" : " on task '" + rule.task + "'", sides.world);
   if (!rule.Compares()) return sides;

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "core/statistics/rate_difference.h"
+#include "core/store.h"
 #include "reports/gate_baseline.h"
 #include "reports/gate_decision.h"
 #include "reports/gate_rules.h"
@@ -16,6 +17,7 @@ namespace evac {
 struct GateData {
   const PinnedResult& candidate;
   const PinnedResult* baseline = nullptr;  ///< null: none was given
+  std::vector<PlannedEpisodes> missing = {};  ///< of the candidate: MissingOf its plan
 };
 
 /// One policy in one world, a cell per task.
@@ -23,6 +25,9 @@ struct GateSide {
   std::string policy;  ///< empty: all of them, where the rule is about no policy
   std::vector<const PinnedCell*> cells;
   std::int64_t episodes = 0, errors = 0;
+
+  /// @param cell  outlives this.
+  void Add(const PinnedCell& cell);
 };
 
 struct GateSides {
@@ -30,10 +35,14 @@ struct GateSides {
   GateSide candidate, baseline;  ///< baseline empty where the rule does not compare
 };
 
+/// Whether a part of the suite's plan is of the rule's task and policy (empty: of any) in such a world.
+bool IsOfRule(const PlannedEpisodes& part, const GateRule& rule, const std::string& world);
+
+/// Where episodes of the rule are missing, the candidate may have a part of the baseline's initial states, or no cell.
 /// @throws InvalidInput naming the rule: a policy, world or task that is not there or is not named where there are
 /// several; no baseline; another task page than the baseline's, or another scene, stop rule, picture size, chunk size
 /// or latency, as far as both sides know theirs (PinnedResult); for pairs another list of initial states or another
-/// world profile (a sequential rule may have seen only a part of its states yet); without pairs more than one task on
+/// world profile (of a sequential rule the states may be a part); without pairs more than one task on
 /// either side, or not the same.
 GateSides SidesOf(const GateRule& rule, const GateData& data);
 

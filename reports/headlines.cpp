@@ -147,8 +147,8 @@ Headline Trusted(const ReportData& report) {
   }
   const bool one = report.trust.size() == 1 && report.unsaid.empty();
   headline.question =
-      fmt::format("Can I trust {} to within ±{:.0f} points?", one ? report.trust[0].world : "the other worlds",
-                  100 * report.trust[0].options.margin);
+      fmt::format("Can I trust {} to within ±{}?", one ? report.trust[0].world : "the other worlds",
+                  GivenPoints(report.trust[0].options.margin));
   std::size_t left_out = 0;
   for (const TrustReport& trust : report.trust) {
     for (const TaskTrust& task : trust.tasks) {

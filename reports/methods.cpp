@@ -112,8 +112,8 @@ std::string Worlds(const ReportData& report) {
   for (const TrustReport& trust : report.trust) {
     text += fmt::format(
         "{} is trusted on a task where the {:.0f} % interval of its bias against {} (Tango, on effective pairs) lies "
-        "within ±{:.0f} points. ",
-        trust.world, 100 * trust.options.confidence, trust.real, 100 * trust.options.margin);
+        "within ±{}. ",
+        trust.world, 100 * trust.options.confidence, trust.real, GivenPoints(trust.options.margin));
   }
   if (!report.stages.partings.empty()) {
     text +=

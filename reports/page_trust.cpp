@@ -82,9 +82,9 @@ std::string TrustPart(const ReportData& report) {
     html += fmt::format(
         "<h3>May {} stand for the real world?</h3><p class=\"quiet\">Held against {}. <b>Yes</b>: the whole interval "
         "of "
-        "its bias lies within ±{:.0f} points (shaded); <b>no</b>: all of it lies outside; else <b>unknown</b>. Left of "
+        "its bias lies within ±{} (shaded); <b>no</b>: all of it lies outside; else <b>unknown</b>. Left of "
         "0 {} is harder than real, right of it kinder. McNemar asks whether there is any bias at all.</p>",
-        Escaped(trust.world), Escaped(trust.real), 100 * trust.options.margin, Escaped(trust.world));
+        Escaped(trust.world), Escaped(trust.real), GivenPoints(trust.options.margin), Escaped(trust.world));
     html += TaskTable(trust) + PredictedRates(trust);
   }
   for (const auto& [world, reason] : report.unsaid)

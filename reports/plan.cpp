@@ -65,6 +65,7 @@ void Check(const PlanOptions& o) {
   Require(inside(o.promise.power), "power", o.promise.power, "between 0 and 1");
 }
 
+/// Of what came out; what was asked for is said as it was given (GivenPoints).
 std::string InPoints(double share) { return fmt::format("{:.0f} points", 100 * share); }
 
 PlanRow Row(std::string key, std::string question, const Number& value, std::string shown, std::string method) {
@@ -91,7 +92,7 @@ void AddRates(const PlanOptions& o, std::vector<PlanRow>& rows) {
   for (const double wanted : {0.1, 0.05}) {
     const std::int64_t n = TrialsForHalfWidth(o.rate, wanted, Confidence(o));
     rows.push_back(Row(fmt::format("episodes_for_{:.0f}_points", 100 * wanted),
-                       fmt::format("episodes for ± {} at that rate", InPoints(wanted)), static_cast<double>(n),
+                       fmt::format("episodes for ± {} at that rate", GivenPoints(wanted)), static_cast<double>(n),
                        std::to_string(n), "Wilson"));
   }
 }
@@ -112,7 +113,7 @@ void AddDifferences(const PlanOptions& o, std::vector<PlanRow>& rows) {
                      fmt::format("smallest difference that {} episodes of each see, unpaired", o.trials), detectable,
                      detectable ? InPoints(*detectable) : "", "normal approximation"));
   rows.push_back(SizeRow("non_inferiority_pairs",
-                         fmt::format("initial states to show \"not worse by {}\", paired", InPoints(o.margin)),
+                         fmt::format("initial states to show \"not worse by {}\", paired", GivenPoints(o.margin)),
                          PairsForNonInferiority(*o.flips, o.margin, o.promise), "normal approximation, one-sided"));
   rows.push_back(SizeRow("non_inferiority_episodes", fmt::format("episodes of each policy to show that, unpaired"),
                          TrialsForNonInferiority(o.rate, o.margin, o.promise), "normal approximation, one-sided"));
@@ -172,7 +173,7 @@ std::vector<std::string> Words(const PlanOptions& o, const std::vector<PlanRow>&
         fmt::format("To see a difference of {} with {} power, run both policies on the same {} initial states; on "
                     "different ones it "
                     "takes {} episodes of each.",
-                    InPoints(o.difference), Percent(o.promise.power), paired.shown, unpaired.shown));
+                    GivenPoints(o.difference), Percent(o.promise.power), paired.shown, unpaired.shown));
   }
   const double power = *At(rows, "paired_power").value;
   words.push_back(

@@ -122,7 +122,7 @@ Json TaskJson(const TaskTrust& task, const TrustReport& report) {
 }  // namespace
 
 std::string TrustStatement(const TaskTrust& task, const TrustReport& report) {
-  const std::string margin = fmt::format("±{:.0f} points", 100 * report.options.margin), evidence = Evidence(task);
+  const std::string margin = "±" + GivenPoints(report.options.margin), evidence = Evidence(task);
   switch (task.trust) {
     case Trust::kYes:
       return fmt::format("yes: {}'s rate is within {} of the real one ({})", report.world, margin, evidence);

@@ -8,35 +8,43 @@
 namespace evac {
 namespace {
 
-std::string Points(double share) {
-  const double percent = 100 * share;
-  const bool near_end = (percent > 0 && percent < 0.5) || (percent < 100 && percent > 99.5);
-  return near_end ? fmt::format("{:.1f}", percent) : fmt::format("{:.0f}", percent);
-}
+constexpr double kRounding = 1e-9;  // per cent: so near to 0 or 100 an end is only by its arithmetic
+
+/// One rounding for all that is said of a difference. No -0.
+double WholePoints(double difference) { return std::round(100 * difference) + 0.0; }
 
 }  // namespace
 
-std::string Percent(double share) { return Points(share) + " %"; }
+std::string PercentDigits(double share) {
+  const double percent = 100 * share;
+  const bool near_none = percent > kRounding && percent <= 0.5;
+  const bool near_all = percent < 100 - kRounding && percent >= 99.5;
+  if (near_none || near_all) return fmt::format("{:.1f}", std::clamp(percent, 0.1, 99.9));
+  return fmt::format("{:.0f}", percent);
+}
+
+std::string Percent(double share) { return PercentDigits(share) + " %"; }
 
 std::string PercentWithInterval(const Estimate& rate) {
   if (!rate.value) return "undefined: " + rate.value.reason();
   if (!rate.interval) return fmt::format("{} (interval undefined: {})", Percent(*rate.value), rate.interval.reason());
-  return fmt::format("{} [{}, {}]", Percent(*rate.value), Points(rate.interval->low), Points(rate.interval->high));
+  return fmt::format("{} [{}, {}]", Percent(*rate.value), PercentDigits(rate.interval->low),
+                     PercentDigits(rate.interval->high));
 }
 
 std::string PointsWithInterval(const Estimate& difference) {
-  const auto points = [](double share) { return fmt::format("{:.0f}", std::round(100 * share) + 0.0); };
+  const auto points = [](double share) { return fmt::format("{:.0f}", WholePoints(share)); };
   if (!difference.value) return "undefined: " + difference.value.reason();
-  const double value = std::round(100 * *difference.value);
+  const double value = WholePoints(*difference.value);
   const std::string text =
       value == 0 ? "0 points" : fmt::format("{:+.0f} {}", value, std::abs(value) == 1 ? "point" : "points");
   if (!difference.interval) return text + " (interval undefined: " + difference.interval.reason() + ")";
   return fmt::format("{} [{}, {}]", text, points(difference.interval->low), points(difference.interval->high));
 }
 
-std::string SignedPoints(double difference) {
-  return fmt::format("{:+.0f}", std::nearbyint(100 * difference) + 0.0);
-}
+std::string SignedPoints(double difference) { return fmt::format("{:+.0f}", WholePoints(difference)); }
+
+std::string GivenPoints(double share) { return fmt::format("{:g} points", 100 * share); }
 
 std::string NumberWithInterval(const Estimate& estimate) {
   if (!estimate.value) return "undefined: " + estimate.value.reason();

@@ -131,7 +131,9 @@ void CheckLearnedFrom(const train::ShardSet& set, const TrainedFor& trained, con
   if (shards.statistics) trained.CheckStatistics(*shards.statistics, who);
 }
 
-/// A packing as SHARDS, whose latents are what a world model imagines of its clips; shards.json comes last.
+/// A packing as SHARDS, whose latents are what a world model imagines of its clips; shards.json comes last. Where
+/// another world model's latents are replaced, it goes first: killed half way, the folder holds both, and nothing reads
+/// it.
 ExitCode Imagine(const EncodeArguments& arguments) {
   const std::filesystem::path from = arguments.shards, to = arguments.imagined;
   if (std::filesystem::exists(to) && std::filesystem::equivalent(from, to))
@@ -147,6 +149,7 @@ ExitCode Imagine(const EncodeArguments& arguments) {
                   arguments.steps, Config::FromFile(arguments.config).ContentHash());
   MakeFolders(to);
   const RunLock lock(to / "lock");
+  if (std::filesystem::exists(to / "shards.json")) LinkInto(to, from / "shards.json");  // refuses another packing's
   std::size_t shards = 0;
   std::atomic<std::size_t> imagined = 0;
   for (const train::Split split : {train::Split::kTrain, train::Split::kHoldout}) {
@@ -162,6 +165,7 @@ ExitCode Imagine(const EncodeArguments& arguments) {
       const std::filesystem::path shard = set.shards()[i].path, own = to / shard.filename();
       LinkInto(to, shard);
       if (train::IsEncoded(own, {codec, Sha256HexOfFile(shard), products, config.vae.scale_factor})) return;
+      std::filesystem::remove(to / "shards.json");
       train::WriteImaginedLatents(model, set, i, to, products, {.steps = arguments.steps});
       ++imagined;
       fmt::print(stderr, "{}: imagined, {} of {} of this split\n", train::LatentsPath(own).string(), i + 1,

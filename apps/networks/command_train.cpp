@@ -44,7 +44,7 @@ ExitCode WriteJob(const TrainArguments& arguments, const std::string& section, t
   TrainingProgress progress(stderr);
   const train::JobPlace place = PlaceOf(arguments, progress);
   CheckHoldouts(place.shards);
-  if (job.kind == train::TrainingKind::kCodec) train::CheckCodecTraining(place, job.codec);
+  if (job.kind == train::TrainingKind::kCodec) train::CheckCodecTraining(place, job.codec, arguments.init);
   else train::CheckWorldTraining(place, job.world, job.start);
   job.config = place.config;
   job.begun_with = place.begun_with;

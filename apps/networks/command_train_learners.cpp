@@ -40,7 +40,7 @@ struct ShardJudgeData {
   ShardJudgeData(const TrainArguments& arguments, const train::JobPlace& place)
       : codec(CodecOf(arguments, place)),
         learn(place.shards, train::Split::kTrain, codec ? &*codec : nullptr),
-        holdout(place.shards, train::Split::kHoldout, codec ? &*codec : nullptr),
+        holdout(train::EachOnce(place.shards), train::Split::kHoldout, codec ? &*codec : nullptr),
         data{learn, holdout, arguments.init} {}
 
   std::optional<ShardCodec> codec;

@@ -108,7 +108,8 @@ JudgeSplit SplitForJudge(const JudgeClips& clips, const JudgeTrainingOptions& op
   JudgeSplit split;
   for (const PackedClip& clip : clips) {
     const bool calibrates = SplitMix64(SeedFor(seed, clip.state)).Uniform() < options.calibration;
-    (calibrates ? split.calibration : split.fit).push_back(clip);
+    if (!calibrates) split.fit.push_back(clip);
+    if (calibrates && !clip.is_again) split.calibration.push_back(clip);
   }
   RequireBothOutcomes(split.fit, "learn from");
   RequireBothOutcomes(split.calibration, "calibrate with");

@@ -48,6 +48,7 @@ void RequireBothOutcomes(const JudgeClips& clips, const char* to);
 struct JudgeSplit {
   JudgeClips fit, calibration;
 };
+/// @param clips  of them those that are there again (PackedClip::is_again) calibrate no second time
 /// @throws InvalidInput if either part has outcomes of one kind alone.
 JudgeSplit SplitForJudge(const JudgeClips& clips, const JudgeTrainingOptions& options);
 

@@ -239,6 +239,20 @@ std::string RecipeOf(const PackArguments& arguments, const Packing& packing) {
   return Sha256Hex(all + "\n" + StatisticsPage(packing.clip.statistics));
 }
 
+/// The tasks, sorted. Metadata have them with commas between them: a name with one in it would be two tasks' there.
+std::vector<std::string> TasksOf(const std::vector<PackSource>& sources) {
+  std::vector<std::string> tasks;
+  for (const PackSource& source : sources) {
+    if (source.task.find(',') != std::string::npos)
+      throw InvalidInput("{}: its task is called '{}', wanted a name without a comma: rename the task's folder",
+                         source.folder.string(), source.task);
+    tasks.push_back(source.task);
+  }
+  std::sort(tasks.begin(), tasks.end());
+  tasks.erase(std::unique(tasks.begin(), tasks.end()), tasks.end());
+  return tasks;
+}
+
 Packing Plan(const PackArguments& arguments) {
   const nn::ModelConfig config = ReadEvacConfig(arguments.config);
   if (!arguments.cameras.empty() && std::ssize(arguments.cameras) != config.views)
@@ -253,9 +267,7 @@ Packing Plan(const PackArguments& arguments) {
   LeaveOutOtherRobots(packing);
   SayLeftOut(packing);
   packing.arms_read = ArmsRead(arguments.arms, packing.sources);
-  for (const PackSource& source : packing.sources) packing.tasks.push_back(source.task);
-  std::sort(packing.tasks.begin(), packing.tasks.end());
-  packing.tasks.erase(std::unique(packing.tasks.begin(), packing.tasks.end()), packing.tasks.end());
+  packing.tasks = TasksOf(packing.sources);
   SayGrippers(packing);
   MeasureMotion(arguments, packing);
   PlanShards(arguments, packing);

@@ -28,8 +28,8 @@ struct PackArguments {
 
 /// Turns recordings into the shards that `out` does not have yet (docs/formats/shards.md); says on stderr how far it is
 /// and what was left out.
-/// @throws InvalidInput if `cameras` are not as many as the page's views, no recording can be packed, or `out` holds
-///   another packing.
+/// @throws InvalidInput if `cameras` are not as many as the page's views, no recording can be packed, a task's name has
+///   a comma, or `out` holds another packing.
 void Pack(const PackArguments& arguments);
 
 }  // namespace evac

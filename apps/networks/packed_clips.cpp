@@ -107,7 +107,13 @@ PackedSet::PackedSet(const train::ShardFolders& folders, train::Split split) : s
     of_folder[page.parent_path()] = ReadRecordings(page);  // as its shards' paths say it, without a last slash
   }
   std::vector<at::Tensor> ids;
-  for (const train::Shard& shard : shards.shards()) ids.push_back(ClipIds(shard.path));
+  std::vector<bool> is_again;
+  std::set<std::filesystem::path> seen;
+  for (const train::Shard& shard : shards.shards()) {
+    ids.push_back(ClipIds(shard.path));
+    const auto folder = std::filesystem::weakly_canonical(shard.path.parent_path());
+    is_again.push_back(!seen.insert(folder / shard.path.filename()).second);
+  }
   std::vector<std::int64_t> in_shard(shards.shards().size(), 0);
   for (const train::Clip& clip : shards.clips()) {
     const Recordings& recordings = of_folder.at(shards.shards()[clip.shard].path.parent_path());
@@ -118,7 +124,8 @@ PackedSet::PackedSet(const train::ShardFolders& folders, train::Split split) : s
       throw InvalidInput("{}: a clip of recording {} and task {}, wanted below {} and {}",
                          shards.shards()[clip.shard].path.string(), recording, clip.task, recordings.states.size(),
                          tasks.size());
-    clips.push_back({clip, recording, "", recordings.states[at], recordings.behaviours[at], recordings.fates[at]});
+    clips.push_back({clip, recording, "", recordings.states[at], recordings.behaviours[at], recordings.fates[at],
+                     is_again[clip.shard]});
   }
 }
 

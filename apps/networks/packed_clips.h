@@ -16,6 +16,7 @@ struct PackedClip : train::Clip {
   std::string state;           ///< recordings that began alike share it: what data is split by
   std::string behaviour;       ///< entry of the collection's mix; empty where nobody collected it
   std::string fate;            ///< judges/attempt.h; empty where unknown
+  bool is_again = false;       ///< its folder was named before: drawn from once more, measured with no second time
 };
 
 /// One split of some packings, the clips in the order of the shards.

@@ -82,11 +82,15 @@ bool IsImitated(const PackedClip& clip, const std::set<std::string>& wanted) {
 
 /// @throws InvalidInput: none of the clips is imitated.
 [[noreturn]] void RefuseToImitateNothing(const PackedSet& set, const std::string& behaviours) {
+  const bool measures = set.shards.split() == train::Split::kHoldout;
+  const std::string of = measures ? " of the hold-out of " + set.shards.FolderNames() : "";
+  const char* wanted = measures ? "; wanted a larger `evac pack --holdout`, or another --seed" : "";
   if (NamesIn(behaviours).empty())
-    throw InvalidInput("policy training: each of {} clips is a failure or has a single frame", set.clips.size());
+    throw InvalidInput("policy training: each of {} clips{} is a failure or has a single frame{}", set.clips.size(), of,
+                       wanted);
   const bool robots = std::ranges::any_of(set.clips, [](const PackedClip& clip) { return clip.outcome < 0; });
-  throw InvalidInput("policy training: none of {} clips is a success of behaviours '{}'{}", set.clips.size(),
-                     behaviours,
+  throw InvalidInput("policy training: none of {} clips{} is a success of behaviours '{}'{}{}", set.clips.size(), of,
+                     behaviours, wanted,
                      robots ? "; a robot's recordings have no behaviour and no outcome: all are imitated with "
                               "`behaviours: \"\"`"
                             : "");

@@ -37,7 +37,8 @@ class PolicyTraining {
  public:
   /// @param set  outlives this
   /// @param codec  whose latents of `set` are open, or null; outlives this
-  /// @throws InvalidInput if nothing in it is worth imitating; for an option out of range, as TensorError does.
+  /// @throws InvalidInput if nothing in it is worth imitating, saying of a hold-out that it is one; for an option
+  ///   out of range, as TensorError does.
   PolicyTraining(const PackedSet& set, const PolicyOptions& options, const ShardCodec* codec);
 
   at::Tensor Loss(const LearnedNet& net, const train::StepPlace& place) const;

@@ -24,6 +24,7 @@ ExitCode RunTraining(const TrainArguments& arguments, const TrainingKind& kind, 
   Options options;
   ReadTrainingPage(arguments.training, kind.section, arguments.settings, SettingsOf(options));
   Override(arguments, options.job.trainer);
+  train::CheckOptions(options.job.trainer);  // before OUT is made, and threads are shared out among the parts of a step
   const CatchInterrupts catch_interrupts;
   TrainingProgress progress(stderr);
   const train::JobPlace place = PlaceOf(arguments, progress);

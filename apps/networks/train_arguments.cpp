@@ -41,7 +41,10 @@ std::string HowItWent(const train::TrainerSummary& summary) {
 }  // namespace
 
 void AddShared(CLI::App& command, const std::shared_ptr<TrainArguments>& arguments) {
-  command.add_option("SHARDS", arguments->shards, "folders of `evac pack` (docs/formats/shards.md); one that is named twice counts twice")
+  command
+      .add_option("SHARDS", arguments->shards,
+                  "folders of `evac pack` (docs/formats/shards.md); one that is named twice is drawn from twice as "
+                  "often")
       ->required()
       ->check(CLI::ExistingDirectory);
   AddTraining(command, arguments);
@@ -130,6 +133,11 @@ ExitCode End(const train::TrainerSummary& summary, const std::filesystem::path& 
                "nothing was left to do: the training in {} is planned for {} steps and has done them; more --steps go "
                "on for longer\n",
                out.string(), summary.steps);
+  else if (summary.steps_now == 0)
+    fmt::print(stderr,
+               "nothing was left to do: the training in {} had ended after {} steps, {}, which is its `patience`; "
+               "--set patience=N with a larger N goes on\n",
+               out.string(), summary.step, summary.why);
   fmt::print("{}: {} after {} steps{}\n", (out / file).string(), summary.why, summary.step, HowItWent(summary));
   return ExitCode::kOk;
 }

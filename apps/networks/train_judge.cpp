@@ -226,7 +226,9 @@ void CalibrateJudge(const train::JobPlace& place, const JudgeTrainingOptions& gi
   RequireBothOutcomes(data.learn.clips, "calibrate with");
   const ClassifierShape shape = ShapeOf(data.learn, options);
   const Learners<ClassifierNet> learners(shape, options.job.trainer.seed, 1, BeginningOf(place, shape, options, data.init));
-  const Judged judged = MeasureAll(learners.net(), data, data.learn.clips, options);
+  JudgeClips once = data.learn.clips;
+  std::erase_if(once, [](const PackedClip& clip) { return clip.is_again; });
+  const Judged judged = MeasureAll(learners.net(), data, once, options);
   Say(place, judged);
   TensorMetadata card = CardText(judged, data, options, {{"steps", "0"}});
   card.erase("longest_frames");  // these clips taught the weights nothing
@@ -236,6 +238,8 @@ void CalibrateJudge(const train::JobPlace& place, const JudgeTrainingOptions& gi
 
 train::TrainerSummary TrainJudge(const train::JobPlace& place, const JudgeTrainingOptions& given,
                                  const JudgeData& data) {
+  CheckJudgeOptions(given);
+  train::CheckOptions(given.job.trainer);
   JudgeTrainingOptions options = given;
   CheckSides(data.learn.height_px, data.learn.width_px);
   CheckInit(data, options);

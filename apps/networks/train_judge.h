@@ -13,8 +13,8 @@ struct JudgeData {
 };
 
 /// Writes OUT/judge.safetensors with the weights of `data.init`, not trained on: temperature and threshold are chosen
-/// anew on all of `data.learn`, and what it is worth is measured on the hold-out. How long a clip may be and at how many
-/// places it looks stay as its card has them, whatever `given` says.
+/// anew on all of `data.learn`, each clip once, and what it is worth is measured on the hold-out. How long a clip may
+/// be and at how many places it looks stay as its card has them, whatever `given` says.
 /// @throws InvalidInput, TensorError naming an option that is out of range (CheckJudgeOptions); InvalidInput if
 ///   `data.init` is of other tasks or views, if `data.learn` has not clips of both outcomes, or for CheckSides.
 void CalibrateJudge(const train::JobPlace& place, const JudgeTrainingOptions& given, const JudgeData& data);
@@ -23,7 +23,8 @@ void CalibrateJudge(const train::JobPlace& place, const JudgeTrainingOptions& gi
 /// Where the clips have a codec, `reconstructed_share` of them are shown as it gives them back, which is how a world
 /// model's clips look. An interrupted training writes none.
 /// @param place  of it `shards` and `config` are not read
-/// @throws InvalidInput for pictures whose sides are no multiples of 8 (CheckSides), and as CalibrateJudge
+/// @throws InvalidInput for pictures whose sides are no multiples of 8 (CheckSides), and as CalibrateJudge; TensorError
+///   for the trainer's options that make no training
 train::TrainerSummary TrainJudge(const train::JobPlace& place, const JudgeTrainingOptions& options,
                                  const JudgeData& data);
 

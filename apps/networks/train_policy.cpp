@@ -47,10 +47,11 @@ void CheckKept(const std::filesystem::path& folder, const std::vector<std::int64
 
 train::TrainerSummary TrainPolicy(const train::JobPlace& place, const PolicyOptions& given, const ShardCodec* codec,
                                   const std::vector<std::int64_t>& keep_steps) {
+  train::CheckOptions(given.job.trainer);
   PolicyOptions options = given;
   PackedSet set(place.shards, train::Split::kTrain);
   CheckSides(set.shards.height_px(), set.shards.width_px());
-  const PackedSet holdout(place.shards, train::Split::kHoldout);
+  const PackedSet holdout(train::EachOnce(place.shards), train::Split::kHoldout);
   if (codec) codec->Open(set.shards);
   const LearnedShape shape{set.tasks, set.cameras, ArmsOf(set), static_cast<int>(set.shards.height_px()),
                            static_cast<int>(set.shards.width_px())};

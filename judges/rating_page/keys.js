@@ -19,6 +19,16 @@ function capDigits() {
   document.querySelectorAll('[data-digit]').forEach(cap => cap.replaceWith(digitCap(Number(cap.dataset.digit))));
 }
 
+/** Which stage, flag or view a key stands for, from 0; -1: none. To the right hand the keypad has the digits that buttons show, and no others. */
+function digitOf(code) {
+  if (isRightHanded()) {
+    const right = rightDigits.indexOf(code.replace('NumpadSubtract', 'Minus').replace('Numpad', 'Digit'));
+    if (right >= 0 || code.startsWith('Numpad')) return right;
+  }
+  const digit = /^(?:Digit|Numpad)([1-9])$/.exec(code);
+  return digit ? Number(digit[1]) - 1 : -1;
+}
+
 function openHelp() {
   rating.player?.video.pause();
   const hand = make('input', {type: 'checkbox', id: 'hand'});
@@ -84,9 +94,8 @@ function onRateScreen(event) {
   const isButton = event.target.matches('button, summary') && (event.key === ' ' || event.key === 'Enter');
   if (isButton) return false;
   const code = isBracketByAlt(event) ? '' : event.code;
-  const digit = /^(?:Digit|Numpad)([1-9])$/.exec(code), right = isRightHanded() ? rightDigits.indexOf(code) : -1;
-  if (right >= 0) return onDigit(right, event.shiftKey, player), true;
-  if (digit) return onDigit(Number(digit[1]) - 1, event.shiftKey, player), true;
+  const digit = digitOf(code);
+  if (digit >= 0) return onDigit(digit, event.shiftKey, player), true;
   if (event.key === '?') return openHelp(), true;
   let key = event.key.length === 1 ? event.key.toUpperCase() : event.key;
   if (isRightHanded() && rightHand[key]) key = rightHand[key];

@@ -1,25 +1,54 @@
 // Verdicts wait on disk (IndexedDB) until the server has said that they are on its disk; order is kept.
 // Another study that was or is served at this address may have entries here too: they are left alone.
-const outbox = {waiting: [], isSending: false, isStopped: false, database: null, listeners: []};
+const outbox = {waiting: [], isSending: false, isStopped: false, database: null, reopening: null, listeners: []};
 
 function openOutbox() {
   return new Promise(resolve => {
     if (!('indexedDB' in window)) return resolve(null);
     const asked = indexedDB.open('evac-rating', 1);
     asked.onupgradeneeded = () => asked.result.createObjectStore('outbox', {keyPath: 'at', autoIncrement: true});
-    asked.onsuccess = () => resolve(asked.result);
+    asked.onsuccess = () => { asked.result.onclose = reopenOutbox; resolve(asked.result); };
     asked.onerror = () => resolve(null);  // private windows: memory alone
   });
 }
 
-function inOutbox(mode, act) {
-  if (!outbox.database) return Promise.resolve(null);
+/** Fails where the browser has closed what was open: a tab that was in the background, site data that were cleared. */
+function transact(mode, act) {
   return new Promise(resolve => {
     const transaction = outbox.database.transaction('outbox', mode);
     const asked = act(transaction.objectStore('outbox'));
     transaction.oncomplete = () => resolve(asked.result);
     transaction.onerror = transaction.onabort = () => resolve(null);
   });
+}
+
+/** @returns null if the disk has not done it, never a refusal: what waits is in memory as well. */
+async function inOutbox(mode, act) {
+  await outbox.reopening;
+  if (!outbox.database) return null;
+  try {
+    return await transact(mode, act);
+  } catch (error) {
+    await reopenOutbox();
+    return outbox.database ? transact(mode, act).catch(() => null) : null;
+  }
+}
+
+/** What waits is on disk again after it, under the numbers that it had: nothing is there twice, and nobody else gets them. */
+function reopenOutbox() {
+  outbox.reopening ||= (async () => {
+    outbox.database = await Promise.race([openOutbox().catch(() => null), sleep(3000)]) || null;
+    for (const entry of [...outbox.waiting]) await keep(entry, transact);
+    outbox.reopening = null;
+  })();
+  return outbox.reopening;
+}
+
+/** An entry with a number (`at`) is on disk; one without is in memory alone. */
+async function keep(entry, within = inOutbox) {
+  const {resolve, reject, answered, ...plain} = entry;
+  const at = await within('readwrite', store => store.put(plain)).catch(() => null);
+  if (at === null) delete entry.at; else entry.at = at;
 }
 
 /** Entries without a study are of a page that knew of one alone. */
@@ -47,9 +76,7 @@ async function send(path, body) {
   const entry = {path, body, study: outbox.study, rater: outbox.rater};
   entry.answered = new Promise((resolve, reject) => { entry.resolve = resolve; entry.reject = reject; });
   entry.answered.catch(() => {});
-  const {resolve, reject, answered, ...plain} = entry;
-  const at = await inOutbox('readwrite', store => store.add(plain));
-  if (at !== null) entry.at = at;
+  await keep(entry);
   outbox.waiting.push(entry);
   sayUnsent();
   flush();

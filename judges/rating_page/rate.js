@@ -1,5 +1,5 @@
 // The screen that matters: one clip, one verdict.
-const rating = {player: null, clip: null, film: null, isBusy: false, done: 0, sinceBreak: 0, breakAt: Date.now(), prefetched: null, last: null, turn: 0, held: null};
+const rating = {player: null, clip: null, film: null, isBusy: false, done: 0, sinceBreak: 0, breakAt: Date.now(), prefetched: null, last: null, turn: 0, held: null, aside: null};
 
 /** The next clip and its bytes. What was fetched ahead comes first: so a rater goes on while the line is down. That nothing is left is
     never believed of an answer from before: it left out the clips in hand, and whoever dropped one since would not be asked of it. */
@@ -37,7 +37,10 @@ async function rate() {
   try {
     const ready = await nextClip();
     if (turn !== rating.turn) return;
-    if (ready.clip.done) return session.me.role === 'adjudicator' ? adjudicated() : finished();
+    if (ready.clip.done) {
+      session.me.progress = ready.clip.progress;
+      return session.me.role === 'adjudicator' ? adjudicated() : finished();
+    }
     if (!ready.source) return unplayable(ready.clip, ready.problem);
     showClip(ready.clip, ready.source);
   } catch (error) {
@@ -74,6 +77,37 @@ function goOn() {
   if (!rating.isBusy && !rating.player.isCovered(session.me.cover)) rating.player.play();
 }
 
+/** Another clip is changed first: what was seen of this one and what was marked waits until the server gives it again. */
+function setAside() {
+  if (!rating.player || rating.isOver || rating.isBusy || rating.isOpen) return;
+  rating.player.rest();
+  clearInterval(rating.beat);
+  if (rating.aside) forgetAside();
+  const {player, clip, source, scrub, answer, film, stages, flags, cause, confidence, note, saidCovered} = rating;
+  rating.aside = {player, clip, source, scrub, answer, film, stages, flags, cause, confidence, note, saidCovered, nodes: [...$('#screen').childNodes]};
+  rating.player = rating.source = null;  // whoever comes next closes neither
+}
+
+function forgetAside() {
+  rating.aside.player.close();
+  URL.revokeObjectURL(rating.aside.source);
+  rating.aside = null;
+}
+
+function putBack() {
+  const {nodes, ...state} = rating.aside;
+  Object.assign(rating, state, {aside: null, isBusy: false, isOver: false, isOpen: false, supersedes: null});
+  show(...nodes).className = 'rate';
+  rating.player.back();
+  capDigits();  // another hand may have come meanwhile
+  sayUnsent();
+  keepPlace();
+  fetchAhead();
+  refresh();
+  speak(headline(rating.clip));
+  if (!rating.player.isCovered(session.me.cover)) rating.player.play();
+}
+
 /** After a verdict: the next clip; to somebody who went to the menu meanwhile it comes with Go on. */
 function moveOn() {
   if (rating.held) return closeClip();
@@ -87,9 +121,22 @@ function keepPlace() {
   rating.beat = setInterval(beat, 60000);
 }
 
-function showClip(clip, source) {
+function fetchAhead() {
+  const held = inHand();
+  if (rating.clip.kind !== 'clip' || held.length > mostHeld) return;
+  const ahead = fetchNext(held);
+  ahead.catch(() => {});
+  rating.prefetched = ahead;
+}
+
+/** @param isOpen  it was rated before: what is said of it now is a change. */
+function showClip(clip, source, isOpen = false) {
   closeClip();
-  Object.assign(rating, {clip, source, isBusy: false, stages: 0, flags: new Set(), cause: '', confidence: 0, note: '', film: null, isOpen: false, supersedes: null,
+  if (rating.aside?.clip.presentation === clip.presentation) {
+    URL.revokeObjectURL(source);
+    return putBack();
+  }
+  Object.assign(rating, {clip, source, isBusy: false, stages: 0, flags: new Set(), cause: '', confidence: 0, note: '', film: null, isOpen, supersedes: null,
     isOver: false, saidCovered: false});
   const resumed = JSON.parse(sessionStorage.getItem('evac-clip') || 'null');
   const player = new Player(clip, source, refresh, why => unplayable(clip, why));
@@ -103,12 +150,7 @@ function showClip(clip, source) {
   player.isolate(-1);
   player.play();
   keepPlace();
-  const held = inHand();
-  if (clip.kind === 'clip' && held.length <= mostHeld) {
-    const ahead = fetchNext(held);
-    ahead.catch(() => {});
-    rating.prefetched = ahead;
-  }
+  fetchAhead();
   refresh();
   speak(`${headline(clip)}. ${clip.rubric.instruction}`);
   if (clip.verdict) fill(clip.verdict);
@@ -214,7 +256,7 @@ function column(clip) {
 function refresh() {
   const player = rating.player;
   if (!player || !$('.rate')) return;
-  if (!rating.isBusy) sessionStorage.setItem('evac-clip', JSON.stringify({presentation: player.clip.presentation, time: player.time, seen: player.seen.join('')}));
+  if (!rating.isBusy && !rating.isOpen) sessionStorage.setItem('evac-clip', JSON.stringify({presentation: player.clip.presentation, time: player.time, seen: player.seen.join('')}));
   rating.scrub.refresh();
   const isCovered = player.isCovered(session.me.cover) || rating.isOpen, may = isCovered && !rating.isBusy && !session.isOther;
   document.querySelectorAll('.verdict').forEach(button => { button.disabled = !may; });
@@ -277,7 +319,7 @@ async function decide(label) {
   refresh();
   const {answered} = await send('/api/verdict', body);
   if (clip.kind === 'adjudication') return compare(clip, answered);
-  sessionStorage.removeItem('evac-clip');
+  if (!isOpen) sessionStorage.removeItem('evac-clip');  // of a change it is of the clip that waits
   if (clip.kind === 'practice') return learn(clip, answered);
   if (!isOpen) rating.done++, rating.sinceBreak++;
   rating.last = {uuid, clip};

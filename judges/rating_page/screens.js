@@ -58,11 +58,13 @@ function join(invite) {
   screen.className = 'centred';
 }
 
+const isByTouch = () => !matchMedia('(any-pointer: fine)').matches;
+
 /** Is this a place where clips can be seen and keys reached? Said, never enforced. */
 function screenCheck() {
   const hints = [];
   if (Math.min(innerWidth, innerHeight) < 600) hints.push('This is a small screen; a larger one shows more. It works here too, by touch.');
-  if (!matchMedia('(any-pointer: fine)').matches) hints.push('No mouse or keyboard seems to be here. Every key has a button as well.');
+  if (isByTouch()) hints.push('No mouse or keyboard seems to be here. Every key has a button as well.');
   const video = document.createElement('video');
   if (!video.canPlayType('video/mp4; codecs="avc1.640028"')) hints.push('This browser may not play the clips (H.264). Chrome, Edge, Safari and Firefox do.');
   return hints.length ? make('.notice', {}, hints.map(hint => make('p', {}, hint))) : null;
@@ -84,7 +86,8 @@ async function brief() {
     examples.length ? make('section', {}, make('h2', {}, 'Examples'), make('.examples', {}, examples.map(example))) : null,
     make('section', {}, make('h2', {}, 'How'),
       make('p', {}, `Watch at least ${Math.round(100 * session.me.cover)} % of a clip and its end; then press `, make('kbd', {}, 'S'), ' success, ', make('kbd', {}, 'F'),
-        ' failure or ', make('kbd', {}, 'U'), ' if it cannot be told. Digits mark the stages that were reached. ', make('kbd', {}, '?'), ' shows every key. ', make('kbd', {}, 'Z'), ' undoes.')),
+        ' failure or ', make('kbd', {}, 'U'), ' if it cannot be told. Digits mark the stages that were reached. ', make('kbd', {}, '?'), ' shows every key. ', make('kbd', {}, 'Z'), ' undoes.'),
+      isByTouch() ? make('p', {}, 'By touch: tap Success, Failure or Can’t tell, and the stages that were reached. After a verdict Undo is there for some seconds.') : null),
     make('.row', {}, make('button.primary', {type: 'button', onclick: rate}, left ? `Practise on ${plural(left, 'clip')}` : 'Rate clips'))));
   screen.className = 'centred';
   $('.primary', screen).focus({preventScroll: true});
@@ -138,12 +141,18 @@ function openMenu() {
   pause();
 }
 
-/** The end for now: first the question about origins, then what was recorded. */
+/** How much a rater is asked in all, as things are. */
+const askedInAll = progress => progress.total + progress.practice_left;
+
+/** The end for now, unless there is more since the server said so: clips that were added are given to who asks who they are. First the
+    question about origins, then what was recorded. */
 async function finished() {
   closeClip();
+  const before = askedInAll(session.me.progress);
+  const me = session.me = {...session.me, ...await patiently(() => get('/api/me'))};
+  if (askedInAll(me.progress) > before) return rate();
   const {clips} = await patiently(() => get('/api/guesses'));
   if (clips.length) return guess(clips[0], clips.length);
-  const me = session.me = {...session.me, ...await patiently(() => get('/api/me'))};
   const screen = show(make('.sheet', {}, make('h1', {}, 'Thank you'),
     make('p.big', {}, `${plural(me.progress.done, 'clip')} rated`),
     make('p', {}, 'There is nothing left for you now. If clips are added later, the same page shows them.'),
@@ -227,8 +236,8 @@ async function reopen(verdict) {
     const source = await patiently(() => fetchClip(verdict.presentation));
     rating.prefetched = null;
     rating.turn++;
-    showClip(clip, source);
-    rating.isOpen = Boolean(clip.verdict);  // undone meanwhile: it is asked as if for the first time
+    setAside();
+    showClip(clip, source, Boolean(clip.verdict));  // undone meanwhile: it is asked as if for the first time
     rating.supersedes = clip.verdict?.id;
     refresh();
   } catch (error) {

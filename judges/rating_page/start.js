@@ -32,5 +32,5 @@ window.addEventListener('unhandledrejection', event => {
   if (event.reason instanceof Offline) return;
   toast(`Something went wrong: ${event.reason?.message || event.reason}. Your answers are kept.`, {name: 'Reload', act: () => location.reload()}, 30);
 });
-window.addEventListener('beforeunload', event => { if (outbox.waiting.length && !outbox.database) event.preventDefault(); });
+window.addEventListener('beforeunload', event => { if (outbox.waiting.some(entry => entry.at === undefined)) event.preventDefault(); });
 start();

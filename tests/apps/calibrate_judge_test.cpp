@@ -1,13 +1,17 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
+
 #include "apps/networks/judge_shard_clips.h"
 #include "apps/networks/learners.h"
 #include "apps/networks/train_judge.h"
 #include "core/error.h"
+#include "core/file.h"
 #include "core/weight_file.h"
 #include "judges/judge_card.h"
 #include "tests/apps/learning_shards.h"
+#include "tests/apps/printed.h"
 #include "tests/support/temp_folder.h"
 
 /// What becomes of a judge's card where another one goes on from it, and what calibrating refuses.
@@ -127,6 +131,23 @@ TEST_F(CalibrateJudgeTest, ClipsWhoseSidesAreNoMultiplesOfEightAreRefused) {
   EXPECT_THAT([&] { CalibrateJudge(Place("out"), {}, {learn, holdout, folder_ / "odd.safetensors"}); },
               ThrowsMessage<Error>(HasSubstr("pictures are 24x20, wanted multiples of 8")));
   EXPECT_FALSE(std::filesystem::exists(folder_ / "out"));
+}
+
+/// Each clip was measured as often as its folder was named, and the card said twice the clips.
+TEST_F(CalibrateJudgeTest, ClipsOfAFolderThatIsNamedTwiceAreMeasuredOnce) {
+  const ShardClips once = Learn(), twice({shards_, shards_ / ""}, train::Split::kTrain, nullptr);
+  ASSERT_EQ(twice.clips.size(), 2 * once.clips.size());
+  JudgeTrainingOptions options;
+  options.calibration = 0.3;
+  options.job.trainer.seed = 3;
+  const JudgeSplit of_one = SplitForJudge(once.clips, options), of_two = SplitForJudge(twice.clips, options);
+  EXPECT_EQ(of_two.fit.size(), 2 * of_one.fit.size()) << "drawn from twice as often";
+  EXPECT_EQ(of_two.calibration.size(), of_one.calibration.size());
+  Printed(AddTrain, {"train", "judge", shards_.string(), (shards_ / "").string(), "--init", Given({}).string(),
+                     "--calibrate-only", "--out", (folder_ / "out").string()});
+  EXPECT_EQ(std::ranges::count(ReadFile(folder_ / "out" / "judged.csv"), '\n'),
+            1 + std::ssize(once.clips) + std::ssize(holdout_.clips));
+  EXPECT_EQ(CardOf("out").at("holdout_clips"), std::to_string(holdout_.clips.size()));
 }
 
 TEST_F(CalibrateJudgeTest, OptionsOutOfRangeAreRefusedAsByTraining) {

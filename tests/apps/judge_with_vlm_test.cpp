@@ -6,6 +6,7 @@
 #include <signal.h>
 
 #include <atomic>
+#include <filesystem>
 #include <fstream>
 #include <nlohmann/json.hpp>
 #include <utility>
@@ -155,6 +156,20 @@ TEST_F(ASmallServer, ABudgetIsForTheRunHoweverOftenTheCommandIsCalled) {
   EXPECT_THAT(judge, over) << "eight are spent, and one for whether it sees";
   EXPECT_THAT(judge, over);
   EXPECT_EQ(server_.Seen().size(), asked + 4) << "who it is and whether it sees, each time";
+}
+
+/// What was paid for already was counted again, and named a price.
+TEST_F(ASmallServer, WhatTheCacheAnswersIsNoRequestThatIsStillToCome) {
+  std::ofstream(page_, std::ios::app) << "clip: {frames: 6, tail_frames: 0, long_side_px: 64}\n";
+  EXPECT_THAT(Judge(false, true), HasSubstr("2 clips, 8 requests"));
+  EXPECT_FALSE(std::filesystem::exists(run_.folder() / "judge_calls.sqlite")) << "who only asks makes no file";
+  Judge();
+  const std::size_t asked = server_.Seen().size();
+  EXPECT_THAT(Judge(true, true), HasSubstr("0 clips, 0 requests"));
+  EXPECT_THAT(Judge(true, true, true), HasSubstr("2 clips, 6 requests")) << "a retest goes past the cache";
+  EXPECT_EQ(server_.Seen().size(), asked);
+  Judge(true);
+  EXPECT_EQ(server_.Seen().size(), asked + 2) << "and so it is: only who it is and whether it sees";
 }
 
 TEST_F(ASmallServer, IsAskedAnewWhereThatIsWanted) {

@@ -179,12 +179,63 @@ TEST_F(Resolving, ALabelThatTakesTheOneOfAnotherStudyIsSaidToAndNoneIsTakenBack)
   RateAll(bob, "failure");
   EXPECT_THAT(Resolve().warnings, testing::Contains(StartsWith("1 label of judge human instead of another study's")));
   EXPECT_EQ(Told().at("human").label, Label::kFailure);
-  EXPECT_EQ(Told().at("human").reason, "majority: 0 success, 2 failure, 0 cannot tell (study study)");
+  EXPECT_EQ(Told().at("human").reason,
+            fmt::format("majority: 0 success, 2 failure, 0 cannot tell (study study, id {})", store.Id()));
   EXPECT_THAT(Resolve().warnings, testing::Not(testing::Contains(testing::HasSubstr("another study"))));
   say_again();
   for (AtTheDesk* rater : {&ann, &bob}) desk.Withdraw(rater->Me(), {.keep = false, .erase = false}, 9);
   Resolve();
   EXPECT_EQ(Told().at("human").label, Label::kSuccess) << "who left this study says nothing of the other's label";
+}
+
+/// They had one signature, the name: the second one's labels took the first one's place without a word, r1 of one was
+/// r1 of the other, and whose raters had left took back what the other one says.
+TEST_F(Resolving, TwoStudiesOfOneNameAreToldApart) {
+  const TempFolder elsewhere;
+  const StudyOptions options{.runs = {study.run().folder()}, .raters_per_clip = 2, .height_px = 64};
+  MakeStudy(elsewhere / "study", options, [](std::size_t, std::size_t) {});
+  StudyStore other = StudyStore::Open(elsewhere / "study", StudyStore::Mode::kReadWrite);
+  ASSERT_EQ(other.info().name, store.info().name);
+  RatingDesk other_desk(other, {.min_repeats = 0});
+  AtTheDesk ann(store, desk), bob(store, desk), cleo(other, other_desk), dan(other, other_desk);
+  ASSERT_EQ(Named(ann), Named(cleo)) << "the test tests nothing";
+  RateAll(ann, "failure");
+  RateAll(bob, "failure");
+  RateAll(cleo, "success");
+  RateAll(dan, "success");
+  Resolve(true);
+  const std::map<std::string, Verdict> before = Told();
+  EXPECT_THAT([&] { ResolveStudy(other, {.each_rater = true}); },
+              testing::ThrowsMessage<Error>(testing::AllOf(
+                  testing::HasSubstr("the vote of " + Named(ann)),
+                  testing::HasSubstr("another study that is named 'study'"),
+                  testing::HasSubstr("wanted a study of another name (evac rate new --name)"))));
+  EXPECT_EQ(Told().at("human").label, Label::kFailure) << "nothing is written then";
+  EXPECT_EQ(Told().at(Named(ann)).label, Label::kFailure);
+  EXPECT_THAT(ResolveStudy(other, {}).warnings,
+              testing::Contains(StartsWith("4 labels of judge human instead of another study's")));
+  EXPECT_EQ(Told().at("human").label, Label::kSuccess);
+  for (AtTheDesk* rater : {&ann, &bob}) desk.Withdraw(rater->Me(), {.keep = false, .erase = false}, 9);
+  Resolve();
+  EXPECT_EQ(Told().at("human").label, Label::kSuccess) << "who left this study takes nothing of the other one back";
+  EXPECT_EQ(Told().at(Named(ann)).reason, "no vote counts") << "but what they said themselves";
+  EXPECT_EQ(Told().size(), before.size());
+}
+
+/// By the name alone, as earlier versions signed.
+TEST_F(Resolving, ALabelThatIsSignedByNameAloneIsTheStudysOfThatName) {
+  const StudyClip clip = store.Clips().front();
+  Verdict before;
+  before.episode_id = clip.episode;
+  before.judge = "human";
+  before.label = Label::kSuccess;
+  before.reason = "majority: 2 success, 0 failure, 0 cannot tell (study study)";
+  Store::Open(clip.run, Store::Mode::kReadWrite).AddVerdict(before);
+  AtTheDesk ann(store, desk), bob(store, desk);
+  RateAll(ann, "failure");
+  RateAll(bob, "failure");
+  EXPECT_THAT(Resolve().warnings, testing::Not(testing::Contains(testing::HasSubstr("another study"))));
+  EXPECT_EQ(Told().at("human").label, Label::kFailure);
 }
 
 /// A run that was made anew in the same folder, with another checkpoint's file, has the same episode ids.

@@ -195,6 +195,23 @@ TEST_F(TrainCommand, TheEndSaysWhatWasNoNumber) {
   EXPECT_THAT(end(summary), AllOf(HasSubstr("best hold-out 0.5"), Not(HasSubstr("was a number"))));
 }
 
+/// More --steps did nothing, and what was said was what the training had said when it ended.
+TEST_F(TrainCommand, TheEndSaysThatPatienceHasEndedATrainingThatIsGoneOnWith) {
+  train::TrainerSummary summary;
+  summary.step = summary.steps_now = 30;
+  summary.steps = 100;
+  summary.why = "no better for 5 hold-outs";
+  const auto end = [&] {
+    testing::internal::CaptureStderr();
+    EXPECT_EQ(End(summary, "out", "codec.safetensors"), ExitCode::kOk);
+    return testing::internal::GetCapturedStderr();
+  };
+  EXPECT_EQ(end(), "");
+  summary.steps_now = 0;
+  EXPECT_THAT(end(), AllOf(HasSubstr("nothing was left to do"), HasSubstr("after 30 steps, no better for 5 hold-outs"),
+                           HasSubstr("--set patience=N"), Not(HasSubstr("--steps"))));
+}
+
 TEST_F(TrainCommand, KnowsWhatEachTrainingIsBegunWith) {
   const auto begun_with = [&](const std::function<void(TrainArguments&)>& change) {
     TrainArguments arguments;
@@ -242,6 +259,17 @@ TEST_F(TrainCommand, AnOptionTakesItsOwnValueAndNotTheFoldersBehindIt) {
     EXPECT_THAT([&] { Train({"policy", "--out", Path("policy"), "--keep-steps", steps, Path("shards"), "--steps", "2"}); },
                 is_read)
         << steps;
+}
+
+/// It was looked at when copies of the network were there: of no parts there is none, and the first was asked.
+TEST_F(TrainCommand, AStepOfNoPartsIsRefusedBeforeTheFolderIsMade) {
+  for (const char* kind : {"codec", "forecast", "judge", "policy"}) {
+    std::vector<std::string> words = {kind, Path("shards"), "--set", "accumulate=0", "--out", Path("out")};
+    if (*kind == 'c' || *kind == 'f') words.insert(words.end(), {"--config", Path("page.yaml")});
+    EXPECT_THAT([&] { Train(words); },
+                ThrowsMessage<TensorError>(HasSubstr("training: accumulate is 0.000000, wanted at least 1"))) << kind;
+    EXPECT_FALSE(std::filesystem::exists(Path("out"))) << kind;
+  }
 }
 
 TEST_F(TrainCommand, OptionsThatDoNothingAreRefused) {
@@ -434,6 +462,10 @@ TEST_F(TrainCommand, WhatATrainingWouldRefuseIsRefusedBeforeItsJobIsWritten) {
   };
   refused({"codec", "--set", "map_share=2"}, "codec training: map_share is 2, wanted 0 to 1");
   refused({"codec", "--set", "holdout_size=0"}, "holdout_size is 0, wanted at least 1");
+  refused({"codec", "--init", Path("shards/shard_00000.safetensors")}, "first_stage_model");
+  Replace("page.yaml", "vae: {channels: 32", "vae: {channels: 64");
+  refused({"codec", "--init", codec}, codec + ": first_stage_model");
+  Replace("page.yaml", "vae: {channels: 64", "vae: {channels: 32");
   refused({"world", "--codec", codec}, "shard_00000.safetensors has no latents");
   Encode();
   refused({"world", "--codec", codec}, "the page's pose_map wants 'radius_px=50 thickness_px=8'");

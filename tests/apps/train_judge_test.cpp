@@ -340,7 +340,7 @@ TEST(Moved, TheObjectStaysWhereThePicturesShowIt) {
 TEST_F(TrainJudgeTest, OptionsOutOfRangeAreRefusedByName) {
   const std::pair<std::string, double> wrong[] = {
       {"drop_view", 50}, {"jitter", -0.1}, {"mirror_share", 2}, {"reconstructed_share", -1}, {"object_weight", -1},
-      {"unsure", std::nan("")}, {"light", 2}, {"offset", -0.1}, {"blur_share", 25}};
+      {"unsure", std::nan("")}, {"light", 2}, {"offset", -0.1}, {"blur_share", 25}, {"calibration", 1.5}};
   for (const auto& [name, value] : wrong) {
     JudgeTrainingOptions options = Quick(2);
     for (const train::Setting& setting : SettingsOf(options)) {
@@ -349,6 +349,14 @@ TEST_F(TrainJudgeTest, OptionsOutOfRangeAreRefusedByName) {
     EXPECT_THAT([&] { Train(Place("wrong"), options); },
                 ThrowsMessage<TensorError>(HasSubstr("judge training: " + name + " is "))) << name;
   }
+}
+
+/// No copy of the network was made, and the first of none was trained.
+TEST_F(TrainJudgeTest, AStepOfNoPartsIsRefused) {
+  JudgeTrainingOptions options = Quick(2);
+  options.job.trainer.accumulate = 0;
+  EXPECT_THAT([&] { Train(Place("judge"), options); },
+              ThrowsMessage<TensorError>(HasSubstr("training: accumulate is 0")));
 }
 
 TEST_F(TrainJudgeTest, MovedAndMirroredClipsAreOtherClips) {

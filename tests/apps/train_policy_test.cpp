@@ -17,6 +17,7 @@
 namespace evac {
 namespace {
 
+using testing::AllOf;
 using testing::HasSubstr;
 using testing::ThrowsMessage;
 
@@ -113,6 +114,24 @@ TEST_F(TrainPolicyTest, OptionsOutOfRangeAreRefusedByName) {
   }
 }
 
+/// No copy of the network was made, and the first of none was trained.
+TEST_F(TrainPolicyTest, AStepOfNoPartsIsRefused) {
+  PolicyOptions options = Quick(2);
+  options.job.trainer.accumulate = 0;
+  EXPECT_THAT([&] { TrainPolicy(Place("policy"), options, nullptr, {}); },
+              ThrowsMessage<TensorError>(HasSubstr("training: accumulate is 0")));
+}
+
+/// Its hold-out counted twice too.
+TEST_F(TrainPolicyTest, AFolderThatIsNamedTwiceIsDrawnFromTwiceAndMeasuredOnce) {
+  train::JobPlace place = Place("policy");
+  place.shards = {folder_ / "shards", folder_ / "shards"};
+  std::string said;
+  place.say = [&](const std::string& line) { said += line + "\n"; };
+  TrainPolicy(place, Quick(1), nullptr, {});
+  EXPECT_THAT(said, HasSubstr("24 clips to imitate, 12 to measure with"));
+}
+
 /// It ended in the first step, in libtorch's words: "shape is invalid for input".
 TEST_F(TrainPolicyTest, PicturesWhoseSidesAreNoMultiplesOfEightAreRefusedBeforeTheFirstStep) {
   for (const auto& [height_px, width_px] : {std::pair(20, 24), std::pair(16, 28)}) {
@@ -155,6 +174,22 @@ TEST_F(TrainPolicyTest, ARobotsRecordingsWhoseOutcomeNobodyKnowsAreImitatedAndFa
   const PackedSet failures({folder_ / "shards"}, train::Split::kTrain);
   EXPECT_THAT([&] { PolicyTraining(failures, options, nullptr); },
               ThrowsMessage<Error>(HasSubstr("each of 24 clips is a failure")));
+}
+
+/// It was said of all clips, as if there were none to learn from, and named no way out.
+TEST_F(TrainPolicyTest, AHoldOutWithNothingToImitateIsSaidToBeTheHoldOut) {
+  const PackedSet set({folder_ / "shards"}, train::Split::kHoldout);
+  PolicyOptions options = Quick(1);
+  options.behaviours = "push";
+  const std::string of_holdout = "24 clips of the hold-out of " + (folder_ / "shards").string() + " is a ";
+  const auto refused = [&](const PackedSet& clips, const std::string& why) {
+    EXPECT_THAT([&] { PolicyTraining(clips, options, nullptr); },
+                ThrowsMessage<Error>(AllOf(HasSubstr(of_holdout + why), HasSubstr("`evac pack --holdout`"))));
+  };
+  refused(set, "success of behaviours 'push'");
+  MultiplyOutcomes(folder_ / "shards", 0);
+  options.behaviours = "";
+  refused(PackedSet({folder_ / "shards"}, train::Split::kHoldout), "failure");
 }
 
 TEST_F(TrainPolicyTest, TheCardKeepsTheCamerasOfTheShards) {

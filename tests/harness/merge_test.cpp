@@ -194,6 +194,15 @@ TEST_F(MergedRuns, SayWhichShardsCallsOfModelServersStayBehind) {
   EXPECT_THAT(summary.notes[0], testing::HasSubstr((b_.folder() / CallCache::kFile).string()));
 }
 
+TEST_F(MergedRuns, SayWhichShardsLogsStayBehind) {
+  MakeFolders(b_.folder() / "logs");
+  WriteFileAtomically(b_.folder() / "logs/mine@default.log", "out of memory");
+  const MergeSummary summary = Merge();
+  ASSERT_EQ(summary.notes.size(), 1u);
+  EXPECT_THAT(summary.notes[0], testing::HasSubstr((b_.folder() / "logs").string() + " is not merged"));
+  EXPECT_FALSE(std::filesystem::exists(folder_ / "merged/logs"));
+}
+
 /// A shard that was killed, or was none of those that were merged, was no loss to anybody.
 TEST_F(MergedRuns, SayHowManyEpisodesOfTheSuiteNoShardHas) {
   const PairKey& pair = key_.pair;

@@ -148,6 +148,29 @@ TEST_F(PolicyProcessTest, OneThatIsKilledIsSaidToBe) {
   EXPECT_THAT(*process.WhyGone(), HasSubstr("signal 11 (Segmentation fault)"));
 }
 
+/// "At last with signal 9 (Killed)": who looked for a kernel that was out of memory looked in vain.
+TEST_F(PolicyProcessTest, OneThatWasEndedForItsSilenceIsSaidToBe) {
+  PolicyProcessOptions options = Shell("echo loads; echo $$ > $FOLDER/self; exec sleep 1000");
+  options.restarts = 0;
+  PolicyProcess process(options);
+  PidIn("self");
+  ASSERT_TRUE(Eventually([&] {
+    process.Restart(std::chrono::steady_clock::now());
+    return process.WhyGone().has_value();
+  }));
+  EXPECT_EQ(*process.WhyGone(), "its process ended once within 60 s, at last by evac because it was silent: loads (" +
+                                    options.log.string() + ")");
+}
+
+TEST_F(PolicyProcessTest, OneThatLeavesWithCodeTwoWhenItIsEndedForItsSilenceIsStartedAgain) {
+  PolicyProcess process(Shell("trap 'exit 2' TERM; echo $$ > $FOLDER/self; while :; do sleep 0.01; done"));
+  const pid_t first = PidIn("self");
+  fs::remove(folder_ / "self");
+  process.Restart(std::chrono::steady_clock::now());
+  EXPECT_NE(PidIn("self"), first);
+  EXPECT_EQ(process.WhyGone(), std::nullopt);
+}
+
 TEST_F(PolicyProcessTest, ACommandThatDoesNotExistIsNotTriedAgain) {
   PolicyProcessOptions options = Shell("");
   options.command = {"no-such-policy", "--now"};

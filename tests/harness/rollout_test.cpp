@@ -314,6 +314,32 @@ TEST_F(Rollout, AnInterruptedRunKeepsWhatIsFinishedAndTheRestRunsLater) {
   EXPECT_EQ(Run(policy, rest, store).done, 3);
 }
 
+/// All that were to run again were removed at once: after an interrupt, also the reasons of those not tried yet.
+TEST_F(Rollout, AFailedEpisodeThatRunsAgainKeepsItsRowUntilTheNewTryIsOver) {
+  FaultyPolicy sick([](Acted, std::uint64_t) -> Acted { return Failure{StopReason::kPolicyError, "it broke"}; });
+  Store store = NewDeclaredStore("again");
+  Run(sick, Jobs(5), store);
+  const auto reasons = [&] {
+    std::vector<std::string> found;
+    for (const Episode& episode : store.Episodes()) {
+      found.push_back(episode.failure);
+      EXPECT_EQ(Sha256HexOfFile(store.folder() / episode.video), episode.video_sha256) << episode.key.Id();
+    }
+    return found;
+  };
+  WalkingPolicy policy;
+  options_.lanes = 2;
+  options_.interrupted = [chunks = 0]() mutable { return ++chunks > 20; };
+  EXPECT_EQ(Run(policy, Jobs(5), store).done, 2);
+  EXPECT_THAT(reasons(), testing::ElementsAre("", "", "it broke", "it broke", "it broke"));
+  options_.interrupted = nullptr;
+  std::vector<Job> rest = Jobs(5);
+  rest.erase(rest.begin(), rest.begin() + 2);
+  EXPECT_EQ(Run(policy, rest, store).done, 3);
+  EXPECT_THAT(reasons(), testing::Each(""));
+  EXPECT_THROW(Run(policy, Jobs(1), store), Error) << "one that has not failed stays";
+}
+
 TEST_F(Rollout, WhatTheDiskRefusesEndsTheRunAndIsNoEpisodesFailure) {
   WalkingPolicy policy;
   Store store = NewDeclaredStore("full");

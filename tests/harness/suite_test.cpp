@@ -295,6 +295,54 @@ TEST_F(SuiteTest, TheHashTakesAPolicysFilesByContentWhereverTheyLie) {
   EXPECT_NE(hash("b"), alike);
 }
 
+/// Python writes there as it first imports the modules: the run could not be resumed, nor merged with its other part.
+TEST_F(SuiteTest, WhatPythonWritesBesideAPolicysModulesIsInNoHash) {
+  std::filesystem::create_directories(folder_ / "mine/parts");
+  Write("mine/policy.py", "one"), Write("mine/parts/net.py", "one");
+  const auto path = Write("suite.yaml", kSuite);
+  const auto read = [&] { return ReadSuite(path, {"policies.0.files=[" + (folder_ / "mine").string() + "]"}); };
+  const Suite before = read();
+  const std::string policy = PolicyHash(before.policies[0]);
+  for (const std::string cache : {"mine/__pycache__", "mine/parts/__pycache__"}) {
+    std::filesystem::create_directory(folder_ / cache);
+    Write(cache + "/net.cpython-311.pyc", "bytes");
+  }
+  EXPECT_EQ(read().hash, before.hash);
+  EXPECT_EQ(PolicyHash(before.policies[0]), policy);
+  EXPECT_EQ(read().hashed_files.size(), before.hashed_files.size()) << "nobody looks at it again";
+  Write("mine/parts/net.py", "another");
+  EXPECT_NE(read().hash, before.hash);
+}
+
+TEST_F(SuiteTest, AFolderThatACommandNamesAndFilesDoesNotIsKnownButForTheSuitesOwn) {
+  std::filesystem::create_directory(folder_ / "weights");
+  const auto path = Write("suite.yaml", kSuite);
+  const auto unlisted = [&](const std::string& files) {
+    const Suite suite = ReadSuite(path, {"policies.0.command=[mine, weights/, --net=weights, ., --out=]", files});
+    return FilesInNoHash(suite, suite.policies[0]);
+  };
+  EXPECT_THAT(unlisted("policies.0.files=[]"), testing::ElementsAre("weights/", "weights"));
+  EXPECT_THAT(unlisted("policies.0.files=[" + (folder_ / "weights").string() + "]"), testing::IsEmpty());
+}
+
+/// A policy was compared with itself.
+TEST_F(SuiteTest, TwoPoliciesThatJoinOneProcessAndATokenThatNoChannelCanHoldAreRefused) {
+  const auto joining = [&](int port, const std::string& token) {
+    const auto join = [](const char* name, int at, int ttl, const std::string& word) {
+      return fmt::format("{{name: {}, join: {{url: \"udpm://239.255.76.67:{}?ttl={}\", token: \"{}\"}}}}", name, at,
+                         ttl, word);
+    };
+    return Complaint(std::string(kSuite), {"policies.0=" + join("a", 7700, 0, "mine"),
+                                           "policies.1=" + join("b", port, 1, token)});
+  };
+  EXPECT_THAT(joining(7700, "mine"), HasSubstr("field policies: 'join: {url: udpm://239.255.76.67:7700, token: mine}' "
+                                               "is there twice"));
+  EXPECT_EQ(joining(7701, "mine"), "no complaint");
+  EXPECT_EQ(joining(7700, "yours-2"), "no complaint");
+  for (const std::string token : {"my_policy", "", "a b", "abcdefghijklmnopqrstuvwxyz-0123456"})
+    EXPECT_THAT(joining(7701, token), AllOf(HasSubstr("join.token"), HasSubstr("letters, digits and '-'"))) << token;
+}
+
 TEST_F(SuiteTest, WhatIsPlannedIsHowManyJobsThereAre) {
   const Suite suite =
       ReadSuite(EVAC_SOURCE_DIR "/tests/system/small.yaml", {"seeds=[1, 2]", "worlds.1.initial_states=1"});

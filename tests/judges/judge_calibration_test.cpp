@@ -10,7 +10,7 @@ namespace {
 using testing::HasSubstr;
 using testing::Not;
 
-/// A run of one task in two worlds with verdicts of an oracle and of a judge, one letter an episode: s, f, ?, i.
+/// A run of two tasks in two worlds with verdicts of an oracle and of a judge, one letter an episode: s, f, ?, i.
 class Judged {
  public:
   Judged(const std::string& world, const std::string& truth, const std::string& judge, std::size_t states = 1000) {
@@ -18,11 +18,12 @@ class Judged {
   }
 
   /// @param states  of which there are so many, again and again
-  Judged& Add(const std::string& world, const std::string& truth, const std::string& judge, std::size_t states = 1000) {
+  Judged& Add(const std::string& world, const std::string& truth, const std::string& judge, std::size_t states = 1000,
+              const std::string& task = "take") {
     store_.AddWorld({world, "mujoco", world == "real", ""});
     for (std::size_t i = 0; i < truth.size(); ++i) {
       EpisodeRecord record;
-      record.episode.key = {{"take", std::to_string(i % states), "policy", "v1", 1 + i / states}, world};
+      record.episode.key = {{task, std::to_string(i % states), "policy", "v1", 1 + i / states}, world};
       record.episode.stop = StopReason::kStill;
       store_.Add(record);
       Say("oracle", record.episode.key, truth[i]);
@@ -49,9 +50,11 @@ class Judged {
   static Store Made(const std::filesystem::path& folder) {
     Store store = Store::InMemory(
         folder, {.suite_text = "suite: x", .suite_hash = "0", .suite_path = "x.yaml", .evac_version = "0"});
-    Task task;
-    task.id = "take";
-    store.AddTask(task);
+    for (const char* id : {"take", "place"}) {
+      Task task;
+      task.id = id;
+      store.AddTask(task);
+    }
     store.AddPolicy({"policy", "v1", "{}"});
     return store;
   }
@@ -169,6 +172,25 @@ TEST(JudgeCalibration, AWorldThatTheTruthWasNeverAskedAboutIsMissingToo) {
   for (int i = 0; i < 100; ++i)
     run.Say("human", {{"take", std::to_string(i), "policy", "v1", 1}, "real"}, "sf"[i % 2]);
   EXPECT_THAT(CalibrateJudge(run.store(), "vlm:x", "human").missing, testing::ElementsAre(HasSubstr("world sim: ")));
+}
+
+/// It was accepted for all tasks of a world by what was known of one of them.
+TEST(JudgeCalibration, ATaskThatTheTruthWasNeverAskedAboutIsMissingToo) {
+  Judged run("real", Times(50, "sf"), Times(50, "sf"));
+  run.Add("real", Times(20, "??"), Times(20, "sf"), 1000, "place");
+  for (int i = 0; i < 100; ++i)
+    run.Say("human", {{"take", std::to_string(i), "policy", "v1", 1}, "real"}, "sf"[i % 2]);
+  const JudgeCalibrationReport report = CalibrateJudge(run.store(), "vlm:x", "human");
+  EXPECT_THAT(report.missing, testing::ElementsAre("task place: 0 successes and 0 failures, wanted 60 items with 15 of "
+                                                   "each"));
+  EXPECT_THAT(Text(report), Not(HasSubstr("a gate may count this judge")));
+  Judged silent("real", Times(50, "sf"), Times(50, "sf"));
+  silent.Add("sim", "ss", "s?").Add("sim", "s", "?", 1000, "place");
+  silent.Say("human", {{"take", "0", "policy", "v1", 1}, "sim"}, 's');
+  for (int i = 0; i < 100; ++i)
+    silent.Say("human", {{"take", std::to_string(i), "policy", "v1", 1}, "real"}, "sf"[i % 2]);
+  for (const std::string& sentence : CalibrateJudge(silent.store(), "vlm:x", "human").missing)
+    EXPECT_THAT(sentence, Not(HasSubstr("task place"))) << "a gate counts nothing of it there";
 }
 
 TEST(JudgeCalibration, ProbesOfAJudgeThatWasShownFewerImagesAreFound) {

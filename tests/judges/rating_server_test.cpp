@@ -235,6 +235,13 @@ TEST_F(RatingServerTest, WhatIsMalformedTooLargeOrAmbiguousIsRefusedAndTheServer
   EXPECT_EQ(Get("/api/me", ann).status, 200);
 }
 
+/// On phones and tablets the help and the brief told of keys without their names.
+TEST_F(RatingServerTest, NoStyleHidesEveryKeysName) {
+  const std::string css = Get("/rating.css").body;
+  EXPECT_THAT(css, HasSubstr("button kbd"));
+  EXPECT_THAT(css, Not(HasSubstr("{kbd{display:none}")));
+}
+
 TEST_F(RatingServerTest, TextsAreKeptAsTheyAreAndDoNothing) {
   const std::string ann = Join();
   const std::int64_t epoch = Epoch(ann);
@@ -414,6 +421,31 @@ TEST(RatingServerBehindAProxy, IsFoundUnderItsNameHoweverThatWasWritten) {
   const std::string asked = "GET / HTTP/1.1\r\nConnection: close\r\nHost: ";
   EXPECT_EQ(RawExchange(server.port(), asked + "rate.lab.org\r\n\r\n").status, 200);
   EXPECT_EQ(RawExchange(server.port(), asked + "evil.example\r\n\r\n").status, 403);
+  server.Stop();
+  at_work.join();
+}
+
+/// nginx and Apache name the server that they pass to: whatever changed something was "from another site".
+TEST(RatingServerBehindAProxy, TakesWhatItsPageSendsThroughAProxyThatKeepsTheHostToItself) {
+  SmallStudy study(2);
+  const std::string link = NewSecret();
+  {
+    StudyStore store = study.Open();
+    store.AddInvite(link, RaterRole::kRater, 1);
+  }
+  RatingServerOptions options;
+  options.study = study.folder();
+  options.public_url = "https://Rate.Lab.org:443/";
+  RatingServer server(options);
+  std::thread at_work([&] { server.Serve(); });
+  const std::string body = json{{"invite", link}, {"uuid", NewSecret()}}.dump();
+  const auto join_from = [&](const std::string& origin) {  // PostJson says "Host: 127.0.0.1"
+    const std::string headers = "Origin: " + origin + "\r\nSec-Fetch-Site: same-origin\r\n";
+    return PostJson(server.port(), "/api/join", body, headers).status;
+  };
+  EXPECT_EQ(join_from("https://rate.lab.org.evil.example"), 403);
+  EXPECT_EQ(join_from("http://rate.lab.org"), 403) << "not as it is served";
+  EXPECT_EQ(join_from("https://rate.lab.org"), 200);
   server.Stop();
   at_work.join();
 }

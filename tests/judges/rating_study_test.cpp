@@ -75,6 +75,47 @@ TEST(RatingStudy, StatesAreDrawnOnceForAllRunsSoThatPairsStayPairs) {
   }
 }
 
+/// One more state, and all of them were drawn anew: the study had other states, and pairs were torn.
+TEST(RatingStudy, TheSameCommandLaterKeepsToTheStatesThatTheStudyHas) {
+  StoredRun run("begun", std::string(8, 's'), std::string(8, 'f'));
+  const fs::path folder = run.folder().parent_path() / "study";
+  const StudyOptions options{.runs = {run.folder()}, .height_px = 64, .states = 3};
+  const auto states_of = [&](int wave) {
+    std::set<std::string> states;
+    for (const StudyClip& clip : ClipsIn(folder)) {
+      if (clip.wave == wave) states.insert(clip.initial_state);
+    }
+    return states;
+  };
+  Make(folder, options);
+  const std::set<std::string> begun = states_of(1);
+  ASSERT_EQ(begun.size(), 3u);
+  for (int i = 0; i < 4; ++i) run.Add(fmt::format("42-{:04d}", i), 's', 's');
+  for (int i = 0; i < 8; ++i) run.AddEpisode({{"take", fmt::format("41-{:04d}", i), "pick", "1", 2}, "sim"}, 's');
+  EXPECT_EQ(Make(folder, options).clips, 3) << "one of each state that is in it";
+  EXPECT_EQ(states_of(2), begun);
+  StudyOptions more = options;
+  more.states = 5;
+  Make(folder, more);
+  EXPECT_EQ(states_of(3).size(), 2u) << "what is missing to five";
+  for (const std::string& state : states_of(3)) EXPECT_FALSE(begun.contains(state)) << state;
+}
+
+TEST(RatingStudy, WhichStatesAreDrawnIsNoMatterOfHowManyOthersThereAre) {
+  const StoredRun few("few", std::string(6, 's'), std::string(6, 'f'));
+  const StoredRun many("many", std::string(9, 's'), std::string(9, 'f'));
+  const auto drawn_of = [](const StoredRun& run) {
+    const fs::path folder = run.folder().parent_path() / "study";
+    Make(folder, {.runs = {run.folder()}, .height_px = 64, .states = 4});
+    std::set<std::string> states;
+    for (const StudyClip& clip : ClipsIn(folder)) states.insert(clip.initial_state);
+    return states;
+  };
+  const std::set<std::string> of_few = drawn_of(few);
+  for (const std::string& state : drawn_of(many))
+    EXPECT_TRUE(state >= "41-0006" || of_few.contains(state)) << state << ": one that came since has moved another in";
+}
+
 TEST(RatingStudy, OnlyStatesWithAClipAreDrawn) {
   StoredRun run("gaps", "sf", "fs");
   for (int i = 0; i < 10; ++i) {
@@ -269,6 +310,26 @@ TEST(RatingStudy, ATaskOfWhichNobodySaidWhatSuccessIsIsRefusedByNameBeforeAnythi
               testing::ThrowsMessage<Error>(testing::AllOf(
                   HasSubstr(run.folder().string() + ": task bare has no rubric"), HasSubstr("`rubric: {success: …}`"))));
   EXPECT_FALSE(fs::exists(folder));
+}
+
+/// Whoever marked the seventeenth lost the vote: the server took no such verdict.
+TEST(RatingStudy, ATaskWithMoreStagesThanAVerdictHoldsIsRefusedByName) {
+  StoredRun run("begun", "s", "f");
+  Task task = run.store().Tasks().front();
+  for (const int stages : {16, 17}) {
+    task.id = fmt::format("long_{}", stages);
+    task.rubric.stages.resize(static_cast<std::size_t>(stages));
+    for (int k = 0; k < stages; ++k) task.rubric.stages[static_cast<std::size_t>(k)].name = fmt::format("s{}", k);
+    run.store().AddTask(task);
+  }
+  const fs::path folder = run.folder().parent_path() / "study";
+  run.AddEpisode({{"long_16", "41-0000", "pick", "1", 1}, "real"}, 's');
+  EXPECT_EQ(Make(folder, {.runs = {run.folder()}, .height_px = 64}).clips, 3);
+  run.AddEpisode({{"long_17", "41-0000", "pick", "1", 1}, "real"}, 's');
+  EXPECT_THAT([&] { Make(folder, {.runs = {run.folder()}}); },
+              testing::ThrowsMessage<Error>(
+                  HasSubstr(run.folder().string() + ": the rubric of task long_17 has 17 stages, wanted at most 16")));
+  EXPECT_EQ(ClipsIn(folder).size(), 3u);
 }
 
 /// Of a task it ended with 4 in "map::at"; of a world, what was recorded in it was taken for a model's.

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <memory>
+#include <set>
 
 #include "core/seed.h"
 #include "judges/rating_board.h"
@@ -183,6 +184,53 @@ TEST(RatingTally, ClipsThatWereAddedAreThere) {
             [](std::size_t, std::size_t) {});
   tally.Read(store);
   EXPECT_EQ(tally.rated().size(), 10u);
+}
+
+/// Both were given the same clips in step, and the later word silently won.
+TEST(Adjudicators, WhoDecideAtOnceAreGivenDifferentClipsUntilOneAloneIsLeft) {
+  SmallStudy study(2, {.raters_per_clip = 2});
+  StudyStore store = study.Open();
+  RatingDesk desk(store, {.min_repeats = 0});
+  AtTheDesk ann(store, desk), bob(store, desk);
+  ann.RateAll([](const StudyClip&) { return "success"; });
+  bob.RateAll([](const StudyClip&) { return "failure"; });
+  ASSERT_EQ(store.Disputes().size(), 4u);
+  AtTheDesk eve(store, desk, RaterRole::kAdjudicator), fay(store, desk, RaterRole::kAdjudicator);
+  const auto given = [&](AtTheDesk& who) {
+    return store.FindPresentation(who.Next().body.at("presentation").get<std::string>())->clip;
+  };
+  const std::int64_t of_eve = given(eve), of_fay = given(fay);
+  EXPECT_NE(of_eve, of_fay);
+  EXPECT_EQ(given(eve), of_eve) << "a reload goes on there";
+  EXPECT_EQ(given(fay), of_fay);
+  for (int i = 0; i < 3; ++i) {
+    const std::string clip = eve.Next().body.at("presentation");
+    EXPECT_NE(store.FindPresentation(clip)->clip, of_fay);
+    eve.Say(clip, "success");
+    HumanVerdict last = eve.Watched(clip, "success");
+    last.supersedes = store.CurrentVerdict(clip)->id;
+    last.is_final = true;
+    ASSERT_EQ(eve.Say(last).status, 200);
+  }
+  EXPECT_EQ(given(eve), of_fay) << "nothing else is left";
+}
+
+TEST(Adjudicators, AClipWhoseLeaseIsOverIsAnyonesAgain) {
+  SmallStudy study(1, {.raters_per_clip = 2});
+  StudyStore store = study.Open();
+  RatingDesk desk(store, {.min_repeats = 0});
+  AtTheDesk ann(store, desk), bob(store, desk);
+  ann.RateAll([](const StudyClip&) { return "success"; });
+  bob.RateAll([](const StudyClip&) { return "failure"; });
+  AtTheDesk eve(store, desk, RaterRole::kAdjudicator), fay(store, desk, RaterRole::kAdjudicator);
+  const auto given = [&](AtTheDesk& who) {
+    return store.FindPresentation(who.Next().body.at("presentation").get<std::string>())->clip;
+  };
+  const std::int64_t first = given(eve);
+  fay.now_ms += 600'001;
+  EXPECT_EQ(given(fay), first);
+  eve.now_ms = fay.now_ms;
+  EXPECT_NE(given(eve), first) << "it is fay's by now";
 }
 
 }  // namespace

@@ -136,6 +136,29 @@ TEST(VlmClient, AWrongKeyEndsEverythingAtOnceAndIsNotRepeatedInTheMessage) {
   }
 }
 
+/// The rest of the run was stored as errors, one episode after another, and never asked about again.
+TEST(VlmClient, CreditThatIsUsedUpEndsEverythingAtOnce) {
+  Talk talk({Answer(402, R"({"error": {"message": "Insufficient credits"}})")});
+  EXPECT_EQ(talk.Ask().trouble, VlmOutcome::kHttpError);
+  EXPECT_THAT(talk.client().WhyOver().value_or("it goes on"), HasSubstr("status 402: Insufficient credits"));
+  talk.Ask();
+  EXPECT_EQ(talk.Seen().size(), 1u) << "nothing more is sent";
+}
+
+TEST(VlmClient, AStatusThatNobodyForesawIsOneOfTheTroublesInARow) {
+  for (const int status : {301, 405, 410, 451}) {
+    Talk talk({Answer(status, "{}")});
+    for (int i = 0; i < 10; ++i) EXPECT_EQ(talk.Ask().attempts, 1) << "it is not asked again";
+    EXPECT_EQ(std::count(talk.waits_s().begin(), talk.waits_s().end(), 60), 1) << status;
+    EXPECT_FALSE(talk.client().WhyOver());
+    talk.Ask();
+    EXPECT_THAT(talk.client().WhyOver().value_or("it goes on"), HasSubstr("in a row failed, also after a pause"));
+  }
+  Talk refused({Answer(422, "{}")});
+  for (int i = 0; i < 12; ++i) refused.Ask();
+  EXPECT_FALSE(refused.client().WhyOver()) << "of that request alone";
+}
+
 TEST(VlmClient, AfterTenTroublesInARowItPausesOnceAndThenGivesUp) {
   Talk talk({Answer(500, "oops")});
   EXPECT_EQ(talk.Ask().attempts, 6);

@@ -334,6 +334,29 @@ TEST_F(VlmJudgeTest, OfflineAnEpisodeWithoutAnAnswerIsLeftOut) {
   EXPECT_TRUE(server_->Seen().empty());
 }
 
+/// Of the full request the cache has a failed call alone: the episode was left out, and its paid answers with it.
+TEST_F(VlmJudgeTest, OfflineTheAnswersToFewerImagesAreFoundToo) {
+  const auto at_most_eight = [](const SeenRequest& request) {
+    return Images(request) > 8 ? AtMostEight() : Saying(Content("success"), "stop", 900);
+  };
+  for (const VlmProbe probe : {VlmProbe::kNone, VlmProbe::kFlip}) {
+    const Verdict asked = Rate(at_most_eight, {.probe = probe});
+    const Verdict found = Rate(at_most_eight, {.probe = probe, .offline = true});
+    EXPECT_EQ(found.label, Label::kSuccess) << found.reason;
+    EXPECT_EQ(found.judge, asked.judge);
+    EXPECT_THAT(found.judge, testing::EndsWith(":small"));
+    EXPECT_TRUE(server_->Seen().empty());
+  }
+  config_.clip = {.frames = 4, .tail_frames = 0, .long_side_px = 224};  // there is nothing smaller to look for
+  try {
+    Rate(at_most_eight, {.offline = true});
+    ADD_FAILURE() << "nothing is in the cache";
+  } catch (const Error& error) {
+    EXPECT_STREQ(error.kind(), "not_judged");
+    EXPECT_THAT(error.what(), HasSubstr("no answer in the cache"));
+  }
+}
+
 TEST_F(VlmJudgeTest, AWrongKeyEndsTheRunAndNothingIsStored) {
   try {
     Rate([](const SeenRequest&) { return Answer(401, R"({"error": {"message": "bad key"}})"); });

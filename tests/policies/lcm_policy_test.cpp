@@ -114,6 +114,19 @@ TEST_F(LcmPolicyTest, DeclarationsThatDoNotFitEndTheRunWithBothSideBySide) {
   }
 }
 
+/// It was called by its own name alone, under which no suite knows it.
+TEST_F(LcmPolicyTest, OneThatDoesNotFitIsCalledAsTheSuiteCallsIt) {
+  const LcmAddress address = wire::OwnAddress();
+  wire::ProbePolicy probe;
+  wire::Served served(probe, wire::ProbeSpec(), address);
+  LcmPolicyOptions options = Patient(address);
+  options.who = "policy mine@step-4000";
+  LcmPolicy policy(options);
+  EXPECT_THAT([&] { policy.Handshake(HarnessSpec(wire::TwoCameraTask(), 8), 30); },
+              testing::ThrowsMessage<Error>(testing::StartsWith(
+                  "policy mine@step-4000, which declares itself as probe@c1, does not fit this run:\n")));
+}
+
 TEST_F(LcmPolicyTest, SilenceAtTheHandshakeSaysWhereItListened) {
   const LcmAddress address = wire::OwnAddress();
   LcmPolicy policy(Patient(address));
@@ -386,25 +399,6 @@ TEST_F(LcmPolicyTest, AnAnswerAfterTheDeadlineIsLateAndHarmsNoOther) {
   policy.Reset(0, wire::TwoCameraTask(), 1);
   EXPECT_EQ(Told(Ask(policy, {0}, wire::TwoCameraTask())[0]), "chunk");
   EXPECT_EQ(Count(policy.counters(), "late_replies"), 1);
-}
-
-TEST_F(LcmPolicyTest, OneThatIsSilentForAWholeDeadlineIsRestartedAndOneThatAnswersOthersIsNot) {
-  const LcmAddress address = wire::OwnAddress();
-  std::atomic<bool> is_mute = false;
-  wire::RawServer server(address, [&](LcmLink& link, const observation_t& header) {
-    if (!is_mute && header.episode == 0) link.Publish(address.Channel("chunk"), wire::RawServer::Honest(header));
-  });
-  int restarts = 0;
-  LcmPolicyOptions options = Firm(address);
-  options.restart = [&](auto) { ++restarts; };
-  LcmPolicy policy(options);
-  policy.Reset(0, wire::TwoCameraTask(), 1);
-  policy.Reset(1, wire::TwoCameraTask(), 1);
-  EXPECT_THAT(Told(Ask(policy, {0, 1}, wire::TwoCameraTask())[1]), HasSubstr("policy_timeout"));
-  EXPECT_EQ(restarts, 0);
-  is_mute = true;
-  EXPECT_THAT(Told(Ask(policy, {0}, wire::TwoCameraTask())[0]), HasSubstr("policy_timeout"));
-  EXPECT_EQ(restarts, 1);
 }
 
 TEST_F(LcmPolicyTest, OneThatLeavesSeveralWaitingIsRestartedOnceAndAgainIfItGoesOn) {

@@ -288,6 +288,17 @@ TEST(Fidelity, RecordingsThatFailedAreNotCountedAsReplayed) {
   EXPECT_THAT(none, Not(HasSubstr("not a single chunk")));
 }
 
+/// 199 of 200 were 100 % here, and nowhere else.
+TEST(Fidelity, ThePageSaysAllOfAllAlone) {
+  FidelityInput input;
+  const std::string real = std::string(100, 's') + std::string(100, 'f'), model = real.substr(0, 199) + "s";
+  Add(input.rows, "closed_loop", "good", real, real, model);
+  const std::string page = FidelityPage(FidelityOf(std::move(input)));
+  EXPECT_THAT(page, HasSubstr("agreement 99.5 % <span class=\"quiet\">["));
+  EXPECT_THAT(page, HasSubstr("(reality against itself 100 % <span class=\"quiet\">[98, 100]</span>)"));
+  EXPECT_THAT(page, HasSubstr("<td class=\"num\">99.5 %</td>")) << "its cell";
+}
+
 TEST(Fidelity, ThePageEscapesWhatASuiteCalledItsPolicies) {
   FidelityInput input = Sample();
   for (FidelityRow& row : input.rows) row.pair.policy = "<script>alert(1)</script>";

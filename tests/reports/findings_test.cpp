@@ -1,7 +1,10 @@
 #include "reports/findings.h"
 
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+
+#include <string>
 
 #include "reports/report_data.h"
 #include "reports/headlines.h"
@@ -151,6 +154,34 @@ TEST(Wording, NothingLooksMorePerfectThanItIs) {
   EXPECT_EQ(Percent(0.001), "0.1 %");
   EXPECT_EQ(Percent(0), "0 %");
   EXPECT_EQ(PValue(0.0001), "p < 0.001");
+}
+
+/// 199 of 200 were 100 %, 1 of 200 was 0 %; 9996 of 10000 were 100.0 %.
+TEST(Wording, AllAndNoneAreSaidOfAllAndNoneAlone) {
+  EXPECT_EQ(Percent(199.0 / 200), "99.5 %");
+  EXPECT_EQ(Percent(1.0 / 200), "0.5 %");
+  EXPECT_EQ(Percent(0.9996), "99.9 %");
+  EXPECT_EQ(Percent(0.0003), "0.1 %");
+  EXPECT_EQ(Percent(1), "100 %");
+  EXPECT_EQ(Percent(1 - 1e-15), "100 %") << "an interval's end, by its arithmetic";
+  EXPECT_EQ(Percent(1e-15), "0 %");
+  EXPECT_EQ(Percent(0.006), "1 %");
+  EXPECT_EQ(Percent(0.994), "99 %");
+}
+
+/// One went to the even neighbour, the other away from 0: a page's row and its tooltip named two numbers.
+TEST(Wording, ADifferenceIsTheSameNumberWhereverItIsSaid) {
+  for (const double share : {0.125, -0.125, 0.375, -0.625, 0.005, -0.005}) {
+    Estimate difference;
+    difference.value = share;
+    difference.interval = Interval{share, share};
+    const std::string said = PointsWithInterval(difference);
+    const int alone = std::stoi(SignedPoints(share));
+    EXPECT_EQ(alone, std::stoi(said)) << said;
+    EXPECT_THAT(said, HasSubstr(fmt::format("[{0}, {0}]", alone)));
+  }
+  EXPECT_EQ(SignedPoints(0.125), "+13");
+  EXPECT_EQ(SignedPoints(-0.125), "-13");
 }
 
 TEST(Wording, UndefinedIsAReasonAndNotADigit) {

@@ -4,6 +4,7 @@
 
 #include <cmath>
 
+#include "core/error.h"
 #include "core/statistics/special.h"
 #include "reports/gate.h"
 #include "reports/gate_data.h"
@@ -127,6 +128,61 @@ TEST(GateStates, ARunThatIsNotWholeIsDecidedByNoRuleButABet) {
   EXPECT_THAT(DecidedOf(part, "test: savi").statement, Not(HasSubstr("are there")));
 }
 
+/// Its states were "another list than the baseline's", with the advice to ask an unpaired rule instead.
+TEST(GateStates, ARunThatWasBrokenOffIsAPartOfTheBaselinesStatesAndNoOtherList) {
+  const auto decided = [](std::size_t states, std::int64_t planned, const std::string& test) {
+    RunSummary run = RepeatedRun({{"easy", "p", {}, {std::string(states, 's')}}});
+    run.data.plan = {{"easy", "sim", "p", "c", planned}};
+    return DecidedOf(run, "test: " + test);
+  };
+  const auto another_list = testing::ThrowsMessage<Error>(HasSubstr("found another list than the baseline's"));
+  for (const std::string test : {"paired_mcnemar", "noninferiority"}) {
+    SCOPED_TRACE(test);
+    const RuleDecision part = decided(30, 50, test);
+    EXPECT_EQ(part.outcome, GateOutcome::kInconclusive);
+    EXPECT_THAT(part.statement, HasSubstr(": 30 of 50 episodes are there."));
+    EXPECT_THAT(part.more, HasSubstr("evac resume"));
+    EXPECT_EQ(decided(50, 50, test).outcome, GateOutcome::kPass);
+    EXPECT_THAT([&] { decided(30, 30, test); }, another_list) << "no more are to come";
+    EXPECT_THAT([&] { decided(60, 80, test); }, another_list) << "ten that the baseline never had";
+  }
+}
+
+/// "Found no episode of p@c on task 'hard'", of a run that had not come to it yet.
+TEST(GateStates, WhatHasNotBegunYetIsAwaitedAndNotInvalid) {
+  const PinnedResult pinned = Pin(
+      RepeatedRun({{"easy", "p", {}, {std::string(50, 's')}}, {"hard", "p", {}, {std::string(30, 's')}}}), "out/main");
+  const auto result = [&pinned](const RunSummary& run, const std::string& rule) {
+    const std::string text = "gates: [{name: r, " + rule + "}]\n";
+    return Decide(ReadGateRules(Config::FromText(text, "gate.yaml")), {run, "out", {}}, &pinned);
+  };
+  const RunSummary run =
+      EasyPartOf({{"hard", "sim", "p", "c", 30}, {"easy", "real", "p", "c", 20}, {"easy", "sim", "q", "c", 40}});
+  const std::pair<std::string, std::string> cases[] = {
+      {"world: sim, task: hard, policy: p@c", "p@c on hard in sim: 0 of 30 episodes are there."},
+      {"world: real, task: easy, policy: p@c", "p@c on easy in real: 0 of 20 episodes are there."},
+      {"world: sim, task: easy, policy: q@c", "q@c on easy in sim: 0 of 40 episodes are there."}};
+  for (const auto& [about, statement] : cases) {
+    for (const std::string test : {"paired_mcnemar", "noninferiority", "boschloo", "savi", "ci_lower, at_least: 0.5",
+                                   "error_share, at_most: 0.1"}) {
+      const bool compares = test.find(':') == std::string::npos;
+      if (compares && about.starts_with("world: real")) continue;  // the baseline has none there either
+      SCOPED_TRACE(test + ", " + about);
+      const GateResult decided = result(run, "test: " + test + ", " + about);
+      const RuleDecision& rule = decided.decision.rules.at(0);
+      EXPECT_EQ(rule.outcome, GateOutcome::kInconclusive);
+      EXPECT_EQ(rule.statement, statement);
+      EXPECT_THAT(rule.more, HasSubstr("evac resume"));
+      EXPECT_TRUE(decided.looks.empty()) << "nothing was bet";
+      EXPECT_THAT([&] { result(EasyPartOf({}), "test: " + test + ", " + about); }, testing::Throws<Error>());
+    }
+  }
+  EXPECT_THAT(result(run, "test: error_share, at_most: 0.1, world: real").decision.rules.at(0).statement,
+              testing::StartsWith("all policies in real: 0 of 20 episodes"));
+  EXPECT_THAT([&] { result(run, "test: ci_lower, at_least: 0.5, world: sim, policy: x"); },
+              testing::ThrowsMessage<Error>(HasSubstr("policy: found 'x', wanted one of: p@c, q@c")));
+}
+
 TEST(GateStates, WhatIsMissingElsewhereBlocksNoRule) {
   const std::string rule = "test: ci_lower, at_least: 0.7";
   EXPECT_EQ(DecidedOf(EasyPartOf({{"easy", "real", "p", "c", 50}}), rule).outcome, GateOutcome::kPass) << "no world's";
@@ -144,6 +200,22 @@ TEST(GateStates, ACorrelationWantsTheRealWorldWholeToo) {
   EXPECT_THAT(statement(), Not(HasSubstr("are there")));
   run.data.plan[0].episodes = 30;
   EXPECT_THAT(statement(), HasSubstr("40 of 50 episodes are there"));
+}
+
+/// Half of what the robot tried had broken off, and the correlation with it passed.
+TEST(GateStates, ErrorsInTheRealWorldAreTheCorrelationsToo) {
+  const std::string all(20, 's'), half = std::string(10, 's') + std::string(10, 'f'), none(20, 'f');
+  const std::string broken_off = std::string(10, 'e') + std::string(10, 's');
+  const SampleRun sample({{"t", "a", "c", broken_off, all}, {"t", "b", "c", half, half}, {"t", "d", "c", none, none}});
+  const RunSummary run = sample.Summary({.bootstrap_replicates = 1});
+  const std::string correlation = "test: correlation, at_least: 0.5, task: t, max_error_share: ";
+  const RuleDecision decision = DecidedOf(run, correlation + "0.05");
+  EXPECT_EQ(decision.outcome, GateOutcome::kInconclusive);
+  EXPECT_THAT(decision.statement, HasSubstr("10 of 120 episodes (8 %) could not go on, more than 5 %"));
+  EXPECT_THAT(decision.more, HasSubstr("--retry-failed"));
+  EXPECT_THAT(DecidedOf(run, correlation + "0.1").statement, Not(HasSubstr("could not go on")));
+  EXPECT_THAT(DecidedOf(run, "test: ci_lower, policy: a@c, at_least: 0.5, max_error_share: 0.05").statement,
+              Not(HasSubstr("could not go on"))) << "it is about sim alone";
 }
 
 TEST(GateStates, ErrorsThatAreTooManyForTheWholeFailAPartOfIt) {

@@ -258,6 +258,26 @@ TEST(TrustOutput, ABiasThatRoundsToNothingHasNoMinus) {
   EXPECT_THAT(TrustText(report), HasSubstr("bias +0 points [")) << "it was -0";
 }
 
+/// "Within ±12 points" of 0.125, "±0 points" of 0.005.
+TEST(TrustOutput, AMarginIsSaidAsItWasGiven) {
+  const auto text = [](double margin) {
+    TrustReport report{"sim", "the world real", "oracle", {}, TrustOf(Input("sfsf", "sfsf"))};
+    report.options.margin = margin;
+    report.tasks.at(0).trust = Trust::kYes;
+    return TrustText(report);
+  };
+  EXPECT_THAT(text(0.125), HasSubstr("±12.5 points"));
+  EXPECT_THAT(text(0.005), HasSubstr("±0.5 points"));
+  EXPECT_THAT(text(0.07), HasSubstr("±7 points"));
+}
+
+TEST(PlanFor, AMarginAndADifferenceAreSaidAsTheyWereGiven) {
+  const std::string text = PlanText(MakePlan({.difference = 0.075, .margin = 0.125}));
+  EXPECT_THAT(text, HasSubstr("To see a difference of 7.5 points with "));
+  EXPECT_THAT(text, HasSubstr("to show \"not worse by 12.5 points\""));
+  EXPECT_THAT(text, HasSubstr("episodes for ± 5 points at that rate"));
+}
+
 TEST(PlanFor, AnswersInWordsAndATableForTheUsersNumbers) {
   const Plan plan = MakePlan({.rate = 0.28, .difference = 0.08, .trials = 25});
   EXPECT_THAT(PlanText(plan), HasSubstr("it takes 533 episodes of each"));

@@ -23,7 +23,8 @@ TEST(Conventions, WhatIsDeclaredOtherwiseIsRefusedAtTheHandshakeWithBothDeclarat
        "image_format=BGR, "
        "--declare, gripper_open=1, --declare, gripper_closed=0, --declare, period_s=0.0333, --declare, arms=left]"}));
   EXPECT_EQ(result.exit_code, 2);
-  EXPECT_THAT(result.err, HasSubstr("does not fit this run"));
+  EXPECT_THAT(result.err,
+              HasSubstr("evac: policy faulty@default, which declares itself as faulty@v1, does not fit this run:\n"));
   for (const char* row :
        {"\\* quaternion_order +xyzw +wxyz", "\\* action_space +absolute +delta", "\\* image_format +RGB +BGR",
         "\\* gripper +0 open … 1 closed +1 open … 0 closed", "\\* period +0.1 s +0.0333 s", "\\* arms +right +left"})

@@ -7,6 +7,8 @@
 #include <fstream>
 
 #include "core/file.h"
+#include "core/store.h"
+#include "harness/job.h"
 #include "tests/support/temp_folder.h"
 #include "tests/system/process_support.h"
 #include "tests/system/run_support.h"
@@ -102,6 +104,34 @@ TEST(Interrupts, WhileThePolicyIsTriedFailedEpisodesThatWereToRunAgainStay) {
   ::waitpid(pid, &status, 0);
   EXPECT_TRUE(WIFEXITED(status) && WEXITSTATUS(status) == 4) << status;
   EXPECT_EQ(List(run), before);
+}
+
+/// All of a pairing's were gone when the first of them began.
+TEST(Interrupts, FailedEpisodesThatDidNotRunAgainYetKeepTheirReasons) {
+  const TempFolder folder;
+  const std::filesystem::path run = folder / "run", script = folder / "policy.sh";
+  const auto fail_by = [&](const std::string& fault) {
+    std::ofstream(script) << "exec '" << Binary("faulty-policy") << "' --fault " << fault << "\n";
+  };
+  fail_by("error");
+  ASSERT_EQ(RunCommand(RunWords(kFaults, run, {"policies.0.command=[/bin/sh, " + script.string() + "]",
+                                               "transport.deadline_s=600", "initial_states.count=3"}))
+                .exit_code,
+            0);
+  Job second;
+  second.key = {{"take_bottle", "3-0001", "faulty", "default", 1}, "real"};
+  fail_by(fmt::format("hang@{}", second.PolicySeed()));
+  const std::filesystem::path log = run / "logs/faulty@default.log";
+  const pid_t pid = StartCommand({Binary("evac"), "resume", run.string(), "--retry-failed"}, folder / "resume.log");
+  EXPECT_TRUE(WaitUntil([&] { return ReadFile(log).find("hangs") != std::string::npos; }))
+      << ReadFile(folder / "resume.log");
+  ::kill(pid, SIGINT);
+  int status = 0;
+  ::waitpid(pid, &status, 0);
+  EXPECT_TRUE(WIFEXITED(status) && WEXITSTATUS(status) == 4) << status;
+  std::vector<StopReason> stops;
+  for (const Episode& episode : Store::Open(run, Store::Mode::kReadOnly).Episodes()) stops.push_back(episode.stop);
+  EXPECT_EQ(stops, (std::vector<StopReason>{StopReason::kStill, StopReason::kPolicyError, StopReason::kPolicyError}));
 }
 
 struct Interruption {

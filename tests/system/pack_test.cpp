@@ -450,6 +450,16 @@ TEST_F(PackCommand, NormalisesByTheStatisticsThatWeightsWereTrainedWith) {
   EXPECT_THAT(wrong.err, AllOf(HasSubstr("wrong.yaml"), HasSubstr("mean")));
 }
 
+/// Metadata have commas between tasks: clips were of another task than their own, and nobody said so.
+TEST_F(PackCommand, ATaskWithACommaInItsNameIsRefused) {
+  WriteLateRecording({folder_ / "tree", "cut, then pour", "000000"});
+  const CommandResult result = RunCommand(Words("out", {}, {"tree"}));
+  EXPECT_EQ(result.exit_code, 2) << result.err;
+  EXPECT_THAT(result.err, HasSubstr("tree/observations/cut, then pour/000000: its task is called 'cut, then pour', "
+                                    "wanted a name without a comma"));
+  EXPECT_FALSE(fs::exists(folder_ / "out"));
+}
+
 TEST_F(PackCommand, RefusesAFolderThatHoldsAnotherPacking) {
   Add("a", Good());
   ASSERT_EQ(RunCommand(Words("out")).exit_code, 0);

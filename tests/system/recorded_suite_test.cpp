@@ -157,7 +157,7 @@ TEST_F(RecordedSuite, APolicyThatNeedsAnInstructionIsRefusedBeforeAnyEpisodeWher
   const CommandResult refused = with({});
   EXPECT_EQ(refused.exit_code, 2) << refused.err;
   EXPECT_THAT(refused.err, AllOf(HasSubstr("suite.yaml: field instruction: found none"),
-                                 HasSubstr("policy faulty@v1 needs an instruction")));
+                                 HasSubstr("policy faulty@default, which declares itself as faulty@v1, needs ")));
   EXPECT_EQ(system_test::List(run), "[]\n") << "the policy before it did not run either";
   fs::remove_all(run);
   const CommandResult told = with({"instruction=Pour."});

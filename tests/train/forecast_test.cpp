@@ -267,6 +267,28 @@ TEST(TrainForecast, RefusesShardsThatDoNotSayWhereTheirObjectIs) {
               ThrowsMessage<TensorError>(HasSubstr("say where their objects are")));
 }
 
+/// No copy of the network was made, and the first of none was trained.
+TEST(TrainForecast, RefusesAStepOfNoParts) {
+  const TempFolder folder;
+  WriteSyntheticShards(folder / "shards", {});
+  ForecastOptions options = Quick(1);
+  options.job.trainer.accumulate = 0;
+  EXPECT_THAT([&] { TrainForecast({{folder / "shards"}, folder / "out", ForecastConfig(1)}, options); },
+              ThrowsMessage<TensorError>(HasSubstr("training: accumulate is 0")));
+}
+
+/// Its hold-out counted twice too.
+TEST(TrainForecast, AFolderThatIsNamedTwiceIsMeasuredOnce) {
+  const TempFolder folder;
+  const std::filesystem::path shards = folder / "shards";
+  WriteSyntheticShards(shards, {.clips = 6, .failures = 3});
+  JobPlace place{ShardFolders{shards, shards}, folder / "out", ForecastConfig(1)};
+  std::string said;
+  place.say = [&](const std::string& sentence) { said += sentence + "\n"; };
+  TrainForecast(place, Quick(1));
+  EXPECT_THAT(said, HasSubstr(" of 6 outcomes told"));
+}
+
 TEST(TrainForecast, RefusesSizesThatHaveNone) {
   const TempFolder folder;
   WriteSyntheticShards(folder / "shards", {});

@@ -51,6 +51,15 @@ TEST(ShardSet, ASplitThatIsNotThereIsSaidWithTheOptionThatMakesIt) {
               ThrowsMessage<TensorError>(HasSubstr("has no shard with split train (evac pack --holdout)")));
 }
 
+TEST(EachOnce, KeepsTheFirstOfFoldersThatAreTheSame) {
+  const TempFolder folder;
+  const std::filesystem::path a = folder / "a", b = folder / "b", link = folder / "link", none = folder / "none";
+  for (const std::filesystem::path& made : {a, b}) std::filesystem::create_directories(made);
+  std::filesystem::create_directory_symlink(a, link);
+  EXPECT_EQ(EachOnce({b, a, b / "", link, b, none, none}), (ShardFolders{b, a, none}));
+  EXPECT_EQ(EachOnce({a, b}), (ShardFolders{a, b}));
+}
+
 TEST(ShardSet, WhereTheObjectIsMayBeUnknown) {
   const TempFolder folder;
   WriteSyntheticShards(folder.path(), {.knows_object = false});

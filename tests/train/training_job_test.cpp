@@ -75,6 +75,26 @@ TEST(TrainingJob, TrainsTheSameWeights) {
   EXPECT_EQ(BytesOf(at.folder / "there" / "weights.safetensors"), bytes);
 }
 
+/// Whatever lay there was gone: a page, or weights.
+TEST(TrainingJob, DoesNotReplaceAFileThatIsNoJob) {
+  const Prepared at(1);
+  const TrainingJob job = JobOf(at);
+  const std::filesystem::path path = at.folder / "there";
+  for (const std::string text : {"", "evac", "evac-training 10\n", "world:\n  batch: 8\n", "evac-training 1"}) {
+    std::ofstream(path, std::ios::binary | std::ios::trunc) << text;
+    EXPECT_THAT([&] { WriteTrainingJob(path, job); },
+                ThrowsMessage<TensorError>(AllOf(HasSubstr(path.string() + ": what is there does not begin with"),
+                                                 HasSubstr("wanted the name of a new file, or of an earlier job"))))
+        << text;
+    EXPECT_EQ(BytesOf(path), text);
+  }
+  std::ofstream(path, std::ios::binary | std::ios::trunc) << "evac-training 1\nof an earlier version\n";
+  WriteTrainingJob(path, job);
+  EXPECT_EQ(BytesOf(path), TextOf(job));
+  EXPECT_THROW(WriteTrainingJob(at.folder / "shards", job), TensorError) << "a folder";
+  EXPECT_FALSE(std::filesystem::exists(at.folder / "shards.tmp"));
+}
+
 /// It trained with the defaults of what was missing.
 TEST(TrainingJob, CutOffOnItsWayItIsRefusedWhereverThatWas) {
   const std::string whole = TextOf(JobOf(Prepared(1))), first = "evac-training 1\nworld\n";

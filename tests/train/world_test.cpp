@@ -303,6 +303,25 @@ TEST(TrainWorld, GoesOnFromAModelThatWasShownLess) {
   EXPECT_THROW(end("narrow", at.config, 1e-12, start), TensorError) << "nothing is left out";
 }
 
+/// Its hold-out counted twice too: what was said of the weights was mostly said of that folder.
+TEST(TrainWorld, AFolderThatIsNamedTwiceIsMeasuredOnce) {
+  const Prepared at(1);
+  const std::filesystem::path shards = at.folder / "shards", more = at.folder / "more";
+  WriteSyntheticShards(more, {.clips = 3, .seed = 2});
+  CheckpointWeights codec(at.codec());
+  EncodeSyntheticShards(nn::Vae(nn::Scope(codec, kCodecPrefix), at.config.vae), more);
+  const auto holdout = [&](const char* out, const ShardFolders& folders) {
+    WorldOptions options = Quick(1);
+    options.job.trainer.learning_rate = 1e-12;
+    options.job.trainer.holdout_every = 1;
+    options.job.holdout_size = 1000;
+    return TrainWorld({folders, at.folder / out, at.config}, options, {at.codec()}, {}).best.value();
+  };
+  const double once = holdout("once", {shards, more});
+  EXPECT_NEAR(holdout("twice", {shards, more, more, shards / ""}), once, 1e-6 * once);
+  EXPECT_GT(std::abs(holdout("alone", {shards}) - once), 1e-4 * once) << "or nothing is measured";
+}
+
 TEST(TrainWorld, RefusesLatentsOfAnotherCodec) {
   const Prepared at(1);
   WorldStart start{at.codec()};

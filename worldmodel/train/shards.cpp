@@ -8,6 +8,7 @@
 #include <set>
 #include <sstream>
 #include <string_view>
+#include <system_error>
 
 #include "worldmodel/nn/number_text.h"
 
@@ -241,6 +242,18 @@ void RequireVariedAlike(const std::vector<Shard>& shards) {
 }
 
 }  // namespace
+
+ShardFolders EachOnce(const ShardFolders& folders) {
+  ShardFolders once;
+  for (const std::filesystem::path& folder : folders) {
+    const bool is_again = std::any_of(once.begin(), once.end(), [&](const std::filesystem::path& other) {
+      std::error_code unknown;  // what cannot be looked at is told where it is read
+      return folder == other || std::filesystem::equivalent(folder, other, unknown);
+    });
+    if (!is_again) once.push_back(folder);
+  }
+  return once;
+}
 
 std::string ScaleText(double scale_factor) {
   char text[32];

@@ -46,8 +46,13 @@ struct Shard {
 
 enum class Split { kTrain, kHoldout };
 
-/// What `evac pack` wrote, each packing in a folder of its own. One that is named twice counts twice.
+/// What `evac pack` wrote, each packing in a folder of its own. One that is named twice is in a set twice, and so drawn
+/// from twice as often.
 using ShardFolders = std::vector<std::filesystem::path>;
+
+/// Each folder once, where it is named first, whether it is named again, with a '/' behind it or by a link: what is
+/// measured with counts once, however often it is drawn from.
+ShardFolders EachOnce(const ShardFolders& folders);
 
 class ShardSet {
  public:

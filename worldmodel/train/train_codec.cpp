@@ -28,7 +28,7 @@ std::pair<ShardSet, ShardSet> OpenChecked(const JobPlace& place, const CodecOpti
   CheckHoldoutSize(options.job);
   CheckOptions(options.job.trainer);
   CheckOptions(options.codec);
-  std::pair both(ShardSet(place.shards, Split::kTrain), ShardSet(place.shards, Split::kHoldout));
+  std::pair both(ShardSet(place.shards, Split::kTrain), ShardSet(EachOnce(place.shards), Split::kHoldout));
   CheckSizes(both.first, place.config);
   both.first.CheckLike(both.second);
   return both;
@@ -81,7 +81,12 @@ void CheckHoldoutSize(const JobOptions& options) {
     throw TensorError("training: holdout_size is " + std::to_string(options.holdout_size) + ", wanted at least 1");
 }
 
-void CheckCodecTraining(const JobPlace& place, const CodecOptions& options) { OpenChecked(place, options); }
+void CheckCodecTraining(const JobPlace& place, const CodecOptions& options, const std::filesystem::path& init) {
+  OpenChecked(place, options);
+  if (init.empty()) return;
+  CheckpointWeights start(init);
+  nn::Vae(nn::Scope(start, kCodecPrefix), place.config.vae);  // asks for every key and its shape
+}
 
 TrainerSummary TrainCodec(const JobPlace& place, const CodecOptions& given, const std::filesystem::path& init) {
   CodecOptions options = given;

@@ -7,7 +7,7 @@ namespace evac::train {
 
 /// Where a training reads and writes, and who hears of it.
 struct JobPlace {
-  ShardFolders shards;
+  ShardFolders shards;  ///< drawn from as often as they are named; their hold-out is measured once (EachOnce)
   std::filesystem::path out;     ///< see Trainer; and the weights when it ends
   nn::ModelConfig config;
   int threads = 1;  ///< parts of a step (`accumulate`) that are computed side by side, each on one core; or libtorch's
@@ -21,6 +21,7 @@ struct JobPlace {
 
 /// How many threads share the parts of a step, each with a copy of what is trained; what the sums' last digits depend
 /// on. On a GPU it is one, whose parts follow one another: memory is what they are for there.
+/// @param options  that CheckOptions (trainer.h) takes
 std::int64_t Workers(const JobPlace& place, const JobOptions& options);
 /// What of a place decides the numbers of each step: its threads on a CPU, else the kind of device ("cuda" of "cuda:1"),
 /// and what it was begun with.
@@ -30,9 +31,11 @@ void CheckPoseMaps(const ShardSet& shards, const nn::ModelConfig& config);
 /// @throws TensorError if a hold-out of no picture or window is wanted
 void CheckHoldoutSize(const JobOptions& options);
 
-/// All that TrainCodec looks at before it reads `init`: for a training that is carried elsewhere (training_job.h).
-/// @throws TensorError for options that make no training, and for shards that do not fit one another or the page
-void CheckCodecTraining(const JobPlace& place, const CodecOptions& options);
+/// All that TrainCodec looks at before it trains: for a training that is carried elsewhere (training_job.h).
+/// @param init  as of TrainCodec
+/// @throws TensorError for options that make no training, for shards that do not fit one another or the page, and for a
+///   key of the page's codec that is missing in `init` or of another shape, by name
+void CheckCodecTraining(const JobPlace& place, const CodecOptions& options, const std::filesystem::path& init = {});
 
 /// Trains the codec and writes OUT/codec.safetensors: its parameters alone, latents normalised, what they are worth in
 /// the metadata (psnr, psnr_object, psnr_maps: dB, hold-out; psnr_object is "unknown" where no shard knows its place). An

@@ -32,12 +32,13 @@ struct ForecastWorker {
 }  // namespace
 
 TrainerSummary TrainForecast(const JobPlace& place, const ForecastOptions& given) {
+  CheckOptions(given.job.trainer);
   ForecastOptions options = given;
   if (!place.config.object_forecast)
     throw TensorError("the page of sizes has object_forecast: false, wanted true");
   ShardSet shards(place.shards, Split::kTrain);
   shards.OpenVariants();
-  const ShardSet holdout(place.shards, Split::kHoldout);
+  const ShardSet holdout(EachOnce(place.shards), Split::kHoldout);
   nn::CheckShape("the shards' pictures", shards.shards().front().frames,
                  {-1, place.config.views, place.config.image_height_px, place.config.image_width_px, 3});
   CheckPoseMaps(shards, place.config);  // with them the page says how long the tool is

@@ -206,6 +206,7 @@ int Train(const Arguments& arguments) {
     options->trainer.steps = arguments.steps;
     options->trainer.minutes = 0;
   }
+  CheckOptions(job.options().trainer);
   const int cores = static_cast<int>(std::max(1U, std::thread::hardware_concurrency()));
   const int threads = arguments.threads > 0 ? arguments.threads : cores;
   const JobPlace place{arguments.shards, arguments.out, job.config, threads, [] { return g_interrupted != 0; },

@@ -146,7 +146,7 @@ WorldOptions Checked(const JobPlace& place, WorldOptions options, const WorldSta
 
 /// Those to learn from and the hold-out, with their latents: they fit one another, the page and the start.
 std::pair<ShardSet, ShardSet> OpenChecked(const JobPlace& place, const WorldStart& start) {
-  std::pair both(ShardSet(place.shards, Split::kTrain), ShardSet(place.shards, Split::kHoldout));
+  std::pair both(ShardSet(place.shards, Split::kTrain), ShardSet(EachOnce(place.shards), Split::kHoldout));
   auto& [shards, holdout] = both;
   for (ShardSet* set : {&shards, &holdout}) {
     set->OpenLatents(place.config.vae.z_channels, place.config.vae.Stride(), place.config.vae.scale_factor);

@@ -58,6 +58,19 @@ bool SetLine(TrainingJob& job, const std::string& line) {
   return SetOther(job, name, value);
 }
 
+/// A job is written anew; what is no job is somebody's shards, weights or page.
+void RequireNoOthersFile(const std::filesystem::path& path) {
+  std::error_code unknown;  // what cannot be looked at cannot be written either
+  if (!std::filesystem::exists(path, unknown)) return;
+  const std::string wanted = std::string(kFirstLine) + "\n";
+  std::string found(wanted.size(), '\0');
+  std::ifstream file;
+  if (std::filesystem::is_regular_file(path, unknown)) file.open(path, std::ios::binary);  // a pipe would be waited for
+  if (file.read(found.data(), static_cast<std::streamsize>(found.size())) && found == wanted) return;
+  throw TensorError(path.string() + ": what is there does not begin with '" + kFirstLine +
+                    "', so it would be lost: wanted the name of a new file, or of an earlier job");
+}
+
 }  // namespace
 
 std::string TextOf(const TrainingJob& given) {
@@ -109,6 +122,7 @@ TrainingJob ParseTrainingJob(const std::string& text, const std::string& name) {
 }
 
 void WriteTrainingJob(const std::filesystem::path& path, const TrainingJob& job) {
+  RequireNoOthersFile(path);
   const std::filesystem::path unfinished = path.string() + ".tmp";
   {
     std::ofstream file(unfinished, std::ios::binary | std::ios::trunc);

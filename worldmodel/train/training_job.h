@@ -35,7 +35,7 @@ std::string TextOf(const TrainingJob& job);
 ///   that its field cannot have, or sizes that make no network
 TrainingJob ParseTrainingJob(const std::string& text, const std::string& name);
 
-/// @throws TensorError if it cannot be written; nothing is there then, or what was
+/// @throws TensorError if it cannot be written, or what is there is no job; nothing is there then, or what was
 void WriteTrainingJob(const std::filesystem::path& path, const TrainingJob& job);
 /// @throws TensorError as ParseTrainingJob, or if the file cannot be read
 TrainingJob ReadTrainingJob(const std::filesystem::path& path);

@@ -10,7 +10,8 @@ namespace evac::train {
 /// What noise the memory is given, so that the network bears with its own mistakes later.
 enum class MemoryNoise {
   kPublished,  ///< rising towards the newest frame, by a random angle: the reference's
-  kUniform,    ///< one deviation per sample, uniform up to `memory_noise`, for `memory_noise_share` of them
+  kUniform,    ///< one deviation per view of a sample, each drawn by itself: uniform up to `memory_noise`, for
+               ///< `memory_noise_share` of them
 };
 
 /// How much an error counts at a diffusion step. As said of the squared error of v.

@@ -177,6 +177,8 @@ def first_rater(server, ann):
     menu_after_a_verdict(ann)
     change(ann)
     server_in_trouble(ann)
+    disk_that_is_closed(ann)
+    more_comes_at_the_end(ann)
     second_tab(ann)
     line_goes_away(ann, server)
     ann.rate_all(lambda k: "failure" if k % 4 == 3 else "success")
@@ -272,11 +274,19 @@ def keys(ann):
     look(browser, "help")
     browser.js("document.querySelector('#hand').click()")
     check("Backspace" in text(browser, "dl.keys"), "the help shows the right hand's keys", text(browser, "dl.keys"))
+    hidden = browser.js("""[...document.styleSheets].flatMap(sheet => [...sheet.cssRules]).flatMap(rule => [rule, ...rule.cssRules || []])
+        .filter(rule => rule.style?.display === 'none' && document.querySelector('dl.keys kbd').matches(rule.selectorText)).map(rule => rule.selectorText)""")
+    check(hidden == [], "no screen hides the keys of which the help tells", hidden)
     browser.js("document.querySelector('#dialog button.primary').click()")
     check(text(browser, ".flag kbd") == "6", "the flags show the right hand's digits", text(browser, ".flag kbd"))
     browser.press("7")
     check(browser.js("rating.stages === 3"), "7 is the second stage for the right hand", browser.js("rating.stages"))
     browser.press("7")
+    stages = []
+    for code in ("Numpad7", "Numpad1", "Numpad2", "Numpad7"):
+        browser.js(f"document.body.dispatchEvent(new KeyboardEvent('keydown', {{key: '{code[-1]}', code: '{code}', bubbles: true}}))")
+        stages.append(browser.js("rating.stages"))
+    check(stages == [3, 3, 3, 1], "and so it is on the keypad, where 1 and 2 are none", stages)
     clip = ann.clip()
     ann.say(";", "failure")
     browser.js("localStorage.removeItem('evac-keys')")
@@ -375,6 +385,7 @@ def change(ann):
     browser = ann.browser
     ann.ready()
     here, clip = ann.clip(), next(clip for clip, row in current().items() if row["note"] == "sfu")  # of keys(): with all that can be said
+    browser.press("1")
     asked = browser.js(f"get('/api/history').then(said => said.verdicts.findIndex(one => one.presentation === {clip!r}))")
     browser.press("h")
     browser.wait("document.querySelector('#dialog').open && document.querySelector('.history')")
@@ -382,6 +393,8 @@ def change(ann):
     browser.wait(f"rating.clip?.presentation === {clip!r} && rating.isOpen")
     form = browser.js("[rating.stages, [...rating.flags].join(), rating.note, rating.confidence].join(' ')")
     check(form == "1 blur_hides sfu 2", "a change begins with what was said", form)
+    kept = browser.js("JSON.parse(sessionStorage.getItem('evac-clip')).presentation")
+    check(kept == here, "a page that is loaded anew now goes on with the clip that waits", (kept, here))
     browser.press("u")
     ann.said[clip] = "cannot_tell"
     browser.wait(f"rating.clip?.presentation === {here!r}")
@@ -390,6 +403,10 @@ def change(ann):
     check((row["label"], row["stages"], row["flags"], row["confidence"], row["note"]) == ("cannot_tell", 1, "blur_hides", 2, "sfu"),
           "and changes nothing else", row)
     check(browser.js("!rating.isOpen && !rating.supersedes"), "the clip after it is rated as any other")
+    found = browser.js("""[rating.stages, document.querySelector('[data-stage="0"]').getAttribute('aria-pressed'), document.querySelector('.verdict').disabled,
+        rating.player.watch.interrupted].join(' ')""")
+    check(found == "1 true false false", "and what was seen and marked of it before is seen and marked", found)
+    browser.press("1")
 
 
 def server_in_trouble(ann):
@@ -408,6 +425,56 @@ def server_in_trouble(ann):
     ann.sent()
     browser.js("window.fetch = fetched")
     check(current().get(clip, {}).get("label") == "success", "and arrives")
+
+
+def disk_that_is_closed(ann):
+    """By the browser: a tab that was in the background, site data that were cleared."""
+    browser = ann.browser
+    ann.ready()
+    while not ann.is_next_playable():  # which is told at once, and asks for another: that needs the line
+        ann.say("s", "success")
+        ann.ready()
+    clip, count = ann.clip(), "inOutbox('readonly', store => store.count())"
+    browser.offline(True)
+    browser.js("outbox.database.close()")
+    browser.press("s")
+    ann.said[clip] = "success"
+    browser.wait("outbox.waiting.length === 1")
+    check(browser.js(count) == 1, "a verdict that finds the disk closed waits there all the same", browser.js(count))
+    browser.js("window.at = outbox.waiting[0].at; inOutbox('readwrite', store => store.clear()).then(() => outbox.database.close())")
+    browser.js("reopenOutbox()")
+    found = browser.js("inOutbox('readonly', store => store.getAll()).then(all => all.map(entry => entry.at - at).join())")
+    check(found == "0", "what waits is there again after all was cleared, once and under its number", found)
+    holds = "(event => { dispatchEvent(event); return event.defaultPrevented; })(new Event('beforeunload', {cancelable: true}))"
+    check(not browser.js(holds), "who closes the page is not asked while all that waits is on disk")
+    browser.js("delete outbox.waiting[0].at")
+    check(browser.js(holds), "but where some of it is in memory alone")
+    browser.js("outbox.waiting[0].at = at")
+    browser.offline(False)
+    ann.sent()
+    check(current().get(clip, {}).get("label") == "success" and browser.js(count) == 0, "and it arrives, and waits no more", browser.js(count))
+
+
+def more_comes_at_the_end(ann):
+    """As if a wave had come: the server says that nothing is left, and who asks who they are is given more."""
+    browser = ann.browser
+    ann.ready()
+    browser.js("""window.fetched = fetch;
+        window.before = rating.player;
+        window.saidDone = false;
+        window.fetch = (path, options) => {
+          if (path !== '/api/next' || saidDone) return fetched(path, options);
+          saidDone = true;
+          return Promise.resolve(new Response(JSON.stringify({done: true, progress: {done: rating.done, total: rating.done, practice_left: 0}})));
+        };
+        rating.prefetched = null;
+        void rate();""")
+    browser.wait("saidDone && rating.player !== before && (rating.player || !document.querySelector('.rate'))")
+    check(browser.js("Boolean(document.querySelector('.rate') && rating.player)"), "nobody is at the end while clips are left", text(browser, "h1"))
+    browser.js("window.fetch = fetched")
+    if browser.js("!document.querySelector('.rate')"):
+        reload(browser)
+        wait_here(browser, "rating.player")
 
 
 def second_tab(ann):
