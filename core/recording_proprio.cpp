@@ -169,7 +169,7 @@ std::string BytesOf(const std::vector<Arms>& steps) {
 
 std::vector<Arms> ArmsOf(const std::string& bytes) {
   std::vector<double> numbers(bytes.size() / sizeof(double));
-  std::memcpy(numbers.data(), bytes.data(), numbers.size() * sizeof(double));
+  if (!numbers.empty()) std::memcpy(numbers.data(), bytes.data(), numbers.size() * sizeof(double));
   std::vector<Arms> steps(numbers.size() / (kArms * kNumbers));
   for (std::size_t i = 0; i < steps.size() * kArms; ++i) {
     ArmState& arm = steps[i / kArms].emplace_back();
