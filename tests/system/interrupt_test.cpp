@@ -79,58 +79,61 @@ TEST(Interrupts, WhileTheWorldTriesOutItsTasksItDoesNotTryTheOthersFirst) {
   EXPECT_LT(seconds[1], seconds[0] / 2) << "of " << seconds[0] << " s for all";
 }
 
+/// A run whose episodes all failed, and are to run again.
+class FailedRun {
+ public:
+  explicit FailedRun(int states) {
+    FailBy("error");
+    EXPECT_EQ(RunCommand(RunWords(kFaults, run_, {"policies.0.command=[/bin/sh, " + script_.string() + "]",
+                                                  "transport.deadline_s=600",
+                                                  fmt::format("initial_states.count={}", states)}))
+                  .exit_code,
+              0);
+  }
+
+  const std::filesystem::path& run() const { return run_; }
+
+  /// The policy does so from its next start on.
+  void FailBy(const std::string& fault) const {
+    std::ofstream(script_) << "exec '" << Binary("faulty-policy") << "' --fault " << fault << "\n";
+  }
+
+  /// `evac resume --retry-failed`, interrupted once the policy has said a word.
+  void RetryUntil(const char* word) const {
+    const std::filesystem::path policys_log = run_ / "logs/faulty@default.log", log = folder_ / "resume.log";
+    const pid_t pid = StartCommand({Binary("evac"), "resume", run_.string(), "--retry-failed"}, log);
+    EXPECT_TRUE(WaitUntil([&] { return ReadFile(policys_log).find(word) != std::string::npos; })) << ReadFile(log);
+    ::kill(pid, SIGINT);
+    int status = 0;
+    ::waitpid(pid, &status, 0);
+    EXPECT_TRUE(WIFEXITED(status) && WEXITSTATUS(status) == 4) << status;
+  }
+
+ private:
+  TempFolder folder_;
+  std::filesystem::path run_ = folder_ / "run", script_ = folder_ / "policy.sh";
+};
+
 /// The rows were gone, with their reasons, and nothing ran again.
 TEST(Interrupts, WhileThePolicyIsTriedFailedEpisodesThatWereToRunAgainStay) {
-  const TempFolder folder;
-  const std::filesystem::path run = folder / "run", script = folder / "policy.sh";
-  const auto fail_by = [&](const std::string& fault) {
-    std::ofstream(script) << "exec '" << Binary("faulty-policy") << "' --fault " << fault << "\n";
-  };
-  fail_by("error");
-  ASSERT_EQ(RunCommand(RunWords(kFaults, run, {"policies.0.command=[/bin/sh, " + script.string() + "]",
-                                               "transport.deadline_s=600", "initial_states.count=1"}))
-                .exit_code,
-            0);
-  const std::string before = List(run);
+  const FailedRun failed(1);
+  const std::string before = List(failed.run());
   EXPECT_NE(before.find("policy_error"), std::string::npos) << before;
-
-  fail_by("silent");
-  const std::filesystem::path log = run / "logs/faulty@default.log";
-  const pid_t pid = StartCommand({Binary("evac"), "resume", run.string(), "--retry-failed"}, folder / "resume.log");
-  EXPECT_TRUE(WaitUntil([&] { return ReadFile(log).find("is silent") != std::string::npos; }))
-      << ReadFile(folder / "resume.log");
-  ::kill(pid, SIGINT);
-  int status = 0;
-  ::waitpid(pid, &status, 0);
-  EXPECT_TRUE(WIFEXITED(status) && WEXITSTATUS(status) == 4) << status;
-  EXPECT_EQ(List(run), before);
+  failed.FailBy("silent");
+  failed.RetryUntil("is silent");
+  EXPECT_EQ(List(failed.run()), before);
 }
 
 /// All of a pairing's were gone when the first of them began.
 TEST(Interrupts, FailedEpisodesThatDidNotRunAgainYetKeepTheirReasons) {
-  const TempFolder folder;
-  const std::filesystem::path run = folder / "run", script = folder / "policy.sh";
-  const auto fail_by = [&](const std::string& fault) {
-    std::ofstream(script) << "exec '" << Binary("faulty-policy") << "' --fault " << fault << "\n";
-  };
-  fail_by("error");
-  ASSERT_EQ(RunCommand(RunWords(kFaults, run, {"policies.0.command=[/bin/sh, " + script.string() + "]",
-                                               "transport.deadline_s=600", "initial_states.count=3"}))
-                .exit_code,
-            0);
+  const FailedRun failed(3);
   Job second;
   second.key = {{"take_bottle", "3-0001", "faulty", "default", 1}, "real"};
-  fail_by(fmt::format("hang@{}", second.PolicySeed()));
-  const std::filesystem::path log = run / "logs/faulty@default.log";
-  const pid_t pid = StartCommand({Binary("evac"), "resume", run.string(), "--retry-failed"}, folder / "resume.log");
-  EXPECT_TRUE(WaitUntil([&] { return ReadFile(log).find("hangs") != std::string::npos; }))
-      << ReadFile(folder / "resume.log");
-  ::kill(pid, SIGINT);
-  int status = 0;
-  ::waitpid(pid, &status, 0);
-  EXPECT_TRUE(WIFEXITED(status) && WEXITSTATUS(status) == 4) << status;
+  failed.FailBy(fmt::format("hang@{}", second.PolicySeed()));
+  failed.RetryUntil("hangs");
   std::vector<StopReason> stops;
-  for (const Episode& episode : Store::Open(run, Store::Mode::kReadOnly).Episodes()) stops.push_back(episode.stop);
+  for (const Episode& episode : Store::Open(failed.run(), Store::Mode::kReadOnly).Episodes())
+    stops.push_back(episode.stop);
   EXPECT_EQ(stops, (std::vector<StopReason>{StopReason::kStill, StopReason::kPolicyError, StopReason::kPolicyError}));
 }
 
