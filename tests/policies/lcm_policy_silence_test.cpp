@@ -23,13 +23,6 @@ using Clock = std::chrono::steady_clock;
 /// Policies of which nothing is heard for a while, or for ever.
 class LcmPolicySilence : public wire::WireTest {
  protected:
-  static std::vector<Acted> Ask(LcmPolicy& policy, const std::vector<SceneId>& scenes) {
-    const Observation observation = wire::ObservationFor(wire::TwoCameraTask(), 7);
-    std::vector<SceneObservation> batch;
-    for (const SceneId scene : scenes) batch.push_back({scene, &observation});
-    return policy.Act(batch);
-  }
-
   /// A new episode in each.
   static void Begin(LcmPolicy& policy, const std::vector<SceneId>& scenes) {
     for (const SceneId scene : scenes) policy.Reset(scene, wire::TwoCameraTask(), 1);

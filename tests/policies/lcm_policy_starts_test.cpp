@@ -14,15 +14,7 @@ using wire::Count;
 using wire::Told;
 
 /// Policies that take long to begin, or that never do.
-class LcmPolicyStarts : public wire::WireTest {
- protected:
-  static std::vector<Acted> Ask(LcmPolicy& policy, const std::vector<SceneId>& scenes) {
-    const Observation observation = wire::ObservationFor(wire::TwoCameraTask(), 7);
-    std::vector<SceneObservation> batch;
-    for (const SceneId scene : scenes) batch.push_back({scene, &observation});
-    return policy.Act(batch);
-  }
-};
+class LcmPolicyStarts : public wire::WireTest {};
 
 /// Takes its time to begin each episode.
 class SlowlyBeginningPolicy : public wire::ProbePolicy {

@@ -29,14 +29,6 @@ class LcmPolicyTest : public wire::WireTest {
   static LcmPolicyOptions Firm(const LcmAddress& address) {
     return {.address = address, .deadline_s = 2, .repeat_after_s = 0.05};
   }
-
-  /// Resets the scenes (each once) and asks for all of them.
-  static std::vector<Acted> Ask(LcmPolicy& policy, const std::vector<SceneId>& scenes, const Task& task) {
-    const Observation observation = wire::ObservationFor(task, 7);
-    std::vector<SceneObservation> batch;
-    for (const SceneId scene : scenes) batch.push_back({scene, &observation});
-    return policy.Act(batch);
-  }
 };
 
 TEST_F(LcmPolicyTest, WhatThePolicySeesIsWhatTheHarnessShows) {

@@ -204,6 +204,15 @@ class WireTest : public testing::Test {
   void SetUp() override {
     if (const auto wrong = WhatIsWrongWithLcm()) GTEST_SKIP() << *wrong;
   }
+
+  /// Asks for scenes that were reset, all at once.
+  static std::vector<Acted> Ask(LcmPolicy& policy, const std::vector<SceneId>& scenes,
+                                const Task& task = TwoCameraTask()) {
+    const Observation observation = ObservationFor(task, 7);
+    std::vector<SceneObservation> batch;
+    for (const SceneId scene : scenes) batch.push_back({scene, &observation});
+    return policy.Act(batch);
+  }
 };
 
 }  // namespace evac::wire
