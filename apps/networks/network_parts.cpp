@@ -1,5 +1,7 @@
 #include "apps/network_parts.h"
 
+#include <mutex>
+
 #include "judges/classifier_judge.h"
 #include "policies/learned_policy.h"
 #include "worldmodel/nn/threads.h"
@@ -15,7 +17,8 @@ std::unique_ptr<Judge> MakeClassifier(const std::filesystem::path& weights, cons
 }
 
 std::unique_ptr<Policy> MakeLearnedPolicy(const std::filesystem::path& weights, int chunk_size) {
-  static const nn::LibraryThreads one_each(1);  // for as long as the process records
+  static std::once_flag first;
+  std::call_once(first, [] { nn::UseLibraryThreadsForGood(1); });  // the rest of this process records
   nn::UseLibraryThreadsHere(1);
   return std::make_unique<LearnedPolicy>(weights, chunk_size);
 }

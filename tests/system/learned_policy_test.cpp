@@ -1,9 +1,13 @@
+#include <ATen/Parallel.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <unistd.h>
 
+#include <cstdlib>
 #include <deque>
 #include <fstream>
 
+#include "apps/network_parts.h"
 #include "core/seed.h"
 #include "core/store.h"
 #include "core/task_page.h"
@@ -89,6 +93,21 @@ TEST_F(LearnedPolicyProgram, WeightsThatAreNotThereEndTheRunWithTheirName) {
   const CommandResult result = Run("take_toast");
   EXPECT_EQ(result.exit_code, 2);
   EXPECT_THAT(result.err, HasSubstr("step.safetensors"));
+}
+
+/// The number of threads was put back as the last thing of all: libtorch then cleared a cache that was freed already, and
+/// a process that had imagined, too, was aborted now and then ("corrupted size vs. prev_size").
+TEST(LearnedPolicyInThisProcess, PutsNoNumberOfThreadsBackWhenTheProcessEnds) {
+  testing::FLAGS_gtest_death_test_style = "threadsafe";
+  const TempFolder folder;
+  WriteWeights(folder / "step.safetensors");
+  const auto record_and_end = [&] {
+    at::set_num_threads(2);
+    std::atexit([] { ::_exit(at::get_num_threads() == 1 ? 0 : 3); });  // behind whatever is static and made below
+    MakeLearnedPolicy(folder / "step.safetensors", 16);
+    std::exit(0);
+  };
+  EXPECT_EXIT(record_and_end(), testing::ExitedWithCode(0), "");
 }
 
 }  // namespace

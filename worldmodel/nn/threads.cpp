@@ -20,13 +20,17 @@ void SetBlasThreads(int count) {
 }  // namespace
 
 LibraryThreads::LibraryThreads(int count) : before_(at::get_num_threads()), blas_before_(BlasThreads()) {
-  at::set_num_threads(count);
-  SetBlasThreads(count);
+  UseLibraryThreadsForGood(count);
 }
 
 LibraryThreads::~LibraryThreads() {
   at::set_num_threads(before_);
   SetBlasThreads(blas_before_);
+}
+
+void UseLibraryThreadsForGood(int count) {
+  at::set_num_threads(count);
+  SetBlasThreads(count);
 }
 
 void UseLibraryThreadsHere(int count) { at::set_num_threads(count); }
