@@ -247,7 +247,7 @@ void Block(const GateRule& rule, const GateInput& input, const GateSides& sides,
   const double share = side.episodes > 0 ? static_cast<double>(side.errors) / static_cast<double>(side.episodes) : 0;
   if (!evidence.counted && share > rule.max_error_share) {
     evidence.blocked = fmt::format("{} of {} episodes ({}) could not go on, more than {}", side.errors, side.episodes,
-                                   Percent(share), Percent(rule.max_error_share));
+                                   Percent(share), GivenPercent(rule.max_error_share));
     evidence.more = "Mend what failed and run those again (evac resume --retry-failed).";
   } else if (evidence.initial_states < rule.min_states) {
     evidence.blocked = fmt::format("{} of at least {} states", evidence.initial_states, rule.min_states);

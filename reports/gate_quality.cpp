@@ -251,8 +251,8 @@ void CountErrors(const GateRule& rule, const GateSides& sides, Evidence& evidenc
   evidence.decision.statement = fmt::format("{} of {}{} ({}) could not go on", side.errors,
                                             Counted(side.episodes, "episode"),
                                             side.policy.empty() ? "" : " of " + side.policy, Percent(share));
-  evidence.good = "at most " + Percent(*rule.at_most);
-  evidence.bad = "more than " + Percent(*rule.at_most);
+  evidence.good = "at most " + GivenPercent(*rule.at_most);
+  evidence.bad = "more than " + GivenPercent(*rule.at_most);
   evidence.counted = share <= *rule.at_most ? GateOutcome::kPass : GateOutcome::kFail;
 }
 

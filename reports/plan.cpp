@@ -42,7 +42,7 @@ void CheckFlips(const PlanOptions& o) {
   Require(flips > 0 && flips <= 1, "flips", flips, "above 0 and at most 1");
   Require(flips >= o.difference, "flips", flips, "at least the difference: without flips there is none");
   const std::string wanted = fmt::format("at most {:.4g}: of {} against {} no more can differ", most,
-                                         Percent(OtherRate(o)), Percent(o.rate));
+                                         GivenPercent(OtherRate(o)), GivenPercent(o.rate));
   Require(flips <= most + kRounding, "flips", flips, wanted.c_str());
 }
 
@@ -65,8 +65,14 @@ void Check(const PlanOptions& o) {
   Require(inside(o.promise.power), "power", o.promise.power, "between 0 and 1");
 }
 
-/// Of what came out; what was asked for is said as it was given (GivenPoints).
+/// Of what came out; what was asked for is said as it was given (GivenPoints, GivenPercent).
 std::string InPoints(double share) { return fmt::format("{:.0f} points", 100 * share); }
+
+/// "0.90", "0.999".
+std::string GivenNumber(double value) {
+  const std::string text = fmt::format("{:.2f}", value);
+  return std::stod(text) == value ? text : fmt::format("{:g}", value);
+}
 
 PlanRow Row(std::string key, std::string question, const Number& value, std::string shown, std::string method) {
   return {std::move(key), std::move(question), value, value ? std::move(shown) : "undefined: " + value.reason(),
@@ -87,7 +93,7 @@ FlipRates FlipsOf(const PlanOptions& o) {
 void AddRates(const PlanOptions& o, std::vector<PlanRow>& rows) {
   const double half_width = WilsonHalfWidth(o.rate, o.trials, Confidence(o));
   rows.push_back(Row("interval_half_width",
-                     fmt::format("interval of a rate of {} from {} episodes", Percent(o.rate), o.trials), half_width,
+                     fmt::format("interval of a rate of {} from {} episodes", GivenPercent(o.rate), o.trials), half_width,
                      "± " + InPoints(half_width), "Wilson"));
   for (const double wanted : {0.1, 0.05}) {
     const std::int64_t n = TrialsForHalfWidth(o.rate, wanted, Confidence(o));
@@ -98,10 +104,10 @@ void AddRates(const PlanOptions& o, std::vector<PlanRow>& rows) {
 }
 
 void AddDifferences(const PlanOptions& o, std::vector<PlanRow>& rows) {
-  const std::string seen = fmt::format("to see {} against {}", Percent(OtherRate(o)), Percent(o.rate));
+  const std::string seen = fmt::format("to see {} against {}", GivenPercent(OtherRate(o)), GivenPercent(o.rate));
   const FlipRates flips = FlipsOf(o);
   rows.push_back(SizeRow("paired_states",
-                         fmt::format("initial states {}, same states, {} of them flip", seen, Percent(*o.flips)),
+                         fmt::format("initial states {}, same states, {} of them flip", seen, GivenPercent(*o.flips)),
                          PairsForMcNemar(flips, o.promise), "exact McNemar"));
   rows.push_back(SizeRow("unpaired_episodes", fmt::format("episodes of each policy {}, different states", seen),
                          TrialsPerPolicy(o.rate, OtherRate(o), o.promise), "normal approximation"));
@@ -121,7 +127,7 @@ void AddDifferences(const PlanOptions& o, std::vector<PlanRow>& rows) {
 
 void AddCorrelation(const PlanOptions& o, std::vector<PlanRow>& rows) {
   rows.push_back(SizeRow("correlation_points",
-                         fmt::format("policies to show that a correlation of {:.2f} is not 0", o.correlation),
+                         fmt::format("policies to show that a correlation of {} is not 0", GivenNumber(o.correlation)),
                          PointsForCorrelation(o.correlation, o.promise), "Fisher z"));
 }
 
@@ -130,7 +136,8 @@ void AddRaters(const PlanOptions& o, std::vector<PlanRow>& rows) {
   const Number value = raters > 0 ? Number(raters) : Number(Undefined{"more than 99"});
   rows.push_back(
       Row("raters",
-          fmt::format("raters, each {} right, for a majority {} right", Percent(o.accuracy), Percent(o.wanted_right)),
+          fmt::format("raters, each {} right, for a majority {} right", GivenPercent(o.accuracy),
+                      GivenPercent(o.wanted_right)),
           value, std::to_string(raters), "binomial"));
   const PanelQuality three = PanelOf(3, o.accuracy);
   rows.push_back(Row("three_raters_right", "three such raters: majority right", three.majority_right,
@@ -173,14 +180,14 @@ std::vector<std::string> Words(const PlanOptions& o, const std::vector<PlanRow>&
         fmt::format("To see a difference of {} with {} power, run both policies on the same {} initial states; on "
                     "different ones it "
                     "takes {} episodes of each.",
-                    GivenPoints(o.difference), Percent(o.promise.power), paired.shown, unpaired.shown));
+                    GivenPoints(o.difference), GivenPercent(o.promise.power), paired.shown, unpaired.shown));
   }
   const double power = *At(rows, "paired_power").value;
   words.push_back(
       fmt::format("The {} states at hand see it with a chance of {}{}.", o.trials, Percent(power),
                   power < 0.5 ? ": less than a coin, so do not read \"no difference\" into such a run" : ""));
   words.push_back(
-      fmt::format("One policy's rate comes out as {} {}.", Percent(o.rate), At(rows, "interval_half_width").shown));
+      fmt::format("One policy's rate comes out as {} {}.", GivenPercent(o.rate), At(rows, "interval_half_width").shown));
   const PlanRow& raters = At(rows, "raters");
   if (raters.value) {
     words.push_back(fmt::format("Use {} per clip; three would differ on {} of the clips, which need a fourth look.",
@@ -190,8 +197,8 @@ std::vector<std::string> Words(const PlanOptions& o, const std::vector<PlanRow>&
   const PlanRow& points = At(rows, "correlation_points");
   if (points.value) {
     words.push_back(
-        fmt::format("To tell a correlation of {:.2f} from 0 with {} power takes {} policies; fewer see it less often.",
-                    o.correlation, Percent(o.promise.power), points.shown));
+        fmt::format("To tell a correlation of {} from 0 with {} power takes {} policies; fewer see it less often.",
+                    GivenNumber(o.correlation), GivenPercent(o.promise.power), points.shown));
   }
   return words;
 }

@@ -46,6 +46,8 @@ std::string SignedPoints(double difference) { return fmt::format("{:+.0f}", Whol
 
 std::string GivenPoints(double share) { return fmt::format("{:g} points", 100 * share); }
 
+std::string GivenPercent(double share) { return fmt::format("{:g} %", 100 * share); }
+
 std::string NumberWithInterval(const Estimate& estimate) {
   if (!estimate.value) return "undefined: " + estimate.value.reason();
   if (!estimate.interval)

@@ -20,6 +20,8 @@ std::string PointsWithInterval(const Estimate& difference);
 std::string SignedPoints(double difference);
 /// What somebody asked for, as it was given: "10 points", "12.5 points", "0.5 points".
 std::string GivenPoints(double share);
+/// The same of a share: "90 %", "12.5 %".
+std::string GivenPercent(double share);
 /// "0.91 [0.78, 0.97]"; "0.91 (interval undefined: …)"; "undefined: …".
 std::string NumberWithInterval(const Estimate& estimate);
 /// "0.91", "-0.05": two decimals, no "-0.00"; "0.999" and less, cut, where it would otherwise

@@ -230,6 +230,14 @@ TEST(GateStates, ErrorsThatAreTooManyForTheWholeFailAPartOfIt) {
   EXPECT_EQ(outcome(100), GateOutcome::kInconclusive);
 }
 
+TEST(GateStates, AShareOfErrorsIsHeldAgainstTheOneThatWasGiven) {
+  const SampleRun run({{"t", "p", "c", "-", std::string(1, 'e') + std::string(39, 's')}});
+  const RunSummary summary = run.Summary({.bootstrap_replicates = 1});
+  EXPECT_THAT(DecidedOf(summary, "test: error_share, at_most: 0.024").statement, HasSubstr("more than 2.4 %"));
+  EXPECT_THAT(DecidedOf(summary, "test: ci_lower, policy: p@c, at_least: 0.5, max_error_share: 0.024").statement,
+              HasSubstr("could not go on, more than 2.4 %"));
+}
+
 TEST(GateStates, WhatWasDecidedOfAPartIsNotOfAWholeThatLooksTheSame) {
   const RunData whole = EasyPartOf({}).data, part = EasyPartOf({{"hard", "sim", "p", "c", 30}}).data;
   EXPECT_NE(DataHash(part), DataHash(whole));

@@ -278,6 +278,16 @@ TEST(PlanFor, AMarginAndADifferenceAreSaidAsTheyWereGiven) {
   EXPECT_THAT(text, HasSubstr("episodes for ± 5 points at that rate"));
 }
 
+TEST(PlanFor, RatesAndOtherSharesAreSaidAsTheyWereGiven) {
+  const std::string text = PlanText(MakePlan({.rate = 0.125, .difference = 0.075, .flips = 0.105, .correlation = 0.999,
+                                              .accuracy = 0.925, .wanted_right = 0.995, .promise = {.power = 0.825}}));
+  EXPECT_THAT(text, HasSubstr("interval of a rate of 12.5 % from"));
+  EXPECT_THAT(text, HasSubstr("to see 20 % against 12.5 %, same states, 10.5 % of them flip"));
+  EXPECT_THAT(text, HasSubstr("raters, each 92.5 % right, for a majority 99.5 % right"));
+  EXPECT_THAT(text, HasSubstr("a difference of 7.5 points with 82.5 % power"));
+  EXPECT_THAT(text, HasSubstr("To tell a correlation of 0.999 from 0"));
+}
+
 TEST(PlanFor, AnswersInWordsAndATableForTheUsersNumbers) {
   const Plan plan = MakePlan({.rate = 0.28, .difference = 0.08, .trials = 25});
   EXPECT_THAT(PlanText(plan), HasSubstr("it takes 533 episodes of each"));
