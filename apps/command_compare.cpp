@@ -74,6 +74,7 @@ JudgedRun Read(const std::string& folder, const CompareArguments& arguments) {
   options.bootstrap_replicates = 1;  // no correlation is shown
   JudgedRun run{folder, Summarise(ReadRun(Store::Open(folder, Store::Mode::kReadOnly)), options)};
   const auto counts = [&](const std::string& judge) { return IsCounted(judge, run.summary.options.judge); };
+  if (run.summary.judges.empty()) throw NobodyJudged(folder, arguments.judge);
   if (std::ranges::none_of(run.summary.judges, counts)) {
     throw InvalidInput("{}: no verdict of judge '{}', found: {}", folder, arguments.judge,
                        fmt::join(run.summary.judges, ", "));

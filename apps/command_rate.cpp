@@ -156,6 +156,9 @@ void Resolve(const RateArguments& arguments) {
   const Resolved resolved = ResolveStudy(study, arguments.resolve);
   fmt::print("{}: {} clips decided, {} not; {} new verdicts in their runs\n", arguments.resolve.judge, resolved.decided,
              resolved.undecided, resolved.written);
+  if (resolved.unlabelled > 0)
+    fmt::print("note: {} of the study's clips are examples and practice: they get no label, and no rate counts them\n",
+               resolved.unlabelled);
   for (const std::string& warning : resolved.warnings) fmt::print("note: {}\n", warning);
 }
 

@@ -1,14 +1,13 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cctype>
 #include <charconv>
 #include <memory>
-#include <string_view>
 
 #include "apps/commands.h"
 #include "apps/evaluate.h"
 #include "apps/factory.h"
+#include "apps/for_shell.h"
 #include "apps/network_parts.h"
 #include "apps/recorded_suite.h"
 #include "core/version.h"
@@ -47,17 +46,6 @@ Shard ShardNamed(const std::string& text) {
   const bool is_read = reads(0, slash, shard.number) && reads(slash + 1, text.size(), shard.of);
   if (is_read && shard.number >= 1 && shard.number <= shard.of) return shard;
   throw InvalidInput("--shard: found '{}', wanted which of how many, such as 2/4", text);
-}
-
-/// As a shell reads it back: `judges=[oracle]` would else be a pattern.
-std::string ForShell(const std::string& word) {
-  const bool is_plain = !word.empty() && std::ranges::all_of(word, [](unsigned char c) {
-    return std::isalnum(c) || std::string_view("_-./=,:@+%").find(static_cast<char>(c)) != std::string_view::npos;
-  });
-  if (is_plain) return word;
-  std::string quoted = "'";
-  for (const char c : word) quoted += c == '\'' ? "'\\''" : std::string(1, c);
-  return quoted + "'";
 }
 
 std::string ResumeCommand(const std::string& run) { return "evac resume " + ForShell(run); }

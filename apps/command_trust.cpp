@@ -31,10 +31,11 @@ std::vector<std::string> ModelWorlds(const RunSummary& summary, const std::strin
   return worlds;
 }
 
-/// More episodes would not help whoever asks for a judge that the run has not. Of one that nobody judged yet they might.
+/// More episodes, or real trials, would not help whoever asks for a judge that the run has not.
 void DemandVerdicts(const RunSummary& summary, const TrustArguments& arguments) {
   const auto counts = [&](const std::string& judge) { return IsCounted(judge, summary.options.judge); };
-  if (summary.judges.empty() || std::ranges::any_of(summary.judges, counts)) return;
+  if (std::ranges::any_of(summary.judges, counts)) return;
+  if (summary.judges.empty()) throw NobodyJudged(arguments.run, arguments.judge);
   throw InvalidInput("--judge: found '{}', wanted one who has judged {}: {}", arguments.judge, arguments.run,
                      fmt::join(summary.judges, ", "));
 }

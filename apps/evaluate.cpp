@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "apps/factory.h"
+#include "apps/for_shell.h"
 #include "apps/interrupts.h"
 #include "apps/progress_display.h"
 #include "core/seed.h"
@@ -87,13 +88,20 @@ void SayIfAnotherVersionBegan(const Store& store) {
 std::string GoOn(const EvaluateOptions& options, const Store& store, bool retry_failed) {
   const std::string whole = options.part_of.empty() ? "" : fmt::format("the same {} command", options.part_of);
   if (!whole.empty() && !retry_failed) return whole;
-  const std::string command = options.go_on.empty() ? fmt::format("evac resume {}", store.folder().string()) : options.go_on;
+  const std::string command = options.go_on.empty() ? "evac resume " + ForShell(store.folder().string()) : options.go_on;
   return command + (retry_failed ? " --retry-failed" : "") + options.shard.Option() + (whole.empty() ? "" : ", then " + whole);
 }
 
 /// Before whatever may take seconds: who waits at the keyboard is not to wait for it.
 void EndIfInterrupted() {
   if (IsInterrupted()) throw InternalError("interrupted");
+}
+
+/// A suite names the oracle or nobody. What has a verdict is not judged again.
+void RunJudges(const Suite& suite, Store& store) {
+  if (suite.judges.empty()) return;
+  OracleJudge oracle(store);
+  JudgeEpisodes(oracle, store, {.interrupted = IsInterrupted});
 }
 
 /// One run's state while it goes from pairing to pairing.
@@ -109,7 +117,7 @@ class Evaluation {
 
   /// A policy that cannot be started or does not fit ends the run before its first episode: the suite that is mended is
   /// another one, and begins anew. Whoever runs first is greeted then, before any episode too.
-  void GreetPolicies() const {
+  void GreetPolicies() {
     const std::vector<const SuitePolicy*> to_run = PoliciesToRun();
     for (const SuitePolicy* policy : to_run) {
       if (!policy->command.empty()) CommandLine(*policy, suite_);
@@ -117,6 +125,7 @@ class Evaluation {
     for (std::size_t i = 1; i < to_run.size(); ++i) {
       EndIfInterrupted();
       const RunningPolicy greeted(*to_run[i], suite_, store_.folder(), IsInterrupted);
+      Keep(*to_run[i], greeted);
     }
   }
 
@@ -129,7 +138,7 @@ class Evaluation {
       if (!world) world = MakeCheckedWorld(suite_world, suite_policy);
       display_.Begin(fmt::format("{} · {}@{}", suite_world.name, suite_policy.name, suite_policy.checkpoint));
       RunningPolicy policy(suite_policy, suite_, store_.folder(), IsInterrupted);
-      store_.AddPolicy({suite_policy.name, suite_policy.checkpoint, policy.declaration()});
+      Keep(suite_policy, policy);
       Probe(policy, *world, suite_world, suite_policy);
       EndIfInterrupted();  // a probe that was broken off says nothing
       JobQueue jobs(to_run);
@@ -140,6 +149,7 @@ class Evaluation {
       plan_.failed += summary.failed;
       if (summary.failed > 0) display_.Say(fmt::format("{} episodes failed; the last: {}", summary.failed, summary.last_failure));
       if (summary.interrupted || summary.budget_spent) return End(summary);
+      RunJudges(suite_, store_);  // nobody else may while this writes, and who looks meanwhile looks for verdicts
     }
     return true;
   }
@@ -148,6 +158,13 @@ class Evaluation {
   const Plan& plan() const { return plan_; }
 
  private:
+  /// What it declares; where that is not what the suite calls it, it is said, once.
+  void Keep(const SuitePolicy& entry, const RunningPolicy& policy) {
+    store_.AddPolicyAsItIsNow({entry.name, entry.checkpoint, policy.declaration()});
+    const std::string other = policy.declared_otherwise();
+    if (!other.empty() && noted_.insert(other).second) display_.Say("evac: note: " + other);
+  }
+
   /// What the store does not have yet, and what failed where that is to run again.
   std::vector<Job> JobsToRun(const SuiteWorld& world, const SuitePolicy& policy) const {
     std::vector<Job> jobs = JobsOf(suite_, shard_, world, policy);
@@ -252,15 +269,9 @@ class Evaluation {
   const std::set<EpisodeKey> to_retry_;  ///< failed when this began
   Plan plan_;
   ProgressDisplay display_;
+  std::set<std::string> noted_;  ///< of policies, already
   std::string why_ended_;
 };
-
-/// A suite names the oracle or nobody.
-void RunJudges(const Suite& suite, Store& store) {
-  if (suite.judges.empty()) return;
-  OracleJudge oracle(store);
-  JudgeEpisodes(oracle, store, {.interrupted = IsInterrupted});
-}
 
 /// @returns why it ended before its last episode, or nothing.
 std::string RunWorlds(const Suite& suite, const EvaluateOptions& options, Store& store) try {

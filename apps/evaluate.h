@@ -26,7 +26,8 @@ struct EvaluateOptions {
   std::string part_of = "";   ///< the command whose part this run is ("evac fidelity"): it goes on with the run itself
 };
 
-/// Runs every episode of the suite's shard that `store` does not have, judges what is there, and says on stderr what it does.
+/// Runs every episode of the suite's shard that `store` does not have, judges what is there, each policy's episodes in a
+/// world once they are through, and says on stderr what it does.
 /// @returns kOk: every job has a row and the error budget holds; kInternal: interrupted, or the budget is spent.
 /// @throws InvalidInput before the first episode if a policy cannot be started or does not fit the suite.
 ExitCode Evaluate(const Suite& suite, Store& store, const EvaluateOptions& options);

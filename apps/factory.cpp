@@ -166,6 +166,20 @@ std::vector<std::string> CommandLine(const SuitePolicy& policy, const Suite& sui
   return words;
 }
 
+std::string DeclaredOtherwise(const SuitePolicy& policy, const PolicySpec& declared) {
+  const auto differs = [](const std::string& ours, const std::string& theirs) {
+    return !ours.empty() && !theirs.empty() && ours != theirs;
+  };
+  const auto said = [](const std::string& checkpoint) {  // nobody says the default one
+    return checkpoint == kDefaultCheckpoint ? std::string() : checkpoint;
+  };
+  const bool is_other = differs(policy.name, declared.name) ||
+                        differs(said(policy.checkpoint), said(declared.checkpoint));
+  if (!policy.command.empty() || !is_other) return "";
+  return fmt::format("policy {}@{} declares itself as {}@{}; its episodes are called as the suite says", policy.name,
+                     policy.checkpoint, declared.name, declared.checkpoint);
+}
+
 RunningPolicy::RunningPolicy(const SuitePolicy& policy, const Suite& suite, const fs::path& run_folder, std::function<bool()> interrupted)
     : entry_(policy), suite_(suite) {
   LcmPolicyOptions options;

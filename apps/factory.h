@@ -41,6 +41,10 @@ std::unique_ptr<World> MakeWorld(const SuiteWorld& world, const Suite& suite, co
 /// @throws InvalidInput if the program is not there; for `${recording}` where there are several.
 std::vector<std::string> CommandLine(const SuitePolicy& policy, const Suite& suite);
 
+/// Under which name or checkpoint other than the suite's a joined policy declares itself, a sentence; empty: under none.
+/// Its episodes are called as the suite says: who joined the process of another checkpoint is to know.
+std::string DeclaredOtherwise(const SuitePolicy& policy, const PolicySpec& declared);
+
 /// A policy's process, if it is ours to start, and the link to it; both gone with this, and before `policy` and `suite`.
 class RunningPolicy {
  public:
@@ -54,6 +58,7 @@ class RunningPolicy {
   Policy& policy() { return *link_; }
   int chunk_size() const { return spec_.chunk_size; }
   std::string declaration() const { return ToJson(spec_); }
+  std::string declared_otherwise() const { return DeclaredOtherwise(entry_, spec_); }
   Counters counters() const;
 
   /// After its answers: one that was started again has read its files again. @throws InvalidInput as DemandUnchanged

@@ -6,6 +6,7 @@
 
 #include "apps/command_rate.h"
 #include "apps/commands.h"
+#include "core/standard_streams.h"
 #include "core/tensor_file.h"
 #include "core/version.h"
 
@@ -70,6 +71,7 @@ int Main(int argc, char** argv) {
 /// Results that a full disk did not take are no results, whatever was decided.
 int main(int argc, char** argv) {
   constexpr int kInternal = static_cast<int>(evac::ExitCode::kInternal);
+  evac::OpenStandardStreams();
   const int exit_code = Main(argc, argv);
   const bool is_written = std::fflush(stdout) == 0 && std::ferror(stdout) == 0;
   if (is_written || exit_code == kInternal) return exit_code;

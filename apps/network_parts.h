@@ -35,11 +35,15 @@ std::unique_ptr<World> MakeEvacWorld(const SuiteWorld& world, const Suite& suite
 /// period, other cameras or arms than `tasks` have, other statistics, other pose maps.
 void CheckNetwork(const SuiteWorld& world, const std::vector<Task>& tasks);
 
+/// Error::kind of what is wrong with a suite whichever recording it is asked about.
+inline constexpr const char* kSuiteError = "suite";
+
 /// A recording of a suite with a world of type `evac`, as its network was trained to see one: in steps of the world's
 /// period, by the cameras that the weights say, or by as many as the network has views, the head first: others are not
 /// looked at, and may be broken.
-/// @throws InvalidInput if its steps are no whole part of that period; if a camera is missing; if two of the suite's
-///   networks want it otherwise: what each wants.
+/// @throws InvalidInput if its steps are no whole part of that period; if a camera is missing; called kSuiteError, which
+///   is no recording's fault: if two of the suite's networks want it otherwise (what each wants), or one of them another
+///   period than the suite says.
 Recording ReadAsTrained(const Suite& suite, const std::filesystem::path& folder);
 
 /// The classifier judge of a run. @throws InvalidInput if the weights are none of its, or do not know the run's tasks.

@@ -259,6 +259,7 @@ Resolved ResolveStudy(const StudyStore& study, const ResolveOptions& options) {
       by_run[clip.clip.run].push_back(std::move(told));
     }
   }
+  resolved.unlabelled = std::ssize(tally.clips()) - std::ssize(clips);
   const WhichStudy which{study.info().name, study.Id()};
   // Before any is written.
   for (const auto& [run, all] : by_run) NewFor(Store::Open(run, Store::Mode::kReadOnly), all, which);

@@ -17,6 +17,7 @@ struct ResolveOptions {
 struct Resolved {
   std::int64_t written = 0;  ///< new verdicts in the runs' stores
   std::int64_t decided = 0, undecided = 0;
+  std::int64_t unlabelled = 0;  ///< examples and practice clips of the study: of them no label is made
   std::vector<std::string> warnings;
 };
 

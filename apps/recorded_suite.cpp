@@ -93,7 +93,8 @@ class RecordedStates {
     try {
       Add(folder, row, ReadAt(suite_, folder));
     } catch (const Error& error) {
-      if (error.exit_code() != ExitCode::kInvalidInput || std::string_view(error.kind()) == kChangedError) throw;
+      const std::string_view kind = error.kind();
+      if (error.exit_code() != ExitCode::kInvalidInput || kind == kChangedError || kind == kSuiteError) throw;
       left_out_.push_back(error.what());
     }
   }
@@ -169,6 +170,7 @@ Recording RecordingOf(const Suite& suite, const InitialState& initial) {
 void FillInRecordedTask(Suite& suite) {
   if (!suite.recording || !suite.tasks.empty()) return;
   IsRecording(*suite.recording) ? FillInOne(suite) : FillInSeveral(suite);
+  CheckVideoSizes(suite);
 }
 
 }  // namespace evac

@@ -22,7 +22,7 @@ Recording RecordingOf(const Suite& suite, const InitialState& initial);
 /// by cameras that are calibrated otherwise than the first's (CalibrationDifference; the principal point by kSameFocal
 /// of a side), which policies are told of in every state.
 /// @throws InvalidInput if none is left, if they are of several tasks, if fewer are left than the suite asks for, or if
-/// one is another than when the suite was read.
+/// one is another than when the suite was read; for what is wrong with the suite itself (kSuiteError).
 void FillInRecordedTask(Suite& suite);
 
 }  // namespace evac

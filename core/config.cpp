@@ -245,7 +245,8 @@ Config Config::FromText(const std::string& text, const std::filesystem::path& na
 
 void Config::Set(const std::string& assignment) {
   const std::size_t equals = assignment.find('=');
-  if (equals == std::string::npos || equals == 0 || assignment[equals - 1] == '.')
+  const bool has_nameless = ("." + assignment.substr(0, equals) + ".").find("..") != std::string::npos;
+  if (equals == std::string::npos || has_nameless)
     throw InvalidInput("--set {}: wanted path.to.field=VALUE", assignment);
   DemandUtf8(assignment, std::filesystem::path("--set"));
   std::vector<std::string> keys;
@@ -253,9 +254,10 @@ void Config::Set(const std::string& assignment) {
   for (std::string key; std::getline(path, key, '.');) keys.push_back(key);
 
   YAML::Node parent = node_;  // reset, never assigned: assignment would write into the tree
-  for (std::size_t i = 0; i + 1 < keys.size(); ++i) {
-    const YAML::Node next = Step(parent, keys[i]);
-    if (!next.IsDefined()) throw InvalidInput("--set {}: {} has no field '{}'", assignment, file_.string(), keys[i]);
+  std::size_t depth = 0;      // of the first key that is not there, or of the last one
+  for (; depth + 1 < keys.size(); ++depth) {
+    const YAML::Node next = Step(parent, keys[depth]);
+    if (!next.IsDefined() || next.IsNull()) break;
     parent.reset(next);
   }
   YAML::Node value;
@@ -264,15 +266,20 @@ void Config::Set(const std::string& assignment) {
   } catch (const YAML::Exception& error) {
     throw InvalidInput("--set {}: the value is not YAML: {}", assignment, error.msg);
   }
+  for (std::size_t i = keys.size() - 1; i > depth; --i) {  // sections that are not there are made
+    YAML::Node section(YAML::NodeType::Map);
+    section[keys[i]] = value;
+    value.reset(section);
+  }
   DemandPlain(value, "--set " + assignment);
-  YAML::Node item = Step(parent, keys.back());
+  YAML::Node item = Step(parent, keys[depth]);
   DemandOnePlace(item.IsDefined() ? item : parent, node_, assignment, file_);
   if (parent.IsMap()) {
-    parent[keys.back()] = value;
+    parent[keys[depth]] = value;
     return;
   }
   if (!item.IsDefined())
-    throw InvalidInput("--set {}: {} has no field or item '{}'", assignment, file_.string(), keys.back());
+    throw InvalidInput("--set {}: {} has no field or item '{}'", assignment, file_.string(), keys[depth]);
   item = value;
 }
 
@@ -289,9 +296,10 @@ std::string Config::Where(const std::string& key) const {
   const YAML::Node child = key.empty() ? node_ : Child(key);
   const YAML::Mark mark = child.IsDefined() ? child.Mark() : node_.Mark();
   const std::string field = FieldName(key);
-  // Only the whole page begins at the first letter; a field that does is a text of its own, from --set.
+  // Only the whole page begins at the first letter; a field that does is a text of its own, from --set, and one that
+  // begins nowhere a section that was made for it.
   const bool is_page = child.IsDefined() ? field.empty() : field_.empty();
-  const std::string line = mark.pos == 0 && !is_page ? " (--set)" : fmt::format(":{}", mark.line + 1);
+  const std::string line = mark.pos <= 0 && !is_page ? " (--set)" : fmt::format(":{}", mark.line + 1);
   return fmt::format("{}{}{}", file_.string(), line, field.empty() ? "" : ": field " + field);
 }
 

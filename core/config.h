@@ -28,7 +28,9 @@ class Config {
   static Config FromText(const std::string& text, const std::filesystem::path& name);
 
   /// `--set path.to.field=VALUE`: VALUE is YAML; a number picks an item of a list ("policies.0.checkpoint=a").
-  /// @throws InvalidInput unless the parent exists, or if an alias in the file makes the field one with another.
+  /// Sections on the way that are not there are made; whether there may be such is for AllowOnly to say.
+  /// @throws InvalidInput for an item that no list has, for a field of what is no mapping, or if an alias in the file
+  /// makes the field one with another.
   void Set(const std::string& assignment);
 
   bool Has(const std::string& key) const;

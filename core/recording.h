@@ -34,6 +34,7 @@ struct Recording {
   std::vector<cv::Mat> first_images;   ///< CV_8UC3 RGB, in the order of `cameras`
   std::vector<std::filesystem::path> videos;  ///< in the order of `cameras`, or empty: there is only the first frame
   int every_nth = 1;                          ///< step k is frame k * every_nth of a video
+  int shrink = 1;  ///< pixels of a video to one of `first_images` and of what RecordedFrames shows, in either direction
   std::vector<std::filesystem::path> files;   ///< all that were read
   bool says_period = true;  ///< false: no video says how far apart steps are, and `period_s` is the layout's
 };
@@ -96,6 +97,10 @@ Recording Thinned(Recording recording, double period_s);
 /// apart.
 /// @throws InvalidInput as Thinned for any other.
 Recording BegunFrom(Recording recording, double period_s);
+
+/// The same recording in smaller images, each pixel the mean of `shrink` x `shrink`, with cameras of their size: of
+/// videos that were drawn larger than their pictures (RecordingVideo::scale) those pictures.
+Recording Shrunk(Recording recording, int shrink);
 
 /// One walk through a recording's images, front to back. Each has its own decoders: any number walk at once.
 class RecordedFrames {

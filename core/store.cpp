@@ -154,6 +154,13 @@ void Store::AddPolicy(const PolicyInfo& policy) {
   database_->Write([&](auto& connection) { rows::DeclarePolicy(connection, policy); });
 }
 
+void Store::AddPolicyAsItIsNow(const PolicyInfo& policy) {
+  database_->Write([&](auto& connection) {
+    rows::ForgetDeclarationWithoutEpisodes(connection, policy);
+    rows::DeclarePolicy(connection, policy);
+  });
+}
+
 std::vector<Task> Store::Tasks() const { return database_->Read(rows::SelectTasks); }
 std::vector<WorldInfo> Store::Worlds() const { return database_->Read(rows::SelectWorlds); }
 std::vector<PolicyInfo> Store::Policies() const { return database_->Read(rows::SelectPolicies); }

@@ -127,6 +127,8 @@ class Store {
   void AddTask(const Task& task, const std::string& page_hash = "");
   void AddWorld(const WorldInfo& world);
   void AddPolicy(const PolicyInfo& policy);
+  /// The same, but one that has no episode yet may say something else than it did: it was mended since.
+  void AddPolicyAsItIsNow(const PolicyInfo& policy);
   std::vector<Task> Tasks() const;
   std::vector<WorldInfo> Worlds() const;
   std::vector<PolicyInfo> Policies() const;

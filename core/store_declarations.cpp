@@ -97,6 +97,13 @@ void DeclarePolicy(sqlite::Connection& connection, const PolicyInfo& policy) {
   ThrowOther("policy '" + policy.name + "@" + policy.checkpoint + "'", row.Text(0), policy.declaration);
 }
 
+void ForgetDeclarationWithoutEpisodes(sqlite::Connection& connection, const PolicyInfo& policy) {
+  connection.Run(
+      "DELETE FROM policies WHERE name = ?1 AND checkpoint = ?2 AND declaration <> ?3 AND NOT EXISTS "
+      "(SELECT 1 FROM episodes WHERE policy = ?1 AND checkpoint = ?2)",
+      policy.name, policy.checkpoint, policy.declaration);
+}
+
 std::vector<Task> SelectTasks(sqlite::Connection& connection) {
   std::vector<Task> tasks;
   for (auto row = connection.Query("SELECT definition, page, page_path FROM tasks ORDER BY id"); row.Step();) {

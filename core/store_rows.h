@@ -28,6 +28,8 @@ void DeleteBeginning(sqlite::Connection& connection);
 void DeclareTask(sqlite::Connection& connection, const Task& task);
 void DeclareWorld(sqlite::Connection& connection, const WorldInfo& world);
 void DeclarePolicy(sqlite::Connection& connection, const PolicyInfo& policy);
+/// Of a policy that says something else now.
+void ForgetDeclarationWithoutEpisodes(sqlite::Connection& connection, const PolicyInfo& policy);
 std::vector<Task> SelectTasks(sqlite::Connection& connection);
 std::vector<WorldInfo> SelectWorlds(sqlite::Connection& connection);
 std::vector<PolicyInfo> SelectPolicies(sqlite::Connection& connection);

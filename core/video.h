@@ -12,6 +12,8 @@ namespace evac {
 inline constexpr const char* kVideoPresets[] = {"ultrafast", "superfast", "veryfast", "faster", "fast",
                                                 "medium",    "slow",      "slower",   "veryslow"};
 
+inline constexpr int kLongestVideoSide_px = 16384;  ///< libx264's, scaled
+
 struct VideoOptions {
   double period_s = 0.1;  ///< presentation time of frame k is k * period_s exactly (time base 1/1000 s or finer)
   int crf = 20;           ///< H.264 quality, 0 lossless … 51

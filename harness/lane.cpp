@@ -105,7 +105,7 @@ void Lane::Observe(const Advanced& advanced) {
   if (chunk_.ends_recording) {
     Stop(StopReason::kRecordingEnd, fmt::format("the recording ended after {} steps in {} chunks", episode_.commands.size(), episode_.chunks));
   } else if (episode_.chunks >= job_.task->max_chunks) {
-    Stop(StopReason::kMaxChunks, fmt::format("still moving after {} chunks, the task's limit", episode_.chunks));
+    Stop(StopReason::kMaxChunks, still_.AtLimit());
   }
 }
 

@@ -334,10 +334,21 @@ RunExtent Fill(const fs::path& part, const std::vector<Store>& stores, const Cho
   return ExtentOf(merged.Plan(), merged.Episodes());
 }
 
+/// Without those that stand there before: what was counted on their wires would be counted again.
+std::vector<fs::path> EachOnce(const std::vector<fs::path>& shards) {
+  std::vector<fs::path> once;
+  std::set<fs::path> seen;
+  for (const fs::path& shard : shards) {
+    if (seen.insert(fs::weakly_canonical(WithoutSlash(shard))).second) once.push_back(shard);
+  }
+  return once;
+}
+
 }  // namespace
 
-MergeSummary MergeRuns(const std::vector<fs::path>& shards, const fs::path& wanted_out) {
+MergeSummary MergeRuns(const std::vector<fs::path>& given, const fs::path& wanted_out) {
   const fs::path out = WithoutSlash(wanted_out);
+  const std::vector<fs::path> shards = EachOnce(given);
   if (shards.empty()) throw InvalidInput("merge: found no shard, wanted at least one run's folder");
   if (out.empty()) throw InvalidInput("merge: found no name, wanted a new folder for the merged run");
   RequireFree(out);

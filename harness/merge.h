@@ -21,7 +21,8 @@ struct MergeSummary {
 /// episodes, videos (copied and checked against their hashes), initial scenes, verdicts, trials on a real robot,
 /// counters, and what the suite asks for. Sequential looks and gates' decisions stay behind: they were looks at a part,
 /// and are none at the whole. So does what model servers were asked and answered (CallCache): a judge of the merged run
-/// asks again; and what policies printed (logs/), which shards have under the same names. The run's evac_version is that
+/// asks again; and what policies printed (logs/), which shards have under the same names. A folder that is given twice is
+/// one shard; of shards that overlap otherwise the counters are added all the same. The run's evac_version is that
 /// of all shards, or each of theirs once, with commas between.
 ///
 /// An episode that several shards hold must be the same in all, to the bytes of its video; a failed one yields to one

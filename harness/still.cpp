@@ -14,6 +14,10 @@ std::string Sentence(const Motion& motion) {
   return fmt::format("{:.1f} mm, {:.3f} rad, closure {:.3f}", 1e3 * motion.translation_m, motion.rotation_rad, motion.closure);
 }
 
+Motion Larger(const Motion& a, const Motion& b) {
+  return {std::max(a.translation_m, b.translation_m), std::max(a.rotation_rad, b.rotation_rad), std::max(a.closure, b.closure)};
+}
+
 }  // namespace
 
 Motion LargestMotion(const Arms& start, std::span<const Arms> later) {
@@ -34,16 +38,25 @@ bool StillMeter::Below(const Motion& motion) const {
 }
 
 std::optional<std::string> StillMeter::Rest(const Arms& last, std::span<const Arms> chunk, std::span<const Arms> observed) {
+  const int executed = chunks_++;
   if (!rule_.enabled) return std::nullopt;
   const Motion commanded = LargestMotion(last, chunk);
   const Motion seen = observed.empty() ? Motion{} : LargestMotion(observed.front(), observed.subspan(1));
   still_ = Below(commanded) && Below(seen) ? still_ + 1 : 0;
-  const bool rests = still_ >= rule_.dwell_chunks && chunks_ >= rule_.min_chunks;
-  ++chunks_;
+  commanded_ = still_ > 1 ? Larger(commanded_, commanded) : commanded;
+  seen_ = still_ > 1 ? Larger(seen_, seen) : seen;
+  const bool rests = still_ >= rule_.dwell_chunks && executed >= rule_.min_chunks;
   if (!rests) return std::nullopt;
   return fmt::format("still for {} chunks: the commanded gripper moves at most {}, the observed one {} (limits {}), after {} chunks", still_,
-                     Sentence(commanded), observed.empty() ? "is not measured" : "moved " + Sentence(seen),
-                     Sentence({rule_.translation_m, rule_.rotation_rad, rule_.closure}), chunks_ - 1);
+                     Sentence(commanded_), observed.empty() ? "is not measured" : "moved " + Sentence(seen_),
+                     Sentence({rule_.translation_m, rule_.rotation_rad, rule_.closure}), executed);
+}
+
+std::string StillMeter::AtLimit() const {
+  if (!rule_.enabled) return fmt::format("after {} chunks, the task's limit; no rule says when it rests", chunks_);
+  if (still_ == 0) return fmt::format("still moving after {} chunks, the task's limit", chunks_);
+  return fmt::format("after {} chunks, the task's limit, still for the last {} (dwell_chunks {}, min_chunks {})", chunks_, still_,
+                     rule_.dwell_chunks, rule_.min_chunks);
 }
 
 }  // namespace evac

@@ -35,12 +35,16 @@ class StillMeter {
   /// @returns the sentence with the numbers if the episode is over, else nothing.
   std::optional<std::string> Rest(const Arms& last, std::span<const Arms> chunk, std::span<const Arms> observed);
 
+  /// What is to be said where the task's limit ends the episode after the chunks so far: it need not have moved.
+  std::string AtLimit() const;
+
  private:
   bool Below(const Motion& motion) const;
 
   StillRule rule_;
-  int chunks_ = 0;  ///< executed so far
+  int chunks_ = 0;  ///< asked about so far
   int still_ = 0;   ///< in a row
+  Motion commanded_, seen_;  ///< the largest in those
 };
 
 }  // namespace evac

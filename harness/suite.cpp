@@ -248,6 +248,20 @@ void CheckPeriods(const Suite& suite, const Config& page) {
   }
 }
 
+/// The task's cameras beside each other, each pixel as large as `video.scale` makes it.
+void CheckVideoSize(const Suite& suite, const Task& task) {
+  int width_px = 0, height_px = 0;
+  for (const Camera& camera : task.cameras) {
+    width_px += camera.width_px;
+    height_px = std::max(height_px, camera.height_px);
+  }
+  const int longest = std::max(width_px, height_px), most = kLongestVideoSide_px / std::max(1, longest);
+  if (suite.video.scale <= most) return;
+  throw InvalidInput("{}: field video.scale: found {}, wanted at most {}: the pictures of task {} beside each other are "
+                     "{}x{}, and a video's side has at most {} pixels",
+                     suite.path.string(), suite.video.scale, most, task.id, width_px, height_px, kLongestVideoSide_px);
+}
+
 void CheckWhole(const Suite& suite, const Config& page) {
   page.Require(!suite.worlds.empty(), "worlds", "at least one world");
   page.Require(!suite.policies.empty(), "policies", "at least one policy");
@@ -269,6 +283,7 @@ void CheckWhole(const Suite& suite, const Config& page) {
   page.Require(reals <= 1, "worlds", "at most one world with role: real");
   CheckStates(suite, page);
   CheckPeriods(suite, page);
+  CheckVideoSizes(suite);
   for (const SuiteWorld& world : suite.worlds) {
     if (world.type == "evac") {
       page.Require(
@@ -382,6 +397,11 @@ void SetFromHere(const std::string& assignment, Config& page) {
 }
 
 }  // namespace
+
+void CheckVideoSizes(const Suite& suite) {
+  if (std::ranges::none_of(suite.worlds, &SuiteWorld::film)) return;
+  for (const Task& task : suite.tasks) CheckVideoSize(suite, task);
+}
 
 bool HasNetwork(const Suite& suite) {
   return std::ranges::any_of(suite.worlds, [](const SuiteWorld& world) { return world.evac.has_value(); });

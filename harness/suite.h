@@ -98,6 +98,10 @@ bool HasNetwork(const Suite& suite);
 /// How many of so many episodes may fail before a run gives up: the suite's share of them, rounded down.
 int AllowedFailures(const Suite& suite, int episodes);
 
+/// @throws InvalidInput if a task's cameras, beside each other and scaled, are larger than a video can be. Of tasks that come
+/// from recordings once these are read (ReadSuite checks the others).
+void CheckVideoSizes(const Suite& suite);
+
 /// The initial states that a world tries.
 std::span<const InitialState> StatesOf(const Suite& suite, const SuiteWorld& world);
 

@@ -40,25 +40,15 @@ class Files {
   std::vector<ChartFile> files_;
 };
 
-std::size_t WorldIndex(const RunSummary& summary, const std::string& world) {
-  std::size_t index = 1;  // 0 is the real one
-  for (const WorldInfo& info : summary.data.worlds) {
-    if (info.name == world) return info.is_real ? 0 : index;
-    if (!info.is_real) ++index;
-  }
-  return index;
-}
-
 /// "● real, ◇ sim": which marker is whose.
-std::string Key(const std::vector<std::string>& worlds) {
-  static constexpr const char* kSigns[] = {"●", "◇", "▽", "✚"};
+std::string Key(const std::vector<std::string>& worlds, const WorldMarks& marks) {
   std::string key;
-  for (std::size_t i = 0; i < worlds.size(); ++i)
-    key += fmt::format("{}{} {}", i == 0 ? "" : ", ", kSigns[std::min<std::size_t>(i, 3)], worlds[i]);
+  for (const std::string& world : worlds)
+    key += fmt::format("{}{} {}", key.empty() ? "" : ", ", WorldSign(marks.at(world)), world);
   return key;
 }
 
-void AddRates(const RunSummary& summary, Files& files) {
+void AddRates(const RunSummary& summary, const WorldMarks& marks, Files& files) {
   for (const Task& task : summary.data.tasks) {
     RowChart chart;
     chart.words = fmt::format("Success rates on {}, percent.", task.id);
@@ -69,14 +59,14 @@ void AddRates(const RunSummary& summary, Files& files) {
         if (is_first) chart.rows.push_back({policy, "", {}, 0, true});
         is_first = false;
         chart.rows.push_back({cell.world, fmt::format("{}, n = {}", PercentWithInterval(cell.rate), cell.rate.n),
-                              cell.rate, WorldIndex(summary, cell.world), false});
+                              cell.rate, marks.at(cell.world), false});
       }
     }
     if (!chart.rows.empty()) files.Add("rates-" + task.id, RowsDrawing(chart), "Success rate at " + task.id + ", %");
   }
 }
 
-void AddTrust(const ReportData& report, Files& files) {
+void AddTrust(const ReportData& report, const WorldMarks& marks, Files& files) {
   for (const TrustReport& trust : report.trust) {
     RowChart chart;
     chart.words = fmt::format("Success rate in {} minus the real one, in points.", trust.world);
@@ -87,7 +77,7 @@ void AddTrust(const ReportData& report, Files& files) {
     for (const TaskTrust& task : trust.tasks) {
       chart.rows.push_back({fmt::format("{}: {}", task.task, Name(task.trust)),
                             fmt::format("{}, n = {}", PointsWithInterval(task.bias), task.pairs.n()), task.bias,
-                            WorldIndex(report.summary, trust.world), false});
+                            marks.at(trust.world), false});
     }
     files.Add("trust-" + trust.world, RowsDrawing(chart), fmt::format("Bias of {}, points", trust.world));
   }
@@ -121,19 +111,19 @@ void AddStates(const RunSummary& summary, Files& files) {
   }
 }
 
-void AddStages(const StageReport& stages, Files& files) {
+void AddStages(const StageReport& stages, const WorldMarks& marks, Files& files) {
   for (const StageFunnel& funnel : stages.funnels) {
     std::vector<std::string> worlds;
     for (const StageRow& row : funnel.worlds) worlds.push_back(row.world);
-    files.Add(fmt::format("stages-{}-{}", funnel.task, funnel.policy), StageDrawing(funnel),
-              fmt::format("{}, {}\nreached, %: {}", funnel.policy, funnel.task, Key(worlds)));
+    files.Add(fmt::format("stages-{}-{}", funnel.task, funnel.policy), StageDrawing(funnel, marks),
+              fmt::format("{}, {}\nreached, %: {}", funnel.policy, funnel.task, Key(worlds, marks)));
   }
 }
 
-void AddCheckpoints(const std::vector<CheckpointCurve>& curves, Files& files) {
+void AddCheckpoints(const std::vector<CheckpointCurve>& curves, const WorldMarks& marks, Files& files) {
   for (const CheckpointCurve& curve : curves) {
-    files.Add(fmt::format("checkpoints-{}-{}", curve.policy, curve.task), CheckpointDrawing(curve),
-              fmt::format("{}, {}\nsuccess, %: {}", curve.policy, curve.task, Key(curve.worlds)));
+    files.Add(fmt::format("checkpoints-{}-{}", curve.policy, curve.task), CheckpointDrawing(curve, marks),
+              fmt::format("{}, {}\nsuccess, %: {}", curve.policy, curve.task, Key(curve.worlds, marks)));
   }
 }
 
@@ -153,12 +143,13 @@ bool IsChartFile(const std::string& name, const std::string& svg) {
 
 std::vector<ChartFile> ChartFilesOf(const ReportData& report) {
   Files files("judge " + JudgeWords(report.summary.options.judge));
-  AddRates(report.summary, files);
-  AddTrust(report, files);
+  const WorldMarks marks = MarksOf(report.summary);
+  AddRates(report.summary, marks, files);
+  AddTrust(report, marks, files);
   AddComparisons(report.summary, files);
   AddStates(report.summary, files);
-  AddStages(report.stages, files);
-  AddCheckpoints(report.checkpoints, files);
+  AddStages(report.stages, marks, files);
+  AddCheckpoints(report.checkpoints, marks, files);
   return files.Take();
 }
 

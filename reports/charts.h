@@ -1,5 +1,6 @@
 #pragma once
 
+#include <map>
 #include <optional>
 #include <string>
 #include <vector>
@@ -35,19 +36,29 @@ std::string PointIcon(const PointStyle& style);
 /// One per point of the comparison: the same policy looks the same in every chart of a run.
 std::vector<PointStyle> StylesOf(const RunSummary& summary, const WorldComparison& comparison);
 
-/// The shape of a world's markers: a circle for the first (the real one), others after it.
+/// The index of each world, by name, that every chart of a page draws it by: 0 is the real one's alone.
+using WorldMarks = std::map<std::string, std::size_t>;
+/// The others count from 1 in this order; a name may come again.
+/// @param real  may be empty, and may be among the worlds
+WorldMarks MarksOf(const std::string& real, const std::vector<std::string>& worlds);
+WorldMarks MarksOf(const RunSummary& summary);
+
+/// The shape of a world's markers: a circle for the real one, for the others one of five.
 std::size_t WorldShape(std::size_t world);
+/// The letter that looks like it, for texts: "●".
+std::string WorldSign(std::size_t world);
 
 /// A text of at most so many letters, "…" after what is left of a longer one.
 std::string Shortened(const std::string& text, std::size_t letters);
 
 /// The other world's rate minus the real one's on a scale from -50 to +50 points, with the zone of ± margin; as wide as
-/// its place.
-std::string BiasStrip(const Estimate& bias, double margin);
+/// its place. A bar that goes on beyond the scale ends in an arrow's head; a bias beyond it has no dot.
+/// @param world  index of the other world
+std::string BiasStrip(const Estimate& bias, double margin, std::size_t world);
 /// The scale above a column of them.
 std::string BiasScale();
 
-/// Names left, dots with intervals in the middle, numbers right.
+/// Names left, dots with intervals in the middle, numbers right. What lies beyond [low, high] is drawn as in BiasStrip.
 struct RowChart {
   struct Row {
     std::string name, numbers;
@@ -64,9 +75,11 @@ struct RowChart {
 Drawing RowsDrawing(const RowChart& chart);
 
 /// Share of episodes that reached each stage, one series per world, every dot with its interval.
-Drawing StageDrawing(const StageFunnel& funnel);
+/// @param marks  of all worlds of the funnel
+Drawing StageDrawing(const StageFunnel& funnel, const WorldMarks& marks);
 /// Success rate by checkpoint, one series per world, every dot with its interval.
-Drawing CheckpointDrawing(const CheckpointCurve& curve);
+/// @param marks  of all worlds of the curve
+Drawing CheckpointDrawing(const CheckpointCurve& curve, const WorldMarks& marks);
 
 /// One initial state in two worlds.
 struct StateOutcomes {

@@ -14,8 +14,15 @@ constexpr double kNames = 210, kPlot = 330, kNumbers = 200, kRow = 22, kHead = 2
 /// A straight map from [low, high] to the plot.
 struct Axis {
   double low = 0, high = 1;
+  bool Holds(double value) const { return low <= value && value <= high; }
   double X(double value) const { return kNames + kPlot * (std::clamp(value, low, high) - low) / (high - low); }
 };
+
+/// How a bar's end is drawn, from where it is: a cap; where the axis ends before the bar does, an arrow's head.
+const char* EndOf(double value, const Axis& axis) {
+  if (value < axis.low) return "m5-4l-5 4l5 4";
+  return value > axis.high ? "m-5-4l5 4l-5 4" : "m0-4v8";
+}
 
 std::string Ticks(const RowChart& chart, const Axis& axis, double bottom) {
   std::string svg;
@@ -37,13 +44,14 @@ std::string RowOf(const RowChart::Row& row, const Axis& axis, double y) {
   if (row.is_group) return svg;
   svg += fmt::format("<text x=\"{:g}\" y=\"{:.1f}\">{}</text>", kNames + kPlot + 14, y + 4, Escaped(row.numbers));
   if (!row.estimate.value || !row.estimate.interval) return svg;
-  const double low = axis.X(row.estimate.interval->low), high = axis.X(row.estimate.interval->high);
-  svg += fmt::format(
-      "<g class=\"w{}\"><path class=\"range\" d=\"M{:.1f} {:.1f}H{:.1f}M{:.1f} {:.1f}v8M{:.1f} {:.1f}v8\"/>",
-      row.world % 4, low, y, high, low, y - 4, high, y - 4);
-  svg += fmt::format("<g transform=\"translate({:.1f} {:.1f})\">{}</g></g>", axis.X(*row.estimate.value), y,
-                     Marker(WorldShape(row.world), "dot"));
-  return svg;
+  const auto [low, high] = *row.estimate.interval;
+  svg += fmt::format("<g class=\"w{0}\"><path class=\"range\" d=\"M{1:.1f} {2:.1f}H{3:.1f}M{1:.1f} {2:.1f}{4}M{3:.1f} "
+                     "{2:.1f}{5}\"/>",
+                     row.world % 4, axis.X(low), y, axis.X(high), EndOf(low, axis), EndOf(high, axis));
+  if (axis.Holds(*row.estimate.value))
+    svg += fmt::format("<g transform=\"translate({:.1f} {:.1f})\">{}</g>", axis.X(*row.estimate.value), y,
+                       Marker(WorldShape(row.world), "dot"));
+  return svg + "</g>";
 }
 
 }  // namespace
@@ -61,8 +69,9 @@ Drawing RowsDrawing(const RowChart& chart) {
   return drawing;
 }
 
-std::string BiasStrip(const Estimate& bias, double margin) {
-  const auto place = [](double share) { return 50 + 100 * std::clamp(share, -0.5, 0.5); };
+std::string BiasStrip(const Estimate& bias, double margin, std::size_t world) {
+  constexpr Axis kAxis{-0.5, 0.5};
+  const auto place = [&](double share) { return 50 + 100 * std::clamp(share, kAxis.low, kAxis.high); };
   std::string svg = fmt::format("<svg class=\"strip\" role=\"img\" aria-label=\"{}\" height=\"24\">",
                                 Escaped("bias " + PointsWithInterval(bias)));
   svg += fmt::format("<rect class=\"zone\" x=\"{:.2f}%\" width=\"{:.2f}%\" y=\"0\" height=\"24\"/>", place(-margin),
@@ -70,13 +79,16 @@ std::string BiasStrip(const Estimate& bias, double margin) {
   for (const int tick : {0, 50, 100})
     svg += fmt::format("<line class=\"grid\" x1=\"{0}%\" x2=\"{0}%\" y1=\"0\" y2=\"24\"/>", tick);
   if (bias.value && bias.interval) {
-    const double low = place(bias.interval->low), high = place(bias.interval->high);
-    svg += fmt::format("<g class=\"w1\"><line class=\"range\" x1=\"{:.2f}%\" x2=\"{:.2f}%\" y1=\"12\" y2=\"12\"/>", low,
-                       high);
+    const auto [low, high] = *bias.interval;
+    const auto at = [&](double share, const std::string& shape) {
+      return fmt::format("<svg x=\"{:.2f}%\" y=\"12\" overflow=\"visible\">{}</svg>", place(share), shape);
+    };
+    svg += fmt::format("<g class=\"w{}\"><line class=\"range\" x1=\"{:.2f}%\" x2=\"{:.2f}%\" y1=\"12\" y2=\"12\"/>",
+                       world % 4, place(low), place(high));
     for (const double end : {low, high})
-      svg += fmt::format("<line class=\"range\" x1=\"{0:.2f}%\" x2=\"{0:.2f}%\" y1=\"8\" y2=\"16\"/>", end);
-    svg += fmt::format("<svg x=\"{:.2f}%\" y=\"12\" overflow=\"visible\">{}</svg></g>", place(*bias.value),
-                       Marker(WorldShape(1), "dot"));
+      svg += at(end, fmt::format("<path class=\"range\" d=\"M0 0{}\"/>", EndOf(end, kAxis)));
+    if (kAxis.Holds(*bias.value)) svg += at(*bias.value, Marker(WorldShape(world), "dot"));
+    svg += "</g>";
   }
   return svg + "</svg>";
 }

@@ -23,8 +23,8 @@ std::string Scale() {
   return svg;
 }
 
-/// Dots with their intervals, joined by a thin line: whole for the first series, dashed for the others.
-std::string Series(const std::vector<Estimate>& rates, const std::vector<double>& places, std::size_t series) {
+/// Dots with their intervals, joined by a thin line: whole for the real world, dashed for the others.
+std::string Series(const std::vector<Estimate>& rates, const std::vector<double>& places, std::size_t world) {
   std::string line, whiskers, dots;
   for (std::size_t i = 0; i < rates.size(); ++i) {
     if (!rates[i].value || !rates[i].interval) continue;
@@ -33,10 +33,10 @@ std::string Series(const std::vector<Estimate>& rates, const std::vector<double>
     const double low = Y(rates[i].interval->low), high = Y(rates[i].interval->high);
     whiskers +=
         fmt::format("M{:.1f} {:.1f}V{:.1f}M{:.1f} {:.1f}h6M{:.1f} {:.1f}h6", x, low, high, x - 3, low, x - 3, high);
-    dots += fmt::format("<g transform=\"translate({:.1f} {:.1f})\">{}</g>", x, y, Marker(WorldShape(series), "dot"));
+    dots += fmt::format("<g transform=\"translate({:.1f} {:.1f})\">{}</g>", x, y, Marker(WorldShape(world), "dot"));
   }
   return fmt::format("<g class=\"w{}\"><path class=\"trend\" d=\"{}\"/><path class=\"range\" d=\"{}\"/>{}</g>",
-                     series % 4, line, whiskers, dots);
+                     world % 4, line, whiskers, dots);
 }
 
 /// Places of one series: columns side by side, series a little apart so that no interval hides another.
@@ -76,13 +76,31 @@ std::string ColumnNames(const std::vector<std::string>& names) {
 
 }  // namespace
 
-std::size_t WorldShape(std::size_t world) { return world == 0 ? 0 : 3 + (world - 1); }
+WorldMarks MarksOf(const std::string& real, const std::vector<std::string>& worlds) {
+  WorldMarks marks{{real, 0}};
+  for (const std::string& world : worlds) marks.emplace(world, marks.size());
+  return marks;
+}
 
-Drawing StageDrawing(const StageFunnel& funnel) {
+WorldMarks MarksOf(const RunSummary& summary) {
+  std::vector<std::string> worlds;
+  for (const WorldInfo& world : summary.data.worlds) worlds.push_back(world.name);
+  return MarksOf(summary.reference, worlds);
+}
+
+std::size_t WorldShape(std::size_t world) { return world == 0 ? 0 : 3 + (world - 1) % 5; }
+
+std::string WorldSign(std::size_t world) {
+  static constexpr const char* kOthers[] = {"◇", "▽", "✚", "✖", "⬡"};
+  return world == 0 ? "●" : kOthers[(world - 1) % 5];
+}
+
+Drawing StageDrawing(const StageFunnel& funnel, const WorldMarks& marks) {
   Drawing drawing{kWidth, kHeight, Scale() + ColumnNames(funnel.stages), ""};
   drawing.words = fmt::format("Share of episodes of {} on {} that reached each stage.", funnel.policy, funnel.task);
   for (std::size_t i = 0; i < funnel.worlds.size(); ++i) {
-    drawing.body += Series(funnel.worlds[i].reached, Places(funnel.stages.size(), i, funnel.worlds.size()), i);
+    drawing.body += Series(funnel.worlds[i].reached, Places(funnel.stages.size(), i, funnel.worlds.size()),
+                           marks.at(funnel.worlds[i].world));
     drawing.words += " " + funnel.worlds[i].world + ":";
     for (std::size_t stage = 0; stage < funnel.stages.size(); ++stage) {
       drawing.words +=
@@ -93,7 +111,7 @@ Drawing StageDrawing(const StageFunnel& funnel) {
   return drawing;
 }
 
-Drawing CheckpointDrawing(const CheckpointCurve& curve) {
+Drawing CheckpointDrawing(const CheckpointCurve& curve, const WorldMarks& marks) {
   std::vector<std::string> names;
   for (const CheckpointPoint& point : curve.points) names.push_back(point.checkpoint);
   Drawing drawing{kWidth, kHeight, Scale() + ColumnNames(names), ""};
@@ -106,7 +124,7 @@ Drawing CheckpointDrawing(const CheckpointCurve& curve) {
       drawing.words += fmt::format(" {} {}{}", point.checkpoint, PercentWithInterval(point.rate[world]),
                                    &point == &curve.points.back() ? "." : ",");
     }
-    drawing.body += Series(rates, Places(names.size(), world, curve.worlds.size()), world);
+    drawing.body += Series(rates, Places(names.size(), world, curve.worlds.size()), marks.at(curve.worlds[world]));
   }
   return drawing;
 }

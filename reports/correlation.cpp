@@ -123,8 +123,8 @@ CorrelationGroup CorrelateOutcomes(const std::string& name, const std::vector<Ta
   UseBootstrap(bootstrap.pearson, bootstrap.method, group.pearson, group.pearson_bca);
   UseBootstrap(bootstrap.spearman, bootstrap.method, group.spearman, group.spearman_bca);
   UseBootstrap(bootstrap.mmrv, bootstrap.method, group.mmrv, group.mmrv_bca);
-  if (bootstrap.pearson) group.undefined_replicates = bootstrap.pearson->undefined;
   WithholdTheVacuous(group);
+  if (bootstrap.pearson && group.pearson.value) group.undefined_replicates = bootstrap.pearson->undefined;
   return group;
 }
 

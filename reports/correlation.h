@@ -35,7 +35,7 @@ struct CorrelationGroup {
   Defined<Interval> pearson_bca = Undefined{"not bootstrapped"};  ///< beside the percentile interval in `pearson`
   Defined<Interval> spearman_bca = Undefined{"not bootstrapped"};
   Defined<Interval> mmrv_bca = Undefined{"not bootstrapped"};
-  std::int64_t undefined_replicates = 0;  ///< of Pearson's bootstrap, dropped
+  std::int64_t undefined_replicates = 0;  ///< of Pearson's bootstrap, dropped; 0 where Pearson is undefined
   MmrvResult ranks;                       ///< mmrv over the range of the real rates, ties
   Number kendall_tau_b = Undefined{"no points"};
   RateAgreement distance;

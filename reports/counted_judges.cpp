@@ -6,7 +6,6 @@
 #include <algorithm>
 #include <sstream>
 
-#include "core/error.h"
 
 namespace evac {
 namespace {
@@ -23,6 +22,9 @@ bool IsProbe(const std::string& judge) {
   const std::string parts = judge + ":";
   return parts.find(":flip:") != std::string::npos || parts.find(":retest:") != std::string::npos;
 }
+
+/// Up to its first colon: "classifier" of "classifier:1a2b".
+std::string KindOf(const std::string& judge) { return judge.substr(0, judge.find(':')); }
 
 std::string FullName(const std::string& name, const std::vector<std::string>& there) {
   std::vector<std::string> meant;
@@ -68,12 +70,22 @@ bool IsCounted(const std::string& judge, const std::string& counted) {
 std::string LastJudge(const std::string& counted) { return Names(counted).back(); }
 
 std::vector<std::string> JudgingCommands(const std::string& judge) {
-  const std::string kind = judge.substr(0, judge.find(':'));
+  const std::string kind = KindOf(judge);
   if (kind == "oracle") return {"evac judge RUN --judge oracle"};
   if (kind == "classifier") return {"evac judge RUN --judge classifier --weights FILE"};
   if (kind == "vlm") return {"evac judge RUN --judge vlm --config PAGE"};
   const std::string as = judge == "human" ? "" : kind == "human" ? " --each-rater" : " --as " + judge;
   return {"evac rate new STUDY --run RUN", "evac rate serve STUDY", "evac rate resolve STUDY" + as};
+}
+
+std::string NeverJudged(const std::string& judge) {
+  const std::string kind = KindOf(judge);
+  const bool is_program = kind == "oracle" || kind == "classifier" || kind == "vlm";
+  return is_program ? "" : "a study's examples and practice clips get no label";
+}
+
+Error NobodyJudged(const std::string& run, const std::string& wanted) {
+  return InvalidInput("{}: judge {}: found no verdicts at all, wanted those that `evac judge` gives", run, wanted);
 }
 
 std::string JudgeWords(const std::string& counted) { return fmt::format("{}", fmt::join(Names(counted), ", else ")); }

@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include "core/error.h"
 #include "core/types.h"
 
 /// Whose verdicts a report counts: one judge's, or, as "oracle,classifier", of each episode the first one's who could
@@ -30,6 +31,12 @@ std::string LastJudge(const std::string& counted);
 /// The commands that give this judge's verdicts, one after the other; RUN, FILE, PAGE and STUDY stand for what the
 /// reader has. @param judge  one name: whoever is no program's is people's.
 std::vector<std::string> JudgingCommands(const std::string& judge);
+
+/// What these commands give no verdict of, as a clause; empty where they give one of every episode.
+std::string NeverJudged(const std::string& judge);
+
+/// What to throw where a run has no verdict of anybody, whomever was asked for.
+Error NobodyJudged(const std::string& run, const std::string& wanted);
 
 /// For people: "oracle", "oracle, else classifier:0123456789ab".
 std::string JudgeWords(const std::string& counted);

@@ -75,6 +75,17 @@ CheckpointCurve CurveOf(const std::vector<DashboardRun>& runs, const std::string
   return curve;
 }
 
+/// One mark for a world in all charts: the first real one's is that of a real world.
+WorldMarks MarksOfAll(const std::vector<DashboardRun>& runs) {
+  std::string real;
+  std::vector<std::string> worlds;
+  for (const DashboardRun& run : runs) {
+    if (real.empty()) real = run.reference;
+    worlds.insert(worlds.end(), run.worlds.begin(), run.worlds.end());
+  }
+  return MarksOf(real, worlds);
+}
+
 std::string History(const std::vector<DashboardRun>& runs) {
   std::vector<std::string> policies;
   for (const DashboardRun& run : runs) {
@@ -83,13 +94,14 @@ std::string History(const std::vector<DashboardRun>& runs) {
     }
   }
   if (policies.empty()) return "<p>No episode yet.</p>";
+  const WorldMarks marks = MarksOfAll(runs);
   std::string html = "<div class=\"multiples\">";
   for (const std::string& policy : policies) {
     const CheckpointCurve curve = CurveOf(runs, policy);
     std::string keys;
-    for (std::size_t world = 0; world < curve.worlds.size(); ++world) keys += WorldKey(world, curve.worlds[world]);
+    for (const std::string& world : curve.worlds) keys += WorldKey(marks.at(world), world);
     html += fmt::format("<figure><figcaption><b>{}</b> <span class=\"keys\">{}</span></figcaption>{}</figure>",
-                        Breakable(policy), keys, InPage(CheckpointDrawing(curve)));
+                        Breakable(policy), keys, InPage(CheckpointDrawing(curve, marks)));
   }
   return html + "</div>";
 }
@@ -105,6 +117,7 @@ DashboardRun DashboardRunOf(const std::string& name, const ReportData& report) {
   run.judged = run.episodes - summary.Count(Outcome::kUnjudged) - summary.Count(Outcome::kError);
   run.errors = summary.Count(Outcome::kError);
   run.reference = summary.reference;
+  for (const WorldInfo& world : summary.data.worlds) run.worlds.push_back(world.name);
   run.rates = PooledRates(summary);
   const HeadlineItem worse = HeadlinesOf(report).front().items.front();
   run.verdict = worse.tag.empty() ? worse.text : worse.tag + ": " + worse.text;

@@ -17,9 +17,10 @@ struct DashboardRun {
   std::string stamp;    ///< of the store that it was counted from (dashboard_run.h)
   std::string suite_hash;
   std::int64_t episodes = 0, judged = 0, errors = 0;
-  std::string reference;        ///< the real world's name
-  std::vector<RateCell> rates;  ///< over all tasks: `task` is empty
-  std::string verdict;          ///< the answer to "is the candidate worse?", first item
+  std::string reference;            ///< the real world's name; empty if there is none
+  std::vector<std::string> worlds;  ///< all that are declared
+  std::vector<RateCell> rates;      ///< over all tasks: `task` is empty
+  std::string verdict;              ///< the answer to "is the candidate worse?", first item
 };
 
 DashboardRun DashboardRunOf(const std::string& name, const ReportData& report);

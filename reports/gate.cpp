@@ -92,19 +92,22 @@ double BaselineRate(const GateRule& rule, const PinnedResult* baseline) {
   return trials > 0 ? successes / trials : kSupposedRate;
 }
 
-std::string Text(const SampleSize& size) { return size.exact ? fmt::to_string(size.n) : size.exact.reason(); }
+/// "124 pairs", "1 episode"
+std::string Text(const SampleSize& size, const std::string& one) {
+  return size.exact ? Counted(size.n, one) : size.exact.reason() + " " + one + "s";
+}
 
 /// "124 pairs if 20 % of the states flip (260 episodes of each unpaired at 70 %)".
 std::string SizeOf(const GateRule& rule, double rate) {
   const Promise promise{rule.alpha, kPower};
-  const std::string flips = fmt::format("pairs if {} of the states flip", Percent(kSupposedFlips));
+  const std::string flips = fmt::format("if {} of the states flip", Percent(kSupposedFlips));
   if (rule.test == GateTest::kSavi) {
     const FlipRates rates{kSupposedFlips / 2, kSupposedFlips / 2};
     const SampleSize size = PairsForSequentialNonInferiority(rates, rule.margin, promise);
-    return fmt::format("{} {} (less where an earlier look shows it)", Text(size), flips);
+    return fmt::format("{} {} (less where an earlier look shows it)", Text(size, "pair"), flips);
   }
-  const std::string pairs = Text(PairsForNonInferiority(kSupposedFlips, rule.margin, promise)) + " " + flips,
-                    trials = Text(TrialsForNonInferiority(rate, rule.margin, promise)) + " episodes of each";
+  const std::string pairs = Text(PairsForNonInferiority(kSupposedFlips, rule.margin, promise), "pair") + " " + flips,
+                    trials = Text(TrialsForNonInferiority(rate, rule.margin, promise), "episode") + " of each";
   return rule.is_paired ? fmt::format("{} ({} unpaired at {})", pairs, trials, Percent(rate))
                         : fmt::format("{} at {} ({})", trials, Percent(rate), pairs);
 }

@@ -1,6 +1,7 @@
 #include "reports/gate_evidence.h"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <cmath>
@@ -13,6 +14,7 @@
 #include "core/statistics/sequential_planning.h"
 #include "core/statistics/special.h"
 #include "core/statistics/two_samples.h"
+#include "reports/counted_judges.h"
 #include "reports/gate_quality.h"
 #include "reports/wording.h"
 
@@ -47,7 +49,7 @@ std::string MorePairs(const GateRule& rule, const PairedOutcomes& seen, std::int
   std::vector<std::string> parts;
   const auto add = [&](const Number& wanted, const std::string& what) {
     const Defined<std::int64_t> further = wanted ? FurtherWanted(*wanted, have) : Undefined{wanted.reason()};
-    if (further) parts.push_back(fmt::format("about {} more pairs to show it {}", *further, what));
+    if (further) parts.push_back(fmt::format("about {} to show it {}", Counted(*further, "more pair"), what));
   };
   const bool is_bet = rule.test == GateTest::kSavi, is_worse = rates.only_second > rates.only_first;
   const Promise promise{rule.alpha, kPower};
@@ -58,8 +60,7 @@ std::string MorePairs(const GateRule& rule, const PairedOutcomes& seen, std::int
   } else if (is_worse) {
     add((is_bet ? PairsForFlipsBet(rates, promise) : PairsForMcNemar(rates, promise)).exact, "worse");
   }
-  if (parts.empty()) return "";
-  return "If the flips stay as seen: " + parts.front() + (parts.size() > 1 ? ", " + parts.back() : "") + ".";
+  return parts.empty() ? "" : fmt::format("If the flips stay as seen: {}.", fmt::join(parts, ", "));
 }
 
 /// One policy's trials: all of them, and what they tell as much as where states repeat.
@@ -69,20 +70,37 @@ struct Trials {
   Count all, effective;
 };
 
+/// Of each of two samples with these rates, as PairsToShow.
+Number TrialsToShow(int side, const GateRule& rule, double p, double q) {
+  const double room = side * (rule.margin + p - q);
+  if (room <= 0.005) return Undefined{"the rates lean the other way"};
+  const double z = NormalQuantile(1 - rule.alpha) + NormalQuantile(kPower);
+  return std::ceil(z * z * (p * (1 - p) + q * (1 - q)) / (room * room));
+}
+
+/// As MorePairs, of episodes on different initial states. Where one of the two has none nothing was seen.
 std::string MoreTrials(const GateRule& rule, const Trials& candidate, const Trials& baseline) {
   if (candidate.all.trials == 0 || baseline.all.trials == 0) return "";
   const auto rate = [](const Count& c) {
     return (static_cast<double>(c.successes) + 0.5) / (static_cast<double>(c.trials) + 1);
   };
-  const double p = rate(candidate.effective), q = rate(baseline.effective), room = rule.margin + p - q;
-  if (room <= 0.005) return "";
-  const double z = NormalQuantile(1 - rule.alpha) + NormalQuantile(kPower);
-  const double wanted = std::ceil(z * z * (p * (1 - p) + q * (1 - q)) / (room * room));
-  const Defined<std::int64_t> here = FurtherWanted(wanted, candidate.Number());
-  const Defined<std::int64_t> there = FurtherWanted(wanted, baseline.Number());
-  if (!here || !there) return "";
-  return fmt::format("If the rates stay as seen: about {} more episodes of each to show it not worse by {}.",
-                     std::max(*here, *there), Margin(rule));
+  const double p = rate(candidate.effective), q = rate(baseline.effective);
+  std::vector<std::string> parts;
+  const auto add = [&](const Number& wanted, const std::string& what) {
+    if (!wanted) return;
+    const Defined<std::int64_t> here = FurtherWanted(*wanted, candidate.Number());
+    const Defined<std::int64_t> there = FurtherWanted(*wanted, baseline.Number());
+    if (!here || !there) return;
+    const std::string further = Counted(std::max(*here, *there), "more episode", "more episodes");
+    parts.push_back(fmt::format("about {} of each to show it {}", further, what));
+  };
+  add(TrialsToShow(1, rule, p, q), "not worse by " + Margin(rule));
+  if (rule.test == GateTest::kNonInferiority) {
+    add(TrialsToShow(-1, rule, p, q), "worse by more than " + Margin(rule));
+  } else if (p < q) {
+    add(TrialsPerPolicy(p, q, {rule.alpha, kPower}).exact, "worse");
+  }
+  return parts.empty() ? "" : fmt::format("If the rates stay as seen: {}.", fmt::join(parts, ", "));
 }
 
 /// Rates, difference, flips: what every comparison shows.
@@ -241,6 +259,13 @@ GateSide TriedBy(const GateRule& rule, const GateInput& input, const GateSides& 
   return side;
 }
 
+/// A rule of outcomes has nothing to go by where nobody judged; errors need no judge.
+void AskForAJudge(const GateRule& rule, const RunSummary& run, Evidence& evidence) {
+  if (!run.judges.empty() || rule.test == GateTest::kErrorShare) return;
+  const std::string judge = LastJudge(run.options.judge);
+  evidence.more = fmt::format("Nobody has judged the run yet: {}.", fmt::join(JudgingCommands(judge), ", then "));
+}
+
 /// What stands before any test.
 void Block(const GateRule& rule, const GateInput& input, const GateSides& sides, Evidence& evidence) {
   const GateSide side = TriedBy(rule, input, sides);
@@ -279,6 +304,7 @@ Evidence Examine(const GateRule& rule, const GateInput& input) {
   } else {
     ExamineQuality(rule, input.run, sides, evidence);
   }
+  AskForAJudge(rule, input.run, evidence);
   BlockPart(rule, input, sides, evidence);
   if (evidence.blocked.empty()) Block(rule, input, sides, evidence);
   return evidence;

@@ -175,11 +175,12 @@ void AddMissing(const RunSummary& summary, std::vector<HeadlineItem>& items) {
                      ""});
   if (const auto unjudged = summary.Count(Outcome::kUnjudged); unjudged > 0) {
     const std::string with_small = CountedWithSmall(summary);
-    const std::string commands =
-        with_small.empty() ? fmt::format("{}", fmt::join(JudgingCommands(LastJudge(summary.options.judge)), ", then "))
-                           : "evac report RUN --judge " + with_small;
+    const std::string judge = LastJudge(summary.options.judge), never = with_small.empty() ? NeverJudged(judge) : "";
+    const std::string commands = with_small.empty() ? fmt::format("{}", fmt::join(JudgingCommands(judge), ", then "))
+                                                    : "evac report RUN --judge " + with_small;
     items.push_back({"",
-                     fmt::format("{} not judged yet: {}", Counted(unjudged, "episode is", "episodes are"), commands),
+                     fmt::format("{} not judged yet: {}{}", Counted(unjudged, "episode is", "episodes are"), commands,
+                                 never.empty() ? "" : " (" + never + ")"),
                      "#clips"});
   }
   if (const auto errors = summary.Count(Outcome::kError); errors > 0)

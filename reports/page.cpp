@@ -67,14 +67,16 @@ std::string MissingVerdicts(const RunSummary& summary) {
         "from smaller pictures: <code>evac report RUN --judge {}</code> counts these.</p>",
         unjudged == 1 ? "1 episode has" : fmt::format("{} episodes have", unjudged),
         Escaped(JudgeWords(summary.options.judge)), Escaped(with_small));
+  const std::string judge = LastJudge(summary.options.judge), never = NeverJudged(judge);
   std::string commands;
-  for (const std::string& command : JudgingCommands(LastJudge(summary.options.judge)))
+  for (const std::string& command : JudgingCommands(judge))
     commands += "<code>" + Escaped(command) + "</code>, then ";
   return fmt::format(
       "<p class=\"notice\" role=\"note\"><strong>{} no verdict by {}.</strong> No rate counts such. "
-      "{}<code>evac report RUN</code>, adds them.{}</p>",
+      "{}<code>evac report RUN</code>, adds them.{}{}</p>",
       unjudged == 1 ? "1 episode has" : fmt::format("{} episodes have", unjudged), Escaped(JudgeWords(summary.options.judge)),
-      commands, others.empty() ? "" : " Other judges have spoken: " + others + ".");
+      commands, never.empty() ? "" : " But " + never + ".",
+      others.empty() ? "" : " Other judges have spoken: " + others + ".");
 }
 
 /// "sha256-…" of a script, as a policy names it: base64 of the hash's bytes.

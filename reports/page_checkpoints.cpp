@@ -7,16 +7,16 @@
 namespace evac {
 namespace {
 
-std::string Curve(const CheckpointCurve& curve) {
+std::string Curve(const CheckpointCurve& curve, const WorldMarks& marks) {
   std::string keys, words;
   for (std::size_t world = 0; world < curve.worlds.size(); ++world) {
-    keys += WorldKey(world, curve.worlds[world]);
+    keys += WorldKey(marks.at(curve.worlds[world]), curve.worlds[world]);
     words += "<p>" + Escaped(TrendInWords(curve, world)) + "</p>";
   }
   return fmt::format(
       "<figure><figcaption><b>{}</b> <span class=\"keys\">{}</span></figcaption>{}<div "
       "class=\"quiet\">{}</div></figure>",
-      Breakable(curve.task), keys, InPage(CheckpointDrawing(curve)), words);
+      Breakable(curve.task), keys, InPage(CheckpointDrawing(curve, marks)), words);
 }
 
 }  // namespace
@@ -28,6 +28,7 @@ std::string CheckpointsPart(const ReportData& report) {
       "intervals. "
       "The sentence compares the last checkpoint with the first one, on the same initial states where at least 80 % of "
       "them are shared; else it says “unpaired”.</p>";
+  const WorldMarks marks = MarksOf(report.summary);
   std::string policy;
   for (const CheckpointCurve& curve : report.checkpoints) {
     if (curve.policy != policy) {
@@ -37,7 +38,7 @@ std::string CheckpointsPart(const ReportData& report) {
                                           : "In the order of the suite: their names differ by more than a number at the end.");
       policy = curve.policy;
     }
-    html += Curve(curve);
+    html += Curve(curve, marks);
   }
   return html + "</div></section>";
 }

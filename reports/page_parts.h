@@ -55,6 +55,7 @@ std::string OutcomeBadge(Outcome outcome);
 /// A pill with one word, "yes", "not decided", "worse", coloured by what it says; nothing for an empty word.
 std::string Tag(const std::string& word);
 /// What a world's markers look like: its icon and name.
+/// @param index  its mark (MarksOf)
 std::string WorldKey(std::size_t index, const std::string& world);
 /// The relative link of a file of the run, ready for an attribute.
 std::string FileLink(const std::string& file, const PageOptions& options);

@@ -14,15 +14,6 @@
 namespace evac {
 namespace {
 
-std::size_t WorldIndex(const RunSummary& summary, const std::string& world) {
-  std::size_t index = 1;  // 0 is the real one
-  for (const WorldInfo& info : summary.data.worlds) {
-    if (info.name == world) return info.is_real ? 0 : index;
-    if (!info.is_real) ++index;
-  }
-  return index;
-}
-
 /// "2 errors, 1 cannot tell": what is in no rate; empty where there is nothing.
 std::string ApartWords(const RateCell& cell) {
   std::string words;
@@ -33,7 +24,7 @@ std::string ApartWords(const RateCell& cell) {
 }
 
 std::string Row(const RunSummary& summary, const RateCell& cell) {
-  const std::size_t world = WorldIndex(summary, cell.world);
+  const std::size_t world = MarksOf(summary).at(cell.world);
   const std::int64_t successes = cell.Of(Outcome::kSuccess), n = successes + cell.Of(Outcome::kFailure);
   const std::string apart = ApartWords(cell);
   return fmt::format(

@@ -12,18 +12,18 @@
 namespace evac {
 namespace {
 
-std::string Keys(const StageFunnel& funnel) {
+std::string Keys(const StageFunnel& funnel, const WorldMarks& marks) {
   std::string html;
-  for (std::size_t i = 0; i < funnel.worlds.size(); ++i) html += WorldKey(i, funnel.worlds[i].world);
+  for (const StageRow& row : funnel.worlds) html += WorldKey(marks.at(row.world), row.world);
   return "<span class=\"keys\">" + html + "</span>";
 }
 
-std::string TaskFunnels(const StageReport& stages, const std::string& task) {
+std::string TaskFunnels(const StageReport& stages, const std::string& task, const WorldMarks& marks) {
   std::string html;
   for (const StageFunnel& funnel : stages.funnels) {
     if (funnel.task != task) continue;
     html += fmt::format("<figure><figcaption><b>{}</b> {}</figcaption>{}</figure>", Breakable(funnel.policy),
-                        Keys(funnel), InPage(StageDrawing(funnel)));
+                        Keys(funnel, marks), InPage(StageDrawing(funnel, marks)));
   }
   return html.empty() ? "" : "<h3>" + Breakable(task) + "</h3><div class=\"multiples\">" + html + "</div>";
 }
@@ -61,14 +61,19 @@ std::string Partings(const ReportData& report, const std::string& world) {
   return html + "</tbody></table></div>";
 }
 
-/// The decided ones in words; else that none is.
+/// The decided ones in words; else that none is, or that there is nothing to decide from.
 std::string Statement(const ReportData& report, const std::string& world) {
   std::string items;
+  std::int64_t pairs = 0;
   for (const StageParting& parting : report.stages.partings) {
+    if (parting.world == world) pairs += parting.pairs;
     if (parting.world == world && parting.p_holm && *parting.p_holm < kAlpha)
       items += fmt::format("<li>{}: {}.</li>", Breakable(parting.task),
                            Escaped(PartingInWords(parting, report.summary.reference)));
   }
+  if (pairs == 0)
+    return fmt::format("<p>Of {} nothing can be said here: no pair of episodes tells the stages there and in {}.</p>",
+                       Escaped(world), Escaped(report.summary.reference));
   if (items.empty())
     return fmt::format("<p>At no stage do these pairs show that {} is kinder or harder than {}.</p>", Escaped(world),
                        Escaped(report.summary.reference));
@@ -84,7 +89,8 @@ std::string StagesPart(const ReportData& report) {
   if (report.stages.funnels.empty())
     return html + "<p>" + Escaped(JudgeWords(report.summary.options.judge)) + " tells no stages.</p></section>";
   for (const WorldComparison& comparison : report.summary.comparisons) html += Statement(report, comparison.other);
-  for (const Task& task : report.summary.data.tasks) html += TaskFunnels(report.stages, task.id);
+  const WorldMarks marks = MarksOf(report.summary);
+  for (const Task& task : report.summary.data.tasks) html += TaskFunnels(report.stages, task.id, marks);
   for (const WorldComparison& comparison : report.summary.comparisons) html += Partings(report, comparison.other);
   return html + "</section>";
 }

@@ -74,8 +74,8 @@ std::string TwoByTwo(const WorldComparison& comparison, const PairTable& table) 
 
 std::string TestInWords(const PairTable& table) {
   if (table.Counted() == 0) return "No pair is judged in both worlds: no test.";
-  std::string words = fmt::format("Same outcome: {}, n = {} pairs. {}: {}.", PercentWithInterval(table.agreement),
-                                  table.Counted(), OnPairs("Exact McNemar", {table.Counted(), table.effective_pairs}),
+  std::string words = fmt::format("Same outcome: {}, n = {}. {}: {}.", PercentWithInterval(table.agreement),
+                                  Counted(table.Counted(), "pair"), OnPairs("Exact McNemar", {table.Counted(), table.effective_pairs}),
                                   PValue(table.test.p_exact));
   if (table.uncounted > 0)
     words +=

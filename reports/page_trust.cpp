@@ -17,7 +17,7 @@ std::string Tested(const TaskTrust& task) {
   return OnPairs(PValue(task.test.p_exact), {task.pairs.n(), task.tested_pairs});
 }
 
-std::string TaskRow(const TaskTrust& task, const TrustReport& trust) {
+std::string TaskRow(const TaskTrust& task, const TrustReport& trust, std::size_t world) {
   const std::string statement = TrustStatement(task, trust);
   const std::string more = task.trust != Trust::kUnknown ? ""
                            : task.more                   ? fmt::format("about {}", Counted(*task.more, "more pair"))
@@ -26,12 +26,13 @@ std::string TaskRow(const TaskTrust& task, const TrustReport& trust) {
       "<tr title=\"{}\"><th scope=\"row\">{}</th><td>{}</td><td class=\"plot\">{}</td><td class=\"num\">{}</td>"
       "<td class=\"num\">{}</td><td class=\"num\">{}</td><td class=\"num\">{}</td><td "
       "class=\"more-pairs\">{}</td></tr>",
-      Escaped(statement), Breakable(task.task), Tag(Name(task.trust)), BiasStrip(task.bias, trust.options.margin),
+      Escaped(statement), Breakable(task.task), Tag(Name(task.trust)),
+      BiasStrip(task.bias, trust.options.margin, world),
       Escaped(PointsWithInterval(task.bias)), task.pairs.n(), Escaped(NumberWithInterval(task.agreement.kappa)),
       Escaped(Tested(task)), more.empty() ? "–" : more);
 }
 
-std::string TaskTable(const TrustReport& trust) {
+std::string TaskTable(const TrustReport& trust, std::size_t world) {
   std::string html = fmt::format(
       "<div class=\"wide\"><table class=\"rates trust\"><thead><tr><th scope=\"col\">task</th><th "
       "scope=\"col\">trusted?</th><th scope=\"col\" class=\"plot\"><span class=\"sr\">bias in points</span>{}</th><th "
@@ -39,7 +40,7 @@ std::string TaskTable(const TrustReport& trust) {
       "class=\"num\">kappa</th><th scope=\"col\" class=\"num\">McNemar</th><th scope=\"col\">to "
       "decide</th></tr></thead><tbody>",
       BiasScale(), 100 * trust.options.confidence);
-  for (const TaskTrust& task : trust.tasks) html += TaskRow(task, trust);
+  for (const TaskTrust& task : trust.tasks) html += TaskRow(task, trust, world);
   return html + "</tbody></table></div>";
 }
 
@@ -78,6 +79,7 @@ std::string PredictedRates(const TrustReport& trust) {
 std::string TrustPart(const ReportData& report) {
   std::string html = "<section id=\"trust\"><h2>Trust in the other worlds</h2>";
   if (report.trust.empty()) return html + "<p>No statement: " + Escaped(report.no_trust) + ".</p></section>";
+  const WorldMarks marks = MarksOf(report.summary);
   for (const TrustReport& trust : report.trust) {
     html += fmt::format(
         "<h3>May {} stand for the real world?</h3><p class=\"quiet\">Held against {}. <b>Yes</b>: the whole interval "
@@ -85,7 +87,7 @@ std::string TrustPart(const ReportData& report) {
         "its bias lies within ±{} (shaded); <b>no</b>: all of it lies outside; else <b>unknown</b>. Left of "
         "0 {} is harder than real, right of it kinder. McNemar asks whether there is any bias at all.</p>",
         Escaped(trust.world), Escaped(trust.real), GivenPoints(trust.options.margin), Escaped(trust.world));
-    html += TaskTable(trust) + PredictedRates(trust);
+    html += TaskTable(trust, marks.at(trust.world)) + PredictedRates(trust);
   }
   for (const auto& [world, reason] : report.unsaid)
     html += fmt::format("<h3>May {} stand for the real world?</h3><p>No statement: {}.</p>", Escaped(world),

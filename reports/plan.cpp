@@ -93,8 +93,8 @@ FlipRates FlipsOf(const PlanOptions& o) {
 void AddRates(const PlanOptions& o, std::vector<PlanRow>& rows) {
   const double half_width = WilsonHalfWidth(o.rate, o.trials, Confidence(o));
   rows.push_back(Row("interval_half_width",
-                     fmt::format("interval of a rate of {} from {} episodes", GivenPercent(o.rate), o.trials), half_width,
-                     "± " + InPoints(half_width), "Wilson"));
+                     fmt::format("interval of a rate of {} from {}", GivenPercent(o.rate), Counted(o.trials, "episode")),
+                     half_width, "± " + InPoints(half_width), "Wilson"));
   for (const double wanted : {0.1, 0.05}) {
     const std::int64_t n = TrialsForHalfWidth(o.rate, wanted, Confidence(o));
     rows.push_back(Row(fmt::format("episodes_for_{:.0f}_points", 100 * wanted),
@@ -112,12 +112,13 @@ void AddDifferences(const PlanOptions& o, std::vector<PlanRow>& rows) {
   rows.push_back(SizeRow("unpaired_episodes", fmt::format("episodes of each policy {}, different states", seen),
                          TrialsPerPolicy(o.rate, OtherRate(o), o.promise), "normal approximation"));
   const double power = McNemarPower(o.trials, flips, o.promise.alpha);
-  rows.push_back(Row("paired_power", fmt::format("power of {} states for that, paired", o.trials), power,
+  rows.push_back(Row("paired_power", fmt::format("power of {} for that, paired", Counted(o.trials, "state")), power,
                      fmt::format("{:.2f}", power), "exact McNemar"));
   const Number detectable = DetectableDifference(o.rate, o.trials, o.promise);
   rows.push_back(Row("detectable_difference",
-                     fmt::format("smallest difference that {} episodes of each see, unpaired", o.trials), detectable,
-                     detectable ? InPoints(*detectable) : "", "normal approximation"));
+                     fmt::format("smallest difference that {}, unpaired",
+                                 Counted(o.trials, "episode of each sees", "episodes of each see")),
+                     detectable, detectable ? InPoints(*detectable) : "", "normal approximation"));
   rows.push_back(SizeRow("non_inferiority_pairs",
                          fmt::format("initial states to show \"not worse by {}\", paired", GivenPoints(o.margin)),
                          PairsForNonInferiority(*o.flips, o.margin, o.promise), "normal approximation, one-sided"));
@@ -184,7 +185,8 @@ std::vector<std::string> Words(const PlanOptions& o, const std::vector<PlanRow>&
   }
   const double power = *At(rows, "paired_power").value;
   words.push_back(
-      fmt::format("The {} states at hand see it with a chance of {}{}.", o.trials, Percent(power),
+      fmt::format("The {} it with a chance of {}{}.", Counted(o.trials, "state at hand sees", "states at hand see"),
+                  Percent(power),
                   power < 0.5 ? ": less than a coin, so do not read \"no difference\" into such a run" : ""));
   words.push_back(
       fmt::format("One policy's rate comes out as {} {}.", GivenPercent(o.rate), At(rows, "interval_half_width").shown));

@@ -32,7 +32,8 @@ std::string Shown(const Number& p) {
 
 std::string More(const ComparisonRow& row) {
   if (!row.more) return "not decided (" + row.more.reason() + ")";
-  return fmt::format("not decided: about {} more {}", *row.more, row.is_paired ? "pairs" : "episodes each");
+  return "not decided: about " + (row.is_paired ? Counted(*row.more, "more pair")
+                                                : Counted(*row.more, "more episode each", "more episodes each"));
 }
 
 std::string Decision(const ComparisonRow& row, const PolicyComparison& comparison) {
@@ -135,8 +136,10 @@ std::string DecisionOf(const PolicyComparison& comparison) {
       return fmt::format(
           "Not decided between {} and {}: {}.{}", comparison.first, comparison.second, how,
           all.more
-              ? fmt::format(" If the rates are those seen, about {} more {} would decide with {} power.", *all.more,
-                            all.is_paired ? "pairs" : "episodes of each", Percent(comparison.options.power))
+              ? fmt::format(" If the rates are those seen, about {} would decide with {} power.",
+                            all.is_paired ? Counted(*all.more, "more pair")
+                                          : Counted(*all.more, "more episode of each", "more episodes of each"),
+                            Percent(comparison.options.power))
               : fmt::format(" No number of further episodes can be named: {}.", all.more.reason()));
   }
   return "";

@@ -146,11 +146,18 @@ class Reader {
         (!known_.new_states_too && !known_.states.contains({trial.task, trial.initial_state}))) {
       Complain(kState, "an initial state that the run has episodes of (or --new-states)");
     }
-    if (!known_.policies.contains({trial.policy, trial.checkpoint})) {
-      std::vector<std::string> names;
-      for (const auto& [name, checkpoint] : known_.policies) names.push_back(name + "," + checkpoint);
-      Complain(kPolicy, fmt::format("a policy and checkpoint of the run: {}", fmt::join(names, "; ")));
+    if (!known_.policies.contains({trial.policy, trial.checkpoint})) ComplainOfPolicy(trial);
+  }
+
+  void ComplainOfPolicy(const RealTrial& trial) {
+    std::vector<std::string> names, checkpoints;
+    for (const auto& [name, checkpoint] : known_.policies) {
+      names.push_back(name + "," + checkpoint);
+      if (name == trial.policy) checkpoints.push_back(checkpoint);
     }
+    if (!checkpoints.empty())
+      return Complain(kCheckpoint, fmt::format("a checkpoint of {}: {}", trial.policy, fmt::join(checkpoints, ", ")));
+    Complain(kPolicy, fmt::format("a policy and checkpoint of the run: {}", fmt::join(names, "; ")));
   }
 
   /// The cell, or the next number of the key; a number that the file gave before is refused.

@@ -33,8 +33,7 @@ std::string Judges(const std::string& wanted, const VerdictsByEpisode& verdicts,
   }
   const std::string full = FullJudgeNames(wanted, {names.begin(), names.end()});
   if (std::ranges::any_of(names, [&](const std::string& name) { return IsCounted(name, full); })) return full;
-  if (names.empty())
-    throw InvalidInput("{}: judge {}: found no verdicts at all, wanted those that `evac judge` gives", run, wanted);
+  if (names.empty()) throw NobodyJudged(run, wanted);
   throw InvalidInput("{}: judge {}: found verdicts of {}, wanted one of these", run, wanted, fmt::join(names, ", "));
 }
 

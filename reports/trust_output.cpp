@@ -130,7 +130,7 @@ std::string TrustStatement(const TaskTrust& task, const TrustReport& report) {
       return fmt::format("no: {}'s rate is further than {} from the real one ({})", report.world, margin, evidence);
     case Trust::kUnknown:
       return fmt::format("unknown: {}; {}", evidence,
-                         task.more ? fmt::format("about {} more pairs would decide on {}", *task.more, margin)
+                         task.more ? fmt::format("about {} would decide on {}", Counted(*task.more, "more pair"), margin)
                                    : "no number of pairs can be named: " + task.more.reason());
   }
   return "";

@@ -73,14 +73,6 @@ void AppendArms(const Arms* before, const Arms& now, const ClipOptions& options,
   clip.deltas.insert(clip.deltas.end(), delta.begin(), delta.end());
 }
 
-/// A mean over `shrink` x `shrink` pixels.
-cv::Mat Shrunk(const cv::Mat& picture, int shrink) {
-  if (shrink == 1) return picture.clone();
-  cv::Mat small;
-  cv::resize(picture, small, {picture.cols / shrink, picture.rows / shrink}, 0, 0, cv::INTER_AREA);
-  return small;
-}
-
 EpisodeTruth NothingKnown(std::size_t frames, const std::vector<Camera>& cameras) {
   EpisodeTruth truth;
   for (const Camera& camera : cameras) truth.cameras.push_back(camera.name);
@@ -110,19 +102,18 @@ Camera Cropped(const Camera& camera, const Crop& crop, const cv::Size& picture_p
   return Resized(part, picture_px.width, picture_px.height);
 }
 
-ClipSource ReadClipSource(const Recording& recording, const EpisodeTruth* truth, int shrink) {
+ClipSource ReadClipSource(const Recording& recording, const EpisodeTruth* truth) {
   ClipSource source;
   source.arms = ToldTrack(recording);
+  source.cameras = recording.cameras;
   const std::size_t steps = source.arms.size();
-  for (const Camera& camera : recording.cameras)
-    source.cameras.push_back(Resized(camera, camera.width_px / shrink, camera.height_px / shrink));
   RecordedFrames walk(recording);
   for (std::size_t step = 0; step < steps; ++step) {
     std::vector<cv::Mat>& pictures = source.pictures.emplace_back();
-    for (const cv::Mat& picture : walk.Next()) pictures.push_back(Shrunk(picture, shrink));
+    for (const cv::Mat& picture : walk.Next()) pictures.push_back(picture.clone());
   }
   source.truth = truth != nullptr ? *truth : NothingKnown(steps, recording.cameras);
-  for (float& value : source.truth.object_px) value /= static_cast<float>(shrink);
+  for (float& value : source.truth.object_px) value /= static_cast<float>(recording.shrink);
   return source;
 }
 

@@ -52,10 +52,10 @@ struct ClipSource {
   EpisodeTruth truth;                          ///< in pixels of the pictures; NaN and 0 where nothing is known
 };
 
-/// Decodes the recording's pictures, `shrink` video pixels to one, and puts cameras and truth into their pixels.
+/// Decodes the recording's pictures, and puts truth into their pixels.
 /// @param truth  of the recording's cameras in their order, in pixels of the video, or null
 /// @throws Error of kind short_video or broken_video.
-ClipSource ReadClipSource(const Recording& recording, const EpisodeTruth* truth, int shrink);
+ClipSource ReadClipSource(const Recording& recording, const EpisodeTruth* truth);
 
 /// The same crop of all frames; maps drawn for it. Pictures are resized as when imagining: bilinear with antialiasing.
 /// Number, task and outcome are left to the caller.

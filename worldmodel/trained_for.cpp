@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstdlib>
 
@@ -31,15 +32,16 @@ double Period(const std::string& weights, const std::string& text) {
   return period_s;
 }
 
-bool Differ(double one, double other) {
-  return std::abs(one - other) > kStatisticsTolerance * std::max(std::abs(one), std::abs(other));
+/// @param spread  beside which the two count: means of rounding noise are as good as 0
+bool Differ(double one, double other, double spread = 0) {
+  return std::abs(one - other) > kStatisticsTolerance * std::max({std::abs(one), std::abs(other), spread});
 }
 
 /// The first number that differs, in words; empty: none does.
 std::string Difference(const ActionStatistics& page, const ActionStatistics& trained) {
   for (std::size_t i = 0; i < page.mean.size(); ++i) {
     const bool spread = Differ(page.deviation[i], trained.deviation[i]);
-    if (!spread && !Differ(page.mean[i], trained.mean[i])) continue;
+    if (!spread && !Differ(page.mean[i], trained.mean[i], trained.deviation[i])) continue;
     return fmt::format("{} of {}: found {:.6g}, wanted {:.6g}", spread ? "deviation" : "mean", kNumbers[i],
                        spread ? page.deviation[i] : page.mean[i], spread ? trained.deviation[i] : trained.mean[i]);
   }

@@ -17,7 +17,7 @@ void AddInputs(CLI::App& command, ImagineArguments& arguments) {
   command.add_option("--intrinsics", inputs.files.intrinsics, "pinhole: .npy [3, 3], or AgiBot World's .json");
   command
       .add_option("--cameras", inputs.cameras, "the views, with commas between them (a folder's; default: what the weights "
-                  "say, else the first of head, hand_left, hand_right)")
+                  "say, else the first that are there of head, hand_left, hand_right)")
       ->delimiter(',')
       ->allow_extra_args(false);
   command

@@ -44,8 +44,10 @@ ExitCode WriteJob(const TrainArguments& arguments, const std::string& section, t
   TrainingProgress progress(stderr);
   const train::JobPlace place = PlaceOf(arguments, progress);
   CheckHoldouts(place.shards);
-  if (job.kind == train::TrainingKind::kCodec) train::CheckCodecTraining(place, job.codec, arguments.init);
-  else train::CheckWorldTraining(place, job.world, job.start);
+  SayingWhere(arguments, section, [&] {
+    if (job.kind == train::TrainingKind::kCodec) train::CheckCodecTraining(place, job.codec, arguments.init);
+    else train::CheckWorldTraining(place, job.world, job.start);
+  });
   job.config = place.config;
   job.begun_with = place.begun_with;
   job.recipe = train::RecipesOf(place.shards);

@@ -62,10 +62,10 @@ ExitCode CalibrateOnly(const TrainArguments& arguments) {
   TrainingProgress progress(stderr);
   const train::JobPlace place = PlaceOf(arguments, progress);
   CheckHoldouts(place.shards);
-  const RunLock lock = HoldFolder(arguments.out);
+  const HeldFolder folder(arguments.out);
   RefuseFolderOfATraining(arguments.out);
   nn::KeepFreedMemory();
-  CalibrateJudge(place, options, ShardJudgeData(arguments, place).data);
+  SayingWhere(arguments, "judge", [&] { CalibrateJudge(place, options, ShardJudgeData(arguments, place).data); });
   fmt::print("{}: calibrated anew\n", (place.out / "judge.safetensors").string());
   return ExitCode::kOk;
 }

@@ -236,8 +236,17 @@ void DemandPage(const WeightsArguments& arguments) {
 }
 
 /// What the weights were trained for, of weights that do not say it, from the shards that they learned from.
-void AddWhatFor(const std::string& shards, const std::string& weights, TensorMetadata& metadata) {
+/// @throws InvalidInput, TensorError for shards that no network of the page's sizes learned from
+void AddWhatFor(const WeightsArguments& arguments, TensorMetadata& metadata) {
+  const std::string &shards = arguments.shards, &weights = arguments.in;
   const train::ShardSet set(shards, train::Split::kTrain);
+  const nn::ModelConfig config = ConfigOf(arguments);
+  if (set.views() != config.views || set.height_px() != config.image_height_px ||
+      set.width_px() != config.image_width_px)
+    throw InvalidInput("--shards {}: found {} views of {}x{} px, wanted {} of {}x{}, as {} has", shards, set.views(),
+                       set.width_px(), set.height_px(), config.views, config.image_width_px, config.image_height_px,
+                       arguments.config.empty() ? "the published network" : arguments.config);
+  train::CheckPoseMaps(set, config);
   for (const auto& [key, value] : train::WhatFor(set.metadata())) {
     const auto [found, is_new] = metadata.emplace(key, value);
     if (!is_new && found->second != value)
@@ -256,7 +265,7 @@ ExitCode RunConvert(const WeightsArguments& arguments) {
   for (const auto& [key, value] : source.file().metadata()) {
     if (key != "layout") options.metadata.emplace(key, value);
   }
-  if (!arguments.shards.empty()) AddWhatFor(arguments.shards, arguments.in, options.metadata);
+  if (!arguments.shards.empty()) AddWhatFor(arguments, options.metadata);
   if (arguments.forecast.empty()) {
     Save(arguments, source, std::move(options));
     return ExitCode::kOk;

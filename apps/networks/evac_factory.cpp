@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <cstdio>
+#include <mutex>
+#include <set>
 
 #include "apps/factory.h"
 #include "apps/network_parts.h"
@@ -65,13 +67,20 @@ FirstScene FirstSceneOf(const Suite& suite, const Store* store, const std::strin
   };
 }
 
+/// On stderr, once: parts of one command make the same world several times.
+void Warn(const std::string& sentence) {
+  static std::mutex mutex;
+  static std::set<std::string> said;
+  const std::lock_guard lock(mutex);
+  if (said.insert(sentence).second) std::fprintf(stderr, "evac: warning: %s\n", sentence.c_str());
+}
+
 std::unique_ptr<const nn::EvacModel> Load(const SuiteEvac& evac, const nn::ModelConfig& config) try {
   nn::LoadReport report;
   nn::LoadOptions options;
   if (evac.bf16) options = {.dtype = at::kBFloat16, .products = at::kBFloat16};
   auto model = std::make_unique<const nn::EvacModel>(nn::LoadModel(evac.weights, config, options, &report));
-  if (!report.schedule.empty())
-    std::fprintf(stderr, "evac: warning: %s: %s\n", evac.weights.c_str(), report.schedule.c_str());
+  if (!report.schedule.empty()) Warn(fmt::format("{}: {}", evac.weights.string(), report.schedule));
   return model;
 } catch (const TensorError& error) {
   throw InvalidInput("{}", error.what());
@@ -83,8 +92,8 @@ void CheckTrainedFor(const SuiteEvac& evac, const nn::ModelConfig& config, const
   const TrainedFor trained = TrainedFor::Read(evac.weights);
   const std::string who = fmt::format("world {}", name);
   if (!trained.statistics && !evac.statistics)
-    std::fprintf(stderr, "evac: warning: %s: neither the suite nor %s says the statistics of the arms' motion: taken are AgiBot World's\n",
-                 who.c_str(), evac.weights.c_str());
+    Warn(fmt::format("{}: neither the suite nor {} says the statistics of the arms' motion: taken are AgiBot World's",
+                     who, evac.weights.string()));
   trained.StatisticsOr(evac.statistics);
   trained.CheckPeriod(evac.period_s, who + ": field period_s");
   trained.CheckPoseMap(PoseMapWords(PoseMapsOf(evac, config)), who);
@@ -113,7 +122,7 @@ struct Sight {
   }
 };
 
-Sight SightOf(const SuiteWorld& world, const std::filesystem::path& folder) {
+Sight SightOf(const SuiteWorld& world, const std::filesystem::path& folder) try {
   const TrainedFor trained = TrainedFor::Read(world.evac->weights);
   trained.CheckPeriod(world.evac->period_s, fmt::format("world {}: field period_s", world.name));
   if (!trained.cameras.empty()) return {world.evac->period_s, trained.cameras};
@@ -121,11 +130,12 @@ Sight SightOf(const SuiteWorld& world, const std::filesystem::path& folder) {
   const auto views = static_cast<std::size_t>(ReadEvacConfig(world.evac->config).views);
   if (cameras.size() > views) cameras.resize(views);  // fewer are refused where an episode begins
   return {world.evac->period_s, std::move(cameras)};
+} catch (const TensorError& error) {
+  throw InvalidInput("{}", error.what());
 }
 
-}  // namespace
-
-Recording ReadAsTrained(const Suite& suite, const std::filesystem::path& folder) try {
+/// The one sight of all the suite's networks.
+Sight SightOf(const Suite& suite, const std::filesystem::path& folder) try {
   const SuiteWorld* first = nullptr;
   Sight wanted{};
   for (const SuiteWorld& world : suite.worlds) {
@@ -139,9 +149,16 @@ Recording ReadAsTrained(const Suite& suite, const std::filesystem::path& folder)
     throw InvalidInput("{}: field recording: world {} is to see {}, world {} {}: wanted a suite for each",
                        suite.path.string(), first->name, wanted.Words(), world.name, own.Words());
   }
+  return wanted;
+} catch (const Error& error) {
+  throw error.Called(kSuiteError);
+}
+
+}  // namespace
+
+Recording ReadAsTrained(const Suite& suite, const std::filesystem::path& folder) {
+  const Sight wanted = SightOf(suite, folder);
   return BegunFrom(ReadRecording(folder, {.cameras = wanted.cameras}), wanted.period_s);
-} catch (const TensorError& error) {
-  throw InvalidInput("{}", error.what());
 }
 
 void CheckNetwork(const SuiteWorld& world, const std::vector<Task>& tasks) try {

@@ -60,7 +60,7 @@ ActionStatistics StatisticsOf(const ImagineArguments& arguments);
 PoseMapOptions MapOptions(const ImagineArguments& arguments, const nn::ModelConfig& config);
 
 /// ReadImagineStart, where what nobody asked for otherwise is as the network was trained; `inputs` says so then.
-/// @throws InvalidInput also for what the network was not trained for.
+/// @throws InvalidInput also for what the network was not trained for, and for sizes of another number of views.
 ImagineStart StartAsTrained(ImagineInputs& inputs, const nn::ModelConfig& config, const PoseMapOptions& drawn,
                             const TrainedFor& trained);
 

@@ -7,6 +7,7 @@
 #include "apps/networks/imagine_output.h"
 #include "core/file.h"
 #include "core/geometry.h"
+#include "core/names.h"
 #include "core/store_lock.h"
 #include "worldmodel/conditioning.h"
 #include "worldmodel/evac_config.h"
@@ -83,8 +84,22 @@ std::size_t WriteMaps(const MapPainter& painter, std::size_t frames, const std::
   return frames;
 }
 
+namespace {
+
+/// Whichever cameras are asked for, weights of more or fewer views need the page of their own.
+void RequireViews(const TrainedFor& trained, std::int64_t views) {
+  if (trained.cameras.empty() || std::ssize(trained.cameras) == views) return;
+  throw InvalidInput(
+      "{}: its network sees {} ({} views), the sizes are of {} (without --config the published ones): wanted --config "
+      "PAGE with its own sizes",
+      trained.weights, Joined(trained.cameras), trained.cameras.size(), views);
+}
+
+}  // namespace
+
 ImagineStart StartAsTrained(ImagineInputs& inputs, const nn::ModelConfig& config, const PoseMapOptions& drawn,
                             const TrainedFor& trained) {
+  RequireViews(trained, config.views);
   if (inputs.cameras.empty()) inputs.cameras = trained.cameras;
   inputs.period_s = trained.period_s.value_or(inputs.period_s);
   inputs.read_told = trained.arms_read == "told";

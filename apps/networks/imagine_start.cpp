@@ -8,6 +8,7 @@
 
 #include "core/error.h"
 #include "core/hash.h"
+#include "core/names.h"
 
 namespace evac {
 namespace {
@@ -28,9 +29,22 @@ void CheckNamed(const ImagineInputs& inputs) {
   }
 }
 
+/// As many of those that are there as there are views, the head first: as `evac pack` takes them.
+std::vector<std::string> CamerasThere(const std::string& recording, std::size_t views) {
+  std::vector<std::string> cameras = CamerasIn(recording);
+  if (cameras.size() < views) {
+    ReadRecording(recording, {.cameras = cameras, .count_video_frames = false});  // or says what else is wrong with it
+    throw InvalidInput("{}: cameras: found {} ({}), wanted {}, one for each view of the network", recording,
+                       cameras.size(), Joined(cameras), views);
+  }
+  cameras.resize(views);
+  return cameras;
+}
+
 /// Those asked for, or as many as there are views, the head first.
 std::vector<std::string> Cameras(const ImagineInputs& inputs, std::size_t views) {
   std::vector<std::string> cameras = inputs.cameras;
+  if (cameras.empty() && !inputs.recording.empty()) return CamerasThere(inputs.recording, views);
   if (cameras.empty()) cameras = {"head", "hand_left", "hand_right"};
   if (cameras.size() < views || (!inputs.cameras.empty() && cameras.size() != views))
     throw InvalidInput("--cameras: {} cameras, wanted {}, one for each view of the network", cameras.size(), views);

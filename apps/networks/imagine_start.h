@@ -13,7 +13,7 @@ namespace evac {
 struct ImagineInputs {
   std::string recording;             ///< a folder (docs/formats/recording.md); empty: `files`
   RecordingFiles files;              ///< the head camera alone
-  std::vector<std::string> cameras;  ///< the views, in this order; empty: of head, hand_left, hand_right the first V
+  std::vector<std::string> cameras;  ///< the views, in this order; empty: the first V that are there, head first
   int stride = 0;         ///< every nth recorded step is one frame; 0: as many as make `period_s`
   double period_s = 0.1;  ///< the network's; the released model's, unless its weights say another
   std::string arms;       ///< told or measured: which of a recording's are the actions; empty: `read_told`

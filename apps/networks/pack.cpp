@@ -63,10 +63,13 @@ bool HoldsOut(const PackSource& source, const PackArguments& arguments) {
   return SplitMix64(SeedFor(SeedFor(arguments.seed, "hold-out"), source.state)).Uniform() < arguments.hold_out;
 }
 
-std::vector<std::string> ViewsOf(const std::vector<fs::path>& folders, const SourceOptions& how) try {
+std::vector<std::string> ViewsOf(const std::vector<fs::path>& folders, const PackArguments& arguments,
+                                 const SourceOptions& how) try {
   return ChooseViews(folders, how);
 } catch (const Error& error) {
   if (error.exit_code() != ExitCode::kInvalidInput) throw;
+  if (error.kind() == std::string_view("few_cameras"))
+    throw InvalidInput("{}: {}", arguments.config.string(), error.what());
   throw InvalidInput("{}; --cameras names others", error.what());
 }
 
@@ -78,7 +81,7 @@ void LookAtAll(const PackArguments& arguments, Packing& packing) {
     folders.insert(folders.end(), found.begin(), found.end());
     SayPassedOver(input);
   }
-  packing.how.cameras = ViewsOf(folders, packing.how);
+  packing.how.cameras = ViewsOf(folders, arguments, packing.how);
   std::vector<Looked> looked(folders.size());
   CountProgress progress("recordings looked at", static_cast<std::int64_t>(folders.size()), 0);
   ShareOut(
@@ -303,8 +306,7 @@ Clip Make(const PlannedClip& planned, const PackArguments& arguments, const Pack
   const Recording recording = ReadForPacking(source.folder, packing.how);
   std::optional<EpisodeTruth> truth;
   if (source.row) truth = ReadTruth(TruthPath(*PlaceOf(source.folder)), source.frames, recording.cameras);
-  const ClipSource read =
-      ReadClipSource(recording, truth ? &*truth : nullptr, source.row ? source.row->video_scale : 1);
+  const ClipSource read = ReadClipSource(recording, truth ? &*truth : nullptr);
   const cv::Size picture_px = read.pictures.front().front().size();
   SplitMix64 random(
       SeedFor(SeedFor(SeedFor(arguments.seed, "crop"), source.name), static_cast<std::uint64_t>(planned.crop)));

@@ -1,6 +1,7 @@
 #include "apps/networks/pack_sources.h"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 
@@ -62,9 +63,12 @@ PackSource Examine(const fs::path& folder, const SourceOptions& options) {
 
 std::vector<std::string> ChooseViews(const std::vector<fs::path>& folders, const SourceOptions& options) {
   if (!options.cameras.empty()) return options.cameras;
-  std::string why = "none has so many";
+  std::string why, most;
+  std::size_t cameras = 0;
   for (const fs::path& folder : folders) {
     std::vector<std::string> names = CamerasIn(folder);
+    if (names.size() > cameras) most = fmt::format("{} has {}", folder.string(), fmt::join(names, ", "));
+    cameras = std::max(cameras, names.size());
     if (names.size() < options.views) continue;
     names.resize(options.views);
     try {
@@ -74,6 +78,11 @@ std::vector<std::string> ChooseViews(const std::vector<fs::path>& folders, const
       why = fmt::format("the last one that could not: {}", error.what());
     }
   }
+  if (cameras < options.views)
+    throw InvalidInput(
+        "field views: found {}, wanted as many as a recording has cameras: none of {} has more than {}{}",
+        options.views, folders.size(), cameras, cameras == 0 ? "" : " (" + most + ")")
+        .Called("few_cameras");
   throw InvalidInput("no recording's first {} cameras can be read; {}", options.views, why);
 }
 
@@ -89,6 +98,7 @@ Recording ReadForPacking(const fs::path& folder, const SourceOptions& options) {
     throw InvalidInput("{}: it does not say where the arms were told to be", folder.string()).Called("nothing_told");
   if (row && recording.every_nth > 1)
     throw InvalidInput("{}: a collection's episodes are packed at their own period", folder.string());
+  if (row) recording = Shrunk(std::move(recording), row->video_scale);
   return recording;
 }
 

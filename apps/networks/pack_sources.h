@@ -45,10 +45,12 @@ struct LeftOut {
 };
 
 /// The cameras that will be packed: those asked for, or the first of the first recording whose first ones can be read,
-/// whatever is wrong with its others. @throws InvalidInput if there is none
+/// whatever is wrong with its others. @throws InvalidInput if there is none; called few_cameras where no recording has
+/// so many, whatever is read
 std::vector<std::string> ChooseViews(const std::vector<std::filesystem::path>& folders, const SourceOptions& options);
 
-/// Reads a recording as it will be packed. @throws Error with a kind.
+/// Reads a recording as it will be packed: that of a collection in the size of the pictures that its videos were drawn
+/// from, whatever its recipe's video.scale. @throws Error with a kind.
 Recording ReadForPacking(const std::filesystem::path& folder, const SourceOptions& options);
 
 /// The recording, looked at from end to end, or why it is left out.

@@ -7,6 +7,7 @@
 #include "apps/networks/training_page.h"
 #include "worldmodel/nn/memory.h"
 #include "worldmodel/nn/threads.h"
+#include "worldmodel/train/option_limits.h"
 
 namespace evac {
 
@@ -17,6 +18,17 @@ struct TrainingKind {
   bool is_small = false;  ///< gains nothing from a library's threads
 };
 
+/// Calls `function`; an option that it refuses is said with the place where it was given.
+/// @param section  of the training page
+template <class Function>
+auto SayingWhere(const TrainArguments& arguments, const std::string& section, const Function& function) {
+  try {
+    return function();
+  } catch (const train::OptionError& error) {
+    throw TensorError(WhereGiven(arguments.training, section, arguments.settings, error.option()) + error.what());
+  }
+}
+
 /// What all trainings do around their own part: page, command line, progress, interrupts, threads, one process in OUT.
 /// @param train  (const train::JobPlace&, const Options&) → train::TrainerSummary
 template <class Options, class Train>
@@ -24,16 +36,19 @@ ExitCode RunTraining(const TrainArguments& arguments, const TrainingKind& kind, 
   Options options;
   ReadTrainingPage(arguments.training, kind.section, arguments.settings, SettingsOf(options));
   Override(arguments, options.job.trainer);
-  train::CheckOptions(options.job.trainer);  // before OUT is made, and threads are shared out among the parts of a step
+  // Before OUT is made, and threads are shared out among the parts of a step.
+  SayingWhere(arguments, kind.section, [&] { train::CheckOptions(options.job.trainer); });
   const CatchInterrupts catch_interrupts;
   TrainingProgress progress(stderr);
   const train::JobPlace place = PlaceOf(arguments, progress);
   CheckHoldouts(place.shards);
-  const RunLock lock = HoldFolder(arguments.out);
+  const HeldFolder folder(arguments.out);
   KeepWhoBegan(arguments.out);
   nn::KeepFreedMemory();
   const nn::LibraryThreads threads(kind.is_small ? 1 : LibraryThreadsOf(place, options.job));
-  return End(train(place, options), arguments.out, kind.file.c_str());
+  const train::TrainerSummary summary =
+      SayingWhere(arguments, kind.section, [&] { return train(place, options); });
+  return End(summary, arguments.out, kind.file.c_str());
 }
 
 }  // namespace evac

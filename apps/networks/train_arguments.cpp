@@ -28,6 +28,21 @@ std::string BegunWith(const TrainArguments& arguments) {
   return text;
 }
 
+/// Makes the folder of a training.
+/// @returns what of it and of what every training writes there at once was not there, in the order to remove it
+std::vector<std::filesystem::path> MakeMissing(const std::filesystem::path& out) {
+  if (out.empty()) throw InvalidInput("--out is required");  // where --job may stand in its place
+  std::vector<std::filesystem::path> missing;
+  std::error_code unknown;  // what cannot be looked at is told where it is made
+  const auto add = [&](const std::filesystem::path& path) {
+    if (!std::filesystem::exists(path, unknown)) missing.push_back(path);
+  };
+  for (const char* file : {"begun_by", "lock"}) add(out / file);
+  for (std::filesystem::path at = out; !at.empty() && at != at.root_path(); at = at.parent_path()) add(at);
+  MakeFolders(out);
+  return missing;
+}
+
 /// ", best hold-out 0.03 at step 650, 12 steps left out: …": what else there is to say of it.
 std::string HowItWent(const train::TrainerSummary& summary) {
   std::string text;
@@ -108,10 +123,13 @@ train::JobPlace PlaceOf(const TrainArguments& arguments, TrainingProgress& progr
           arguments.device == "cuda" ? at::Device(at::kCUDA) : at::Device(at::kCPU)};
 }
 
-RunLock HoldFolder(const std::filesystem::path& out) {
-  if (out.empty()) throw InvalidInput("--out is required");  // where --job may stand in its place
-  MakeFolders(out);
-  return RunLock(out / "lock");
+HeldFolder::HeldFolder(const std::filesystem::path& out) : out_(out), made_(MakeMissing(out)), lock_(out / "lock") {}
+
+HeldFolder::~HeldFolder() {
+  std::error_code ignored;
+  const auto holds = [&](const char* file) { return std::filesystem::exists(out_ / file, ignored); };
+  if (std::uncaught_exceptions() <= exceptions_ || holds("training.safetensors") || holds("training.unsaved")) return;
+  for (const std::filesystem::path& made : made_) std::filesystem::remove(made, ignored);  // no folder that holds more
 }
 
 void KeepWhoBegan(const std::filesystem::path& out) {

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <CLI/CLI.hpp>
+#include <exception>
 #include <filesystem>
 #include <memory>
 #include <optional>
@@ -44,12 +45,25 @@ void Override(const TrainArguments& arguments, train::TrainerOptions& options);
 /// @throws InvalidInput for a --device that libtorch has not
 train::JobPlace PlaceOf(const TrainArguments& arguments, TrainingProgress& progress);
 
-/// Makes OUT and holds it for this process: two trainings would write one another's files.
-/// @throws InvalidInput naming the process that holds it, or if no OUT was given
-RunLock HoldFolder(const std::filesystem::path& out);
+/// OUT, made and held for this process: two trainings would write one another's files. Where an exception ends it
+/// before a training has begun there, what was made for it is removed: OUT/lock, OUT/begun_by, the folders.
+class HeldFolder {
+ public:
+  /// @throws InvalidInput naming the process that holds it, or if no OUT was given
+  explicit HeldFolder(const std::filesystem::path& out);
+  ~HeldFolder();
+  HeldFolder(const HeldFolder&) = delete;
+  HeldFolder& operator=(const HeldFolder&) = delete;
 
-/// Writes into OUT/begun_by which version of evac begins the training; where another began the one that is there, a note
-/// on stderr says so. Needs HoldFolder.
+ private:
+  std::filesystem::path out_;
+  std::vector<std::filesystem::path> made_;  ///< what was not there before, what lies within a folder before it
+  RunLock lock_;
+  int exceptions_ = std::uncaught_exceptions();
+};
+
+/// Writes into OUT/begun_by which version of evac begins the training; where another began the one that is there, a
+/// note on stderr says so. Needs a HeldFolder.
 void KeepWhoBegan(const std::filesystem::path& out);
 
 /// Threads that share the parts of a step use one core each.

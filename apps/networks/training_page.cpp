@@ -42,6 +42,12 @@ void ReadAll(const Config& page, const train::Settings& settings) {
   }
 }
 
+Config Given(const std::vector<std::string>& assignments) {
+  Config given = Config::FromText("{}", "--set");
+  for (const std::string& assignment : assignments) given.Set(assignment);
+  return given;
+}
+
 }  // namespace
 
 void ReadTrainingPage(const std::string& path, const std::string& section, const std::vector<std::string>& assignments,
@@ -51,9 +57,17 @@ void ReadTrainingPage(const std::string& path, const std::string& section, const
     page.AllowOnly({"codec", "forecast", "world", "judge", "policy"});
     if (page.Has(section)) ReadAll(page.Section(section), settings);
   }
-  Config given = Config::FromText("{}", "--set");
-  for (const std::string& assignment : assignments) given.Set(assignment);
-  ReadAll(given, settings);
+  ReadAll(Given(assignments), settings);
+}
+
+std::string WhereGiven(const std::string& path, const std::string& section, const std::vector<std::string>& assignments,
+                       const std::string& option) {
+  const Config given = Given(assignments);
+  if (given.Has(option)) return given.Where(option) + ": ";
+  if (path.empty()) return "";
+  const Config page = Config::FromFile(path);
+  const bool has = page.Has(section) && page.Section(section).Has(option);
+  return has ? page.Section(section).Where(option) + ": " : "";
 }
 
 }  // namespace evac

@@ -15,4 +15,8 @@ namespace evac {
 void ReadTrainingPage(const std::string& path, const std::string& section, const std::vector<std::string>& assignments,
                       const train::Settings& settings);
 
+/// "training.yaml:7: field world.drop: ": where ReadTrainingPage, told the same, found an option; empty: nowhere.
+std::string WhereGiven(const std::string& path, const std::string& section, const std::vector<std::string>& assignments,
+                       const std::string& option);
+
 }  // namespace evac

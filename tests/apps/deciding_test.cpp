@@ -182,6 +182,23 @@ TEST_F(Deciding, AJudgeThatTheRunHasNotIsRefusedWithThoseThatItHas) {
   }
 }
 
+/// "No verdict of judge 'oracle', found: " with nothing behind it; "no real trial is a success or a failure".
+TEST_F(Deciding, OfARunThatNobodyJudgedItIsSaidWhoDoes) {
+  const std::string run = (folder_ / "unjudged").string();
+  {
+    Store store = Store::CreateOrContinue(run, SomeRun());
+    Declare(store);
+    EpisodeRecord record;
+    record.episode.key = Key(1, "sim");
+    record.episode.stop = StopReason::kStill;
+    store.Add(record);
+  }
+  const auto message = testing::ThrowsMessage<Error>(
+      HasSubstr(run + ": judge oracle: found no verdicts at all, wanted those that `evac judge` gives"));
+  EXPECT_THAT([&] { Printed(AddTrust, {"trust", run}); }, message);
+  EXPECT_THAT([&] { Printed(AddCompare, {"compare", "visual_pick@good", "visual_pick@poor", "--run", run}); }, message);
+}
+
 TEST_F(Deciding, AWorldThatNobodyJudgedIsNamedAndTakesNoTrustFromTheOthers) {
   Store::Open(Run(), Store::Mode::kReadWrite).AddWorld({"dream", "evac", false, "d4e"});
   const std::string text = Printed(AddTrust, {"trust", Run()});

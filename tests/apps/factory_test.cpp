@@ -19,6 +19,26 @@ TEST(Factory, OnAMachineOfManyCoresAWorldTakesNoMoreThreadsThanItMay) {
   EXPECT_EQ(Threads(suite, 384), 7);
 }
 
+/// Rates of one checkpoint were kept under the name of another, without a word.
+TEST(Factory, AJoinedPolicyThatDeclaresAnotherNameOrCheckpointIsSaidToDoSo) {
+  SuitePolicy mine;
+  mine.name = "mine";
+  mine.checkpoint = "a";
+  const auto said = [&](const std::string& name, const std::string& checkpoint) {
+    return DeclaredOtherwise(mine, {.name = name, .checkpoint = checkpoint});
+  };
+  EXPECT_EQ(said("mine", "a"), "");
+  EXPECT_EQ(said("", ""), "");
+  EXPECT_EQ(said("mine", ""), "");
+  EXPECT_EQ(said("mine", kDefaultCheckpoint), "") << "it says none";
+  EXPECT_THAT(said("wander", "v1"), testing::StartsWith("policy mine@a declares itself as wander@v1;"));
+  EXPECT_THAT(said("mine", "b"), testing::HasSubstr("mine@b"));
+  mine.checkpoint = kDefaultCheckpoint;
+  EXPECT_EQ(said("mine", "b"), "") << "the suite says none";
+  mine.command = {"evac-policy", "hold"};
+  EXPECT_EQ(said("wander", "v1"), "") << "evac started it, by the suite's own words";
+}
+
 /// Things that a page puts into each other are thrown apart as they settle.
 class RestlessWorld : public World {
  public:

@@ -51,6 +51,17 @@ TEST_F(Interrupts, AreForgottenWhenOtherWorkBeginsAndKillWhereNoneIsDone) {
   EXPECT_FALSE(IsInterrupted());
 }
 
+/// It was killed in mid-episode, by `head`.
+TEST_F(Interrupts, AReaderWhoGoesAwayEndsNoWork) {
+  ::signal(SIGPIPE, SIG_DFL);
+  {
+    const CatchInterrupts whole;
+    { const CatchInterrupts part; }
+    EXPECT_TRUE(Does(SIGPIPE, SIG_IGN));
+  }
+  EXPECT_TRUE(KillsAtOnce(SIGPIPE));
+}
+
 /// `nohup evac train …` ended with the terminal all the same.
 TEST_F(Interrupts, ThatTheCallerIgnoresStayIgnoredDuringTheWorkAndAfterIt) {
   ::signal(SIGHUP, SIG_IGN);

@@ -185,12 +185,31 @@ TEST(Config, AnAssignmentReplacesAFieldAnItemOrAddsAField) {
 
 TEST(Config, AnAssignmentWithoutAPlaceOrAValueIsRefused) {
   for (const char* assignment :
-       {"lanes", "=4", "absent.x=1", "worlds.2.name=a", "worlds.9=a", "worlds.x=a", "lanes.x=1", "lanes.=1", "a=[1"}) {
+       {"lanes", "=4", "worlds.2.name=a", "worlds.9=a", "worlds.x=a", "worlds.x.y.z=a", "lanes.x=1", "lanes.x.y=1",
+        "lanes.=1", "nested..x=1", ".x=1", "a=[1"}) {
     Config page = Page();
     const std::string before = page.Canonical();
     EXPECT_THAT(MessageOf([&] { page.Set(assignment); }), HasSubstr(assignment));
     EXPECT_EQ(page.Canonical(), before);
   }
+}
+
+/// `--set transport.start_s=30`, which a message advises, was refused where the page had no such section.
+TEST(Config, SectionsOnTheWayOfAnAssignmentAreMade) {
+  Config page = Page();
+  for (const char* assignment : {"absent.x=1", "absent.y={z: 2}", "nested.other.new=3", "empty.x=4", "worlds.1.a.b=5"})
+    page.Set(assignment);
+  EXPECT_EQ(page.Section("absent").Get<int>("x"), 1);
+  EXPECT_EQ(page.Section("absent").Section("y").Get<int>("z"), 2);
+  EXPECT_EQ(page.Section("nested").Section("other").Get<int>("new"), 3);
+  EXPECT_EQ(page.Section("nested").Section("deep").Get<int>("deeper"), 1) << "what was there stays";
+  EXPECT_EQ(page.Section("empty").Get<int>("x"), 4);
+  EXPECT_EQ(page.List("worlds").at(1).Section("a").Get<int>("b"), 5);
+  EXPECT_EQ(Config::FromText(page.Text(), "again").Canonical(), page.Canonical());
+  EXPECT_THAT(MessageOf([&] { page.Section("absent").AllowOnly({"why"}); }),
+              HasSubstr("suites/page.yaml (--set): field absent.x: there is no such field"));
+  EXPECT_THAT(MessageOf([&] { page.AllowOnly({"name", "lanes", "big", "friction", "light", "empty", "worlds", "nested"}); }),
+              HasSubstr("suites/page.yaml (--set): field absent: there is no such field"));
 }
 
 /// It was set for all that the alias names: a run compared a policy with itself.

@@ -171,5 +171,27 @@ TEST(RecordingWriter, ACameraThatReadersWouldTakeToBeElsewhereIsRefused) {
   EXPECT_EQ(read.cameras[1].mount, Mount::kBase) << "of a robot without a left arm";
 }
 
+/// Whoever read such a recording saw each pixel four times, and cameras of twice as many: only packing knew better.
+TEST(RecordingWriter, ShrunkAsItWasDrawnItIsThePicturesAgainToTheLastOne) {
+  const TempFolder folder;
+  const TreePlace place{folder.path(), "task", "1"};
+  const RecordedEpisode episode = OneArmEpisode();
+  WriteRecording(place, episode, {.crf = 4, .scale = 2});
+  const Recording shrunk = Shrunk(ReadRecording(place.Folder()), 2);
+  EXPECT_EQ(shrunk.shrink, 2);
+  ASSERT_EQ(shrunk.cameras.size(), 2u);
+  EXPECT_EQ(shrunk.cameras[1].height_px, kHeight_px);
+  EXPECT_DOUBLE_EQ(shrunk.cameras[1].fy_px, 21);
+  RecordedFrames frames(shrunk);
+  for (std::size_t step = 0; step < kSteps; ++step) {
+    const std::vector<cv::Mat>& images = frames.Next();
+    for (std::size_t view = 0; view < 2; ++view) {
+      ASSERT_EQ(images[view].size(), cv::Size(kWidth_px, kHeight_px));
+      EXPECT_LT(MeanDifference(images[view], episode.pictures[step][view]), 8) << step << " " << view;
+    }
+  }
+  EXPECT_EQ(MeanDifference(RecordedFrames(shrunk).Next()[0], shrunk.first_images[0]), 0);
+}
+
 }  // namespace
 }  // namespace evac

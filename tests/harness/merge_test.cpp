@@ -358,5 +358,15 @@ TEST_F(MergedRuns, LoseWhatWasSaidOfAFailedCopyThatYieldedAndDoNotCountItAsTheSa
   EXPECT_EQ(Said(), std::vector<std::string>{"oracle: of the good one"});
 }
 
+/// Its episodes were taken once and its wire's counters twice.
+TEST_F(MergedRuns, TakeAFolderThatIsGivenTwiceOnce) {
+  a_.Add(samples::SomeEpisode(a_, samples::Key(1, "real")));
+  a_.Count("p@a", {{"repeats", 3}});
+  const MergeSummary summary = MergeRuns({a_.folder(), b_.folder(), a_.folder() / "."}, folder_ / "merged");
+  EXPECT_EQ(summary.episodes, 1);
+  EXPECT_EQ(summary.duplicates, 0);
+  EXPECT_EQ(Store::Open(folder_ / "merged", Store::Mode::kReadOnly).CountersByPolicy().at("p@a").at("repeats"), 3);
+}
+
 }  // namespace
 }  // namespace evac

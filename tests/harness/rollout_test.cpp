@@ -190,6 +190,7 @@ TEST_F(Rollout, AWorldThatShowsWhatNobodyAskedForIsAWorldError) {
 }
 
 TEST_F(Rollout, ObservationsAreCommandsPlusOneAndTheLimitIsAStopReason) {
+  task_.still.enabled = true;
   const Episode episode = OnlyEpisode([](Acted plain, std::uint64_t) { return plain; });
   EXPECT_EQ(episode.stop, StopReason::kMaxChunks);
   EXPECT_EQ(episode.stop_reason, "still moving after 5 chunks, the task's limit");

@@ -1,9 +1,13 @@
 #include "harness/still.h"
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 namespace evac {
 namespace {
+
+using testing::AllOf;
+using testing::HasSubstr;
 
 Arms At(double x_m, double closure = 0) {
   ArmState arm;
@@ -70,6 +74,34 @@ TEST(Still, TheSentenceSaysHowFarTheCommandAndTheGripperWentAndTheLimits) {
   EXPECT_EQ(meter.Rest(At(0, .1), told, seen),
             "still for 3 chunks: the commanded gripper moves at most 1.0 mm, 0.010 rad, closure 0.020, the observed "
             "one moved 2.0 mm, 0.020 rad, closure 0.030 (limits 6.0 mm, 0.040 rad, closure 0.050), after 2 chunks");
+}
+
+/// It said how far the last chunk went, of all the chunks for which it was still.
+TEST(Still, TheSentenceIsOfTheFarthestOfTheChunksThatItCounts) {
+  StillMeter meter({.translation_m = .03, .dwell_chunks = 3, .min_chunks = 0});
+  const auto rest = [&](double told_m, double seen_m) {
+    return meter.Rest(At(0), std::vector<Arms>{At(told_m)}, std::vector<Arms>{At(0), At(seen_m)});
+  };
+  EXPECT_FALSE(rest(.020, .020));
+  EXPECT_FALSE(rest(.040, .004)) << "begins anew";
+  EXPECT_FALSE(rest(.005, .001));
+  EXPECT_FALSE(rest(.001, .007));
+  EXPECT_THAT(rest(.002, .003).value_or("it goes on"),
+              AllOf(HasSubstr("still for 3 chunks: the commanded gripper moves at most 5.0 mm"),
+                    HasSubstr("the observed one moved 7.0 mm")));
+}
+
+/// "Still moving" was said of arms that had not moved.
+TEST(Still, AtTheLimitItSaysWhetherItMovedAndWhetherARuleAsked) {
+  StillMeter without({.enabled = false}), moving({.dwell_chunks = 9}), resting({.dwell_chunks = 9, .min_chunks = 1});
+  for (int chunk = 0; chunk < 4; ++chunk) {
+    EXPECT_FALSE(without.Rest(At(0), Stay(0), Stay(0)));
+    EXPECT_FALSE(moving.Rest(At(0), std::vector<Arms>{At(.1)}, {}));
+    EXPECT_FALSE(resting.Rest(At(0), std::vector<Arms>{At(chunk == 0 ? .1 : 0)}, {}));
+  }
+  EXPECT_EQ(without.AtLimit(), "after 4 chunks, the task's limit; no rule says when it rests");
+  EXPECT_EQ(moving.AtLimit(), "still moving after 4 chunks, the task's limit");
+  EXPECT_EQ(resting.AtLimit(), "after 4 chunks, the task's limit, still for the last 3 (dwell_chunks 9, min_chunks 1)");
 }
 
 TEST(Still, WhereArmsAreOnlyCommandedTheCommandDecides) {

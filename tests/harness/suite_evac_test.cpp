@@ -1,3 +1,4 @@
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -266,6 +267,18 @@ TEST_F(EvacSuite, ATaskOfAnotherPeriodIsRefusedBeforeTheRealWorldsEpisodes) {
     EXPECT_EQ(error.exit_code(), ExitCode::kInvalidInput);
     EXPECT_THAT(error.what(), AllOf(HasSubstr("worlds.1.period_s"), HasSubstr("0.2 s apart, those of task take_bottle 0.1 s")));
   }
+}
+
+/// x264 did not start, after the policies had, and "go on with: evac resume" never helped.
+TEST_F(EvacSuite, PicturesThatNoVideoCanHoldAreRefusedBeforeTheFirstEpisode) {
+  WriteBoth();
+  const auto scaled = [&](int scale) {
+    ReadSuite(folder_ / "both.yaml", {"image={height_px: 768, width_px: 1152}", fmt::format("video={{scale: {}}}", scale)});
+  };
+  EXPECT_NO_THROW(scaled(7));
+  EXPECT_THAT([&] { scaled(8); },
+              testing::ThrowsMessage<Error>(AllOf(HasSubstr("both.yaml: field video.scale: found 8, wanted at most 7"),
+                                                  HasSubstr("2304x768"), HasSubstr("at most 16384 pixels"))));
 }
 
 TEST_F(EvacSuite, WithoutARealWorldOrARecordingNothingCouldBeStartedFrom) {

@@ -126,7 +126,9 @@ TEST_F(SuiteTest, SetOverridesAnyFieldAndChangesTheHash) {
   EXPECT_EQ(changed.policies[1].checkpoint, "c");
   EXPECT_EQ(changed.chunk_size, 4);
   EXPECT_NE(plain.hash, changed.hash);
-  EXPECT_THAT(Complaint(std::string(kSuite), {"nowhere.field=1"}), HasSubstr("has no field 'nowhere'"));
+  EXPECT_EQ(ReadSuite(path, {"transport.start_s=7"}).transport.start_s, 7) << "the page has no such section";
+  EXPECT_THAT(Complaint(std::string(kSuite), {"nowhere.field=1"}), HasSubstr("(--set): field nowhere: there is no such field"));
+  EXPECT_THAT(Complaint(std::string(kSuite), {"transport.start=1"}), AllOf(HasSubstr("transport.start:"), HasSubstr("'start_s'")));
 }
 
 TEST_F(SuiteTest, TheHashIgnoresCommentsLayoutAndSpeedButNotTheContentOfFiles) {

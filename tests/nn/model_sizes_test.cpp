@@ -5,6 +5,7 @@
 
 #include <limits>
 #include <set>
+#include <utility>
 
 #include "core/config.h"
 #include "core/error.h"
@@ -112,6 +113,26 @@ TEST(Sizes, APublishedPagesCodecOfNoLevelsOrTooManyIsRefusedByField) {
   }
 }
 
+/// Shards were packed and weights trained without one mark on their pose maps.
+TEST(Sizes, LengthsInMillimetresAreRefusedByField) {
+  ModelConfig config;
+  config.schedule.from_last_frame = true;
+  config.schedule.carry_plane_m = -0.75;
+  config.unet.in_channels += config.vae.z_channels + 1;
+  config.pose_map.drop_line_m = 1.5;
+  config.pose_map.tool_length_m = 1.2;
+  EXPECT_NO_THROW(config.Check());
+  const auto refused = [&](double& field, double value, const std::string& what) {
+    const double before = std::exchange(field, value);
+    EXPECT_THAT([&] { config.Check(); }, ThrowsMessage<TensorError>(HasSubstr(what)));
+    field = before;
+  };
+  refused(config.pose_map.tool_length_m, 230, "pose_map.tool_length_m: found 230, wanted metres, -5 … 5");
+  refused(config.pose_map.tool_length_m, -230, "pose_map.tool_length_m: found -230");
+  refused(*config.pose_map.drop_line_m, 700, "pose_map.drop_line_m: found 700, wanted metres, -10 … 10");
+  refused(*config.schedule.carry_plane_m, 750, "schedule.carry_plane_m: found 750, wanted metres, -10 … 10");
+}
+
 /// Noise would have been taken for velocity, and every picture been noise.
 TEST(Sizes, APublishedPageOfANetworkThatPredictsNoiseIsRefused) {
   const TempFolder folder;
@@ -157,6 +178,21 @@ TEST(NumberText, IsReadWholeOrLeavesWhatWasThere) {
     EXPECT_TRUE(ParseNumber(TextOfNumber(exact), number)) << exact;
     EXPECT_EQ(number, exact);
   }
+}
+
+/// "clip.image" and "action resampler" are no fields of a page.
+TEST(Sizes, AreRefusedByTheNamesThatThePageHasForThem) {
+  const auto refused = [](auto change, const std::string& why) {
+    ModelConfig config = TinyConfig();
+    change(config);
+    EXPECT_THAT([&] { config.Check(); }, ThrowsMessage<TensorError>(HasSubstr(why)));
+  };
+  refused([](ModelConfig& config) { config.image_encoder.image_px = config.image_encoder.patch_px + 1; },
+          "wanted a multiple of image_encoder.patch_px = ");
+  refused([](ModelConfig& config) { config.image_encoder.layers = 0; }, "image_encoder.layers is 0, wanted a number");
+  refused([](ModelConfig& config) { config.action_resampler.queries = 0; }, "action_resampler.queries is 0, wanted a number");
+  refused([](ModelConfig& config) { config.image_resampler.ff_mult = -1; }, "image_resampler.ff_mult is -1, wanted");
+  refused([](ModelConfig& config) { config.action_resampler.embedding_dim = 15; }, "action_resampler.embedding_dim is 15");
 }
 
 TEST(Sizes, ByWhichOthersAreDividedAreAskedFor) {

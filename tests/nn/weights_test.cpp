@@ -8,6 +8,7 @@
 #include <fstream>
 #include <map>
 #include <optional>
+#include <span>
 
 #include "tests/nn/support.h"
 #include "tests/support/temp_folder.h"
@@ -233,6 +234,24 @@ TEST_F(Weights, OfOtherTypesAreConverted) {
   FileWeights as_float(bf16, config_), as_it_is(bf16, config_, {.dtype = at::kBFloat16});
   EXPECT_TRUE(at::equal(as_float.Take(kOut, wanted.sizes()), wanted.to(at::kBFloat16).to(at::kFloat)));
   EXPECT_EQ(as_it_is.Take(kOut, wanted.sizes()).scalar_type(), at::kBFloat16);
+}
+
+/// They were infinite from then on, and nobody was told.
+TEST_F(Weights, BeyondAHalfsLastNumberAreNotWrittenAsHalves) {
+  std::vector<float> numbers(4 * 32 * 3 * 3, 0.5F);
+  numbers[7] = 1e6F;
+  const fs::path large = Changed([&](std::vector<TensorView>& tensors) {
+    Find(tensors, kOut).bytes = std::as_bytes(std::span(numbers));
+  });
+  const fs::path out = folder_ / "out.safetensors";
+  for (const at::ScalarType read_as : {at::kFloat, at::kHalf}) {
+    FileWeights source(large, config_, {.dtype = read_as, .with_unread = true});
+    EXPECT_THAT(MessageOf([&] { SaveWeights(out, source, config_, {.dtype = at::kHalf}); }),
+                HasSubstr(std::string(".safetensors: ") + kOut + " holds 1000000, which is infinite in F16"));
+    EXPECT_FALSE(fs::exists(out));
+  }
+  FileWeights source(large, config_, {.with_unread = true});
+  EXPECT_NO_THROW(SaveWeights(out, source, config_, {.dtype = at::kBFloat16}));
 }
 
 TEST_F(Weights, ForTrainingBeginAsTheRecipeSays) {

@@ -319,6 +319,24 @@ TEST_F(RunCorrelation, CountsOnlyPairsThatSucceededOrFailedInBothWorlds) {
   EXPECT_EQ(group.pearson.value.reason(), "1 point, wanted at least 3");
 }
 
+/// "Pearson is undefined in 503 of 2000 replicates, which are dropped" was said where two points have none in any.
+TEST_F(RunCorrelation, WherePearsonIsUndefinedNoReplicateIsSaidToBeDropped) {
+  const std::string_view outcomes[] = {"ssff", "sfff"};
+  for (int policy = 0; policy < 2; ++policy) {
+    for (std::size_t state = 0; state < 4; ++state) {
+      const PairKey pair{"bottle", "7-" + std::to_string(state), "pick", kCheckpoints[policy], 0};
+      for (const char* world : {"real", "sim"})
+        Add(pair, world, outcomes[policy][state] == 's' ? Label::kSuccess : Label::kFailure);
+    }
+  }
+  RunCorrelationOptions options;
+  options.world = "sim";
+  const auto groups = CorrelateRun(store_, options);
+  EXPECT_EQ(groups[0].pearson.value.reason(), "2 points, wanted at least 3");
+  EXPECT_EQ(groups[0].undefined_replicates, 0);
+  EXPECT_THAT(CorrelationText(groups), testing::Not(HasSubstr("dropped")));
+}
+
 TEST_F(RunCorrelation, TheNewestVerdictOfTheJudgeIsTheOneThatCounts) {
   AddAll();
   const auto before = CorrelateRun(store_)[0];

@@ -483,7 +483,8 @@ TEST(Gate, ASizeThatNobodyCanCountIsNotZero) {
 }
 
 TEST(Gate, WithoutAPairNoNumberOfThemIsPromised) {
-  EXPECT_EQ(Decided(Rules(kMcnemar), "uuuu", "ssss").rules.at(0).more, "");
+  EXPECT_EQ(Decided(Rules(kMcnemar), "uuuu", "ssss").rules.at(0).more,
+            "Nobody has judged the run yet: evac judge RUN --judge oracle.");
 }
 
 TEST(Gate, AnInvertedIntervalTouchesItsThreshold) {

@@ -226,6 +226,20 @@ TEST(Page, MissingVerdictsOfAJudgeAreSaidWithACommandThatTheProgramTakes) {
   EXPECT_THAT(page("human"), Not(HasSubstr("--judge human")));
 }
 
+/// Its examples and practice clips were "not judged yet" for ever, with commands that add nothing.
+TEST(Page, WhatAStudyGivesNoLabelOfIsSaidBesideTheCommandsThatGiveThem) {
+  const SampleRun run({{"a", "pick", "1", "uu", "uu"}});
+  const auto page = [&run](const std::string& judge) { return ReportPage(run.Summary({.judge = judge}), kBeside); };
+  EXPECT_THAT(page("human"), HasSubstr("adds them. But a study's examples and practice clips get no label."));
+  EXPECT_THAT(page("human"), testing::ContainsRegex("4 episodes are not judged yet: evac rate new .*get no label\\)"));
+  EXPECT_THAT(page("oracle"), Not(HasSubstr("get no label")));
+}
+
+TEST(Page, OnePairIsSaidInTheSingular) {
+  const std::string page = ReportPage(SampleRun({{"a", "pick", "1", "s", "s"}}).Summary(), kBeside);
+  EXPECT_THAT(page, HasSubstr("n = 1 pair. Exact McNemar"));
+}
+
 TEST(Page, ARunWithoutEpisodesOrWithoutARealWorldStillHasAPage) {
   RunData data = ReadRun(SampleRun({{"a", "pick", "1", "s", "s"}}).store());
   data.worlds[0].is_real = false;
@@ -246,8 +260,9 @@ TEST(Page, NoBarStandsWithoutItsInterval) {
   const std::string page = ReportPage(LargeRun().Summary(), kBeside);
   EXPECT_GT(Matches(page, "(class=\"dot\")").size(), 40u);
   EXPECT_EQ(Matches(page, "(<rect class=\"bar)").size(), 0u);
+  const WorldMarks marks = MarksOf(LargeRun().Summary());
   for (const StageFunnel& funnel : StagesOf(LargeRun().Summary()).funnels) {
-    const std::string chart = StageDrawing(funnel).body;
+    const std::string chart = StageDrawing(funnel, marks).body;
     EXPECT_EQ(Matches(chart, "(class=\"dot\")").size() * 2, Matches(chart, "(h6)").size()) << "two ends for each dot";
   }
 }

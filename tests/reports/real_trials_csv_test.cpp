@@ -23,9 +23,9 @@ RealTrialsCsv Read(const std::string& text, const KnownNames& known = kKnown) {
   return ReadRealTrialsCsv(text, "t.csv", known);
 }
 
-std::string Refusal(const std::string& text) {
+std::string Refusal(const std::string& text, const KnownNames& known = kKnown) {
   try {
-    Read(text);
+    Read(text, known);
   } catch (const Error& error) {
     EXPECT_EQ(error.exit_code(), ExitCode::kInvalidInput);
     return error.what();
@@ -58,10 +58,24 @@ TEST(RealTrialsCsv, EveryWrongLineIsNamedAndNothingIsRead) {
       "take,41-0002,p,good,success,7\n"
       "take,41-0002,p,good,failure,7\n");
   EXPECT_THAT(refusal, AllOf(HasSubstr("t.csv:2: column outcome: found \"maybe\""), HasSubstr("t.csv:3: column task"),
-                             HasSubstr("t.csv:4: column initial_state"), HasSubstr("t.csv:5: column policy")));
+                             HasSubstr("t.csv:4: column initial_state"), HasSubstr("t.csv:5: column checkpoint")));
   EXPECT_THAT(refusal,
               AllOf(HasSubstr("t.csv:6: found 5 cells, wanted 6"), HasSubstr("t.csv:7: column trial"),
                     Not(HasSubstr("t.csv:8:")), HasSubstr("t.csv:9: column trial"), HasSubstr("nothing was imported")));
+}
+
+/// The policy was found wrong, and the word that was is not shown.
+TEST(RealTrialsCsv, OfAPolicyThatIsKnownTheCheckpointIsWrong) {
+  KnownNames known = kKnown;
+  known.policies = {{"other", "last"}, {"p", "fair"}, {"p", "good"}};
+  const auto refusal_of = [&](const std::string& policy) {
+    return Refusal("task,initial_state,policy,checkpoint,outcome\ntake,41-0001," + policy + ",1\n", known);
+  };
+  EXPECT_THAT(refusal_of("p,god"),
+              HasSubstr("t.csv:2: column checkpoint: found \"god\", wanted a checkpoint of p: fair, good"));
+  EXPECT_THAT(refusal_of("q,good"),
+              HasSubstr("t.csv:2: column policy: found \"q\", wanted a policy and checkpoint of the run: other,last; "
+                        "p,fair; p,good"));
 }
 
 TEST(RealTrialsCsv, AFileWithoutHeaderColumnsOrRowsIsRefused) {

@@ -321,7 +321,7 @@ TEST(Headlines, WhoIsMissingIsAskedByACommandThatTheProgramTakes) {
   EXPECT_THAT(text("classifier:1a2b"), HasSubstr("yet: evac judge RUN --judge classifier --weights FILE"));
   EXPECT_THAT(text("vlm:qwen"), HasSubstr("yet: evac judge RUN --judge vlm --config PAGE"));
   EXPECT_THAT(text("human"), HasSubstr("yet: evac rate new STUDY --run RUN, then evac rate serve STUDY, then evac rate "
-                                       "resolve STUDY"));
+                                       "resolve STUDY (a study's examples and practice clips get no label)"));
 }
 
 TEST(Methods, NameTheTestsThatWereUsedAndNoOthers) {

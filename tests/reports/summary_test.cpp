@@ -123,6 +123,8 @@ TEST(Summary, EveryKindOfJudgeHasItsCommands) {
   EXPECT_EQ(JudgingCommands("human").back(), "evac rate resolve STUDY");
   EXPECT_EQ(JudgingCommands("human:pilot:r3").back(), "evac rate resolve STUDY --each-rater");
   EXPECT_EQ(JudgingCommands("second").back(), "evac rate resolve STUDY --as second");
+  for (const char* program : {"oracle", "classifier:1a2b", "vlm"}) EXPECT_EQ(NeverJudged(program), "");
+  for (const char* people : {"human", "second"}) EXPECT_THAT(NeverJudged(people), testing::HasSubstr("get no label"));
 }
 
 TEST(Summary, OtherJudgesCountTheSameEpisodesWithTheirOwnVerdicts) {

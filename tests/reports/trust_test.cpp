@@ -278,6 +278,14 @@ TEST(PlanFor, AMarginAndADifferenceAreSaidAsTheyWereGiven) {
   EXPECT_THAT(text, HasSubstr("episodes for ± 5 points at that rate"));
 }
 
+/// "The 1 states at hand", "from 1 episodes".
+TEST(PlanFor, OneIsSaidInTheSingular) {
+  const std::string text = PlanText(MakePlan({.trials = 1}));
+  EXPECT_THAT(text, HasSubstr("The 1 state at hand sees it with a chance of"));
+  EXPECT_THAT(text, HasSubstr("from 1 episode"));
+  for (const char* plural : {"1 states", "1 episodes"}) EXPECT_THAT(text, testing::Not(HasSubstr(plural))) << plural;
+}
+
 TEST(PlanFor, RatesAndOtherSharesAreSaidAsTheyWereGiven) {
   const std::string text = PlanText(MakePlan({.rate = 0.125, .difference = 0.075, .flips = 0.105, .correlation = 0.999,
                                               .accuracy = 0.925, .wanted_right = 0.995, .promise = {.power = 0.825}}));

@@ -2,6 +2,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <fstream>
+
 #include "harness/job.h"
 #include "tests/support/temp_folder.h"
 #include "tests/system/run_support.h"
@@ -61,6 +63,44 @@ TEST(Conventions, WhatIsNotDeclaredIsSeenInTheFirstChunkBeforeAnyEpisodeCounts) 
     EXPECT_THAT(warned.err,
                 testing::ContainsRegex(fmt::format("warning: policy {}@default, task take_bottle, first chunk: .*{}",
                                                    fault, said.substr(0, 15))));
+}
+
+/// Policies whose programs can be mended while a run knows them.
+class MendedPolicies : public testing::Test {
+ protected:
+  void Write(const std::string& name, const std::string& words) const {
+    std::ofstream(folder_ / name) << "exec '" << Binary("faulty-policy") << "' " << words << "\n";
+  }
+  std::vector<std::string> Words(const std::vector<std::string>& names) const {
+    std::string policies;
+    for (const std::string& name : names)
+      policies += fmt::format("{}{{name: {}, command: [/bin/sh, {}]}}", policies.empty() ? "" : ", ", name,
+                              (folder_ / name).string());
+    return RunWords(kFaults, folder_ / "run", {"policies=[" + policies + "]", "initial_states.count=1"});
+  }
+  const TempFolder folder_;
+};
+
+/// What it had declared stood in the run, which had no episode, and it could never run there again.
+TEST_F(MendedPolicies, OneThatWasRefusedRunsInTheSameFolderWhateverItDeclaresNow) {
+  Write("p", "--fault delta");
+  EXPECT_EQ(RunCommand(Words({"p"})).exit_code, 2);
+  Write("p", "--declare needs=instruction");
+  const CommandResult mended = RunCommand(Words({"p"}));
+  EXPECT_EQ(mended.exit_code, 0) << mended.err;
+}
+
+/// Others ran first, for hours maybe.
+TEST_F(MendedPolicies, OneWithEpisodesThatDeclaresOtherwiseIsRefusedBeforeAnyEpisodeOfAnother) {
+  for (const char* name : {"p", "q"}) Write(name, "--fault error");
+  ASSERT_EQ(RunCommand(Words({"p", "q"})).exit_code, 0);
+  const std::string before = List(folder_ / "run");
+  Write("p", "");
+  Write("q", "--declare needs=instruction");
+  const CommandResult refused = RunCommand({Binary("evac"), "resume", folder_ / "run", "--retry-failed"});
+  EXPECT_EQ(refused.exit_code, 2);
+  EXPECT_THAT(refused.err, AllOf(HasSubstr("policy 'q@default' is in this run already"), HasSubstr("instruction")));
+  EXPECT_EQ(List(folder_ / "run"), before);
 }
 
 /// The next episode's first chunk was asked for instead, of a policy that had been found to be as it declared.

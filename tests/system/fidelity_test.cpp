@@ -1,3 +1,4 @@
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <signal.h>
@@ -8,6 +9,7 @@
 #include <sstream>
 #include <thread>
 
+#include "core/collection.h"
 #include "core/file.h"
 #include "core/store.h"
 #include "harness/suite.h"
@@ -112,11 +114,18 @@ Arms FirstArmsIn(const fs::path& out, const std::string& world) {
   return {};
 }
 
+int HowOften(const std::string& words, const std::string& text) {
+  int count = 0;
+  for (std::size_t at = 0; (at = text.find(words, at)) != std::string::npos; at += words.size()) ++count;
+  return count;
+}
+
 TEST_F(FidelityRun, AsksEveryPartAndEndsInTheSameNumbersWhenItWasKilled) {
   const fs::path whole = folder_ / "whole", killed = folder_ / "killed";
   const CommandResult straight = RunCommand(Words(whole));
   ASSERT_EQ(straight.exit_code, 0) << straight.err;
   EXPECT_THAT(straight.err, HasSubstr("nobody judges the imagined clips"));
+  EXPECT_EQ(HowOften("says the statistics of the arms' motion", straight.err), 1) << "it was said once for each part";
 
   std::istringstream rows(ReadFile(whole / "episodes.csv"));
   std::vector<std::string> lines;
@@ -337,6 +346,61 @@ class RecordedFidelityRun : public FidelityRun {
     return RunCommand(words);
   }
 };
+
+/// An episode as `evac collect` leaves it, its video `scale` pixels to one of the pictures.
+void WriteCollected(const fs::path& root, int scale) {
+  constexpr int kSteps = 17, kWidth_px = 48, kHeight_px = 32;
+  const TreePlace place{root, "carry", "000000"};
+  RecordedEpisode episode;
+  for (const auto& [name, mount] : {std::pair{"head", Mount::kBase}, {"hand_right", Mount::kRightGripper}})
+    episode.cameras.push_back({name, kWidth_px, kHeight_px, 40, 40, 24, 16, mount, SyntheticClip::MountFromCamera()});
+  for (int step = 0; step < kSteps; ++step) {
+    ArmState left, right;
+    left.base_from_gripper = Eigen::Translation3d(0.4 + 0.01 * step, 0.2, 0.3);
+    right.base_from_gripper = Eigen::Translation3d(0.4 + 0.01 * step, -0.2, 0.3);
+    left.closure = right.closure = 0.5;
+    episode.arms.push_back({left, right});
+    cv::Mat picture(kHeight_px, kWidth_px, CV_8UC3);
+    for (int y = 0; y < kHeight_px; ++y) {
+      for (int x = 0; x < kWidth_px; ++x)
+        picture.at<cv::Vec3b>(y, x) = cv::Vec3b::all(static_cast<uchar>(40 + 2 * x + 2 * y + step));
+    }
+    episode.pictures.push_back({picture, picture});
+  }
+  episode.told = episode.arms;
+  WriteRecording(place, episode, {.crf = 1, .scale = scale});
+  WriteTruth(TruthPath(place),
+             {{"head", "hand_right"}, std::vector<float>(kSteps * 4, 1), std::vector<std::uint8_t>(kSteps, 0)});
+  CollectedEpisode row;
+  row.task = place.task;
+  row.episode = row.initial_state = place.episode;
+  row.stop = "still";
+  row.frames = kSteps;
+  row.video_scale = scale;
+  WriteText(RowPath(place), CollectedJson(row));
+}
+
+/// A collection's doubled pixels were held against imagined pictures that were made as large: other dB than the same
+/// episodes in videos of the pictures' size, and pixels of half the size.
+TEST_F(RecordedFidelityRun, MeasuresACollectionInItsPicturesPixelsHoweverLargeItsVideosAre) {
+  std::vector<std::vector<double>> psnr;
+  for (const int scale : {1, 2}) {
+    const fs::path collection = folder_ / fmt::format("collected_{}", scale);
+    const fs::path out = folder_ / fmt::format("out_{}", scale);
+    WriteCollected(collection, scale);
+    const CommandResult result = Run(out, {"recording=" + collection.string()});
+    ASSERT_EQ(result.exit_code, 0) << result.err;
+    const Store store = Store::Open(out / "open", Store::Mode::kReadOnly);
+    ASSERT_EQ(store.Tasks().size(), 1u);
+    for (const Camera& camera : store.Tasks().front().cameras) {
+      EXPECT_EQ(camera.width_px, 48) << camera.name << " of scale " << scale;
+      EXPECT_DOUBLE_EQ(camera.fx_px, 40) << camera.name << " of scale " << scale;
+    }
+    psnr.push_back(Numbers(out)["open_loop"]["psnr_by_chunk"].get<std::vector<double>>());
+  }
+  ASSERT_EQ(psnr[0].size(), 2u);
+  EXPECT_THAT(psnr[1], testing::Pointwise(testing::DoubleNear(0.3), psnr[0]));
+}
 
 TEST_F(RecordedFidelityRun, ReplaysAsManyAndAsLongAsTheSuiteSays) {
   const fs::path out = folder_ / "out";

@@ -57,5 +57,51 @@ TEST(ImagineFrames, SaysWhereNobodySaidTheStatisticsWhoseTheyAre) {
   EXPECT_THAT(said.err, testing::Not(HasSubstr("AgiBot World")));
 }
 
+/// A one-armed robot's wrist camera is the right one's: the left one's was missed, which `evac pack` does not ask for.
+TEST(ImagineMaps, TakeOfARecordingTheCamerasThatItHas) {
+  const TempFolder folder;
+  SyntheticClip clip(8);
+  clip.cameras = {"head", "hand_right"};
+  clip.LoseLeftArm();
+  clip.Write(OneFolder(folder / "clip"));
+  SyntheticClip(8).Write(OneFolder(folder / "head_alone"));
+  const auto maps = [&](const std::string& recording, const std::string& out) {
+    return RunCommand({Binary("evac"), "imagine", "--maps-only", "--recording", folder / recording, "--config",
+                       EVAC_SOURCE_DIR "/tests/system/evac_small.yaml", "--out", folder / out});
+  };
+  const CommandResult taken = maps("clip", "maps");
+  EXPECT_EQ(taken.exit_code, 0) << taken.err;
+  ImagineInputs inputs;
+  inputs.recording = folder / "clip";
+  EXPECT_THAT(NamesOf(ReadImagineStart(inputs, 2).scene.cameras), testing::ElementsAre("head", "hand_right"));
+  const CommandResult too_few = maps("head_alone", "refused");
+  EXPECT_EQ(too_few.exit_code, 2);
+  EXPECT_THAT(too_few.err, HasSubstr((folder / "head_alone").string() + ": cameras: found 1 (head), wanted 2, one for each view"));
+  std::filesystem::create_directory(folder / "none");
+  EXPECT_THAT(maps("none", "refused").err, HasSubstr("no recording; wanted"));
+  EXPECT_THAT(maps("nowhere", "refused").err, HasSubstr("no such folder"));
+  EXPECT_FALSE(std::filesystem::exists(folder / "refused"));
+}
+
+/// `--cameras`, which nobody had given, was said to be wrong, and the next message wanted them back.
+TEST(ImagineFrames, WeightsOfMoreViewsThanTheSizesWantTheirOwnPage) {
+  const TempFolder folder;
+  SyntheticClip(8).Write(OneFolder(folder / "one"));
+  const std::string config = EVAC_SOURCE_DIR "/tests/system/evac_small.yaml", weights = folder / "small.safetensors";
+  nn::RandomWeights random(5);
+  nn::SaveWeights(weights, random, ReadEvacConfig(config), {.metadata = {{"cameras", "head,hand_right"}}});
+  const std::vector<std::string> words = {Binary("evac"), "imagine", "--recording", folder / "one", "--weights",
+                                          weights, "--out", folder / "out"};
+  for (const std::vector<std::string>& more : {std::vector<std::string>{}, {"--maps-only"}, {"--cameras", "head"}}) {
+    std::vector<std::string> all = words;
+    all.insert(all.end(), more.begin(), more.end());
+    const CommandResult result = RunCommand(all);
+    EXPECT_EQ(result.exit_code, 2) << result.err;
+    EXPECT_THAT(result.err, testing::AllOf(HasSubstr(weights + ": its network sees head,hand_right (2 views)"),
+                                           HasSubstr("--config"), testing::Not(HasSubstr("--cameras"))));
+    EXPECT_FALSE(std::filesystem::exists(folder / "out"));
+  }
+}
+
 }  // namespace
 }  // namespace evac

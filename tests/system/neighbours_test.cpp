@@ -51,5 +51,22 @@ TEST(Neighbours, AStrayPolicyAtTheAddressThatASuiteJoinsIsRefusedByName) {
   EXPECT_THAT(result.err, testing::HasSubstr("2 policies answer on"));
 }
 
+/// Rates of one checkpoint were kept under the name of another, without a word.
+TEST(Neighbours, APolicyThatIsJoinedUnderAnotherNameThanItsOwnIsNotedOnceAndNotRefused) {
+  const TempFolder folder;
+  const std::string token = "n" + std::to_string(::getpid());
+  const Child there({Binary("evac-policy"), "hold", "--chunk-size", "8", "--checkpoint", "b", "--token", token},
+                    folder / "there");
+  const CommandResult result = RunCommand(RunWords(
+      kFaults, folder / "run",
+      {"policies.0={name: mine, checkpoint: a, join: {url: \"udpm://239.255.76.67:7667?ttl=0&recv_buf_size=4194304\", "
+       "token: " + token + "}}",
+       "initial_states.count=1", "transport.start_s=60"}));
+  EXPECT_EQ(result.exit_code, 0) << result.err;
+  const std::string note = "evac: note: policy mine@a declares itself as hold@b;";
+  ASSERT_THAT(result.err, testing::HasSubstr(note));
+  EXPECT_EQ(result.err.find(note), result.err.rfind(note));
+}
+
 }  // namespace
 }  // namespace evac

@@ -122,6 +122,34 @@ TEST_F(OwnRecordings, AFirstFrameAndAStepBeginEpisodesOfANetworkOfAnyPeriod) {
   EXPECT_NO_THROW(CheckNetwork(suite.worlds.front(), suite.tasks));
 }
 
+/// Every recording was warned of, and at last their folder named: nothing was wrong with it.
+TEST_F(OwnRecordings, AMistakeOfTheSuiteIsToldOnceAndBlamesNoRecording) {
+  for (const char* name : {"many/a", "many/b"}) WriteClip(name);
+  WriteNetwork(1);
+  nn::RandomWeights random(5);
+  nn::SaveWeights(folder_ / "small.safetensors", random, ReadEvacConfig(folder_ / "small.yaml"),
+                  {.metadata = {{"period_s", "0.1"}, {"cameras", "head"}}});
+  nn::SaveWeights(folder_ / "other.safetensors", random, ReadEvacConfig(folder_ / "small.yaml"),
+                  {.metadata = {{"period_s", "0.1"}, {"cameras", "hand_left"}}});
+  const auto expect_told = [&](const std::vector<std::string>& set, const std::string& what) {
+    testing::internal::CaptureStderr();
+    EXPECT_THAT(
+        [&] {
+          Suite suite = ReadSuite(WriteSuite(kEvac, "many"), set);
+          FillInRecordedTask(suite);
+        },
+        testing::ThrowsMessage<Error>(testing::AllOf(HasSubstr(what), testing::Not(HasSubstr("begun from")))));
+    EXPECT_EQ(testing::internal::GetCapturedStderr(), "") << what;
+  };
+  expect_told({"worlds.0.period_s=0.2"}, "world evac: field period_s");
+  const std::string beside = folder_.path().string() + "/";
+  const auto world = [&](const std::string& name) {
+    return "{name: " + name + ", type: evac, weights: " + beside + name + ".safetensors, config: " + beside +
+           "small.yaml, steps: 1}";
+  };
+  expect_told({"worlds=[" + world("small") + ", " + world("other") + "]"}, "world small is to see");
+}
+
 /// A task was called like its folder: pour/held_out and stack/held_out were one, pour/held_out and pour/next two.
 TEST_F(OwnRecordings, TheirTaskIsCalledAsThePageSaysAndElseLikeTheirFolder) {
   WriteClip("pour/held_out/a");

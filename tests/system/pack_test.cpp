@@ -149,6 +149,19 @@ TEST_F(PackCommand, ABrokenWristCameraIsInTheWayOfThoseAloneWhoPackIt) {
   ASSERT_EQ(RunCommand(Words("two", {"--cameras", "head,hand_right"})).exit_code, 0);
 }
 
+/// --cameras was advised, which cannot help: no recording has so many.
+TEST_F(PackCommand, MoreViewsThanAnyRecordingHasCamerasAreRefusedWithThePage) {
+  SyntheticClip clip = Good();
+  clip.cameras = {"head", "hand_right"};
+  Add("a", clip);
+  WriteText(folder_ / "tiny.yaml", std::string(kTiny) + "views: 3\n");
+  const CommandResult three = RunCommand(Words("out"));
+  EXPECT_EQ(three.exit_code, 2);
+  EXPECT_THAT(three.err, AllOf(HasSubstr("tiny.yaml: field views: found 3, wanted as many as a recording has cameras"),
+                               HasSubstr("none of 1 has more than 2 ("), HasSubstr("data/a has head, hand_right)"),
+                               Not(HasSubstr("--cameras"))));
+}
+
 TEST_F(PackCommand, ListsRecordingsWhateverTheirFoldersAreCalled) {
   Add("caf\xE9", Good());
   SyntheticClip cut = Good();

@@ -122,6 +122,27 @@ TEST(RatingSession, ASheetOfAllClipsComesInWholeAndIsToldWhichOfItCountNowhere) 
   EXPECT_EQ(nlohmann::json::parse(Rate({"status", study, "--json"}).out).at("progress").at("votes"), 4);
 }
 
+/// They were "not judged yet" for ever, and the command that was named against it was refused.
+TEST(RatingSession, OfWhichClipsThereIsNoLabelIsSaidWhenTheOthersGetTheirs) {
+  StoredRun run("unlabelled", "sfsf", "sffs");
+  { const Store closed = std::move(run.store()); }  // `evac rate resolve` writes into the run
+  const std::string folder = run.folder().string(), study = (run.folder().parent_path() / "study").string();
+  ASSERT_EQ(Rate({"new", study, "--run", folder, "--gold-from", "oracle", "--height", "64"}).exit_code, 0);
+  std::ofstream sheet(study + ".csv");
+  sheet << "episode,rater,label\n";
+  for (const StudyClip& clip : StudyStore::Open(study, StudyStore::Mode::kReadOnly).Clips())
+    sheet << clip.episode << ",ann,success\n" << clip.episode << ",bob,success\n";
+  sheet.close();
+  ASSERT_EQ(Rate({"import", study, study + ".csv"}).exit_code, 0);
+  const CommandResult resolved = Rate({"resolve", study});
+  EXPECT_EQ(resolved.exit_code, 0) << resolved.err;
+  EXPECT_THAT(resolved.out, HasSubstr("human: 4 clips decided, 0 not; 4 new verdicts in their runs\n"
+                                      "note: 4 of the study's clips are examples and practice: they get no label"));
+  ASSERT_EQ(RunCommand({Binary("evac"), "report", folder, "--judge", "human"}).exit_code, 0);
+  EXPECT_THAT(ReadFile(folder + "/report/index.html"),
+              HasSubstr("adds them. But a study's examples and practice clips get no label."));
+}
+
 /// A run was the text that the study has for it, which nobody typed: "out/run/" had no clip.
 TEST(RatingSession, ASheetMayNameARunInAnyWayThatNamesItsFolder) {
   const StoredRun one("one", "s", "s"), two("two", "s", "s");

@@ -16,6 +16,7 @@
 #include "core/seed.h"
 #include "core/store.h"
 #include "harness/suite.h"
+#include "tests/support/child.h"
 #include "tests/support/command.h"
 #include "tests/support/temp_folder.h"
 #include "tests/system/killed_run.h"
@@ -119,6 +120,29 @@ TEST(Resume, AfterThePolicyOrBothWereKilledTheTablesAndVideosAreThoseOfAnUninter
         << killed;
     EXPECT_EQ(Videos(folder / killed), Videos(folder / "whole")) << killed;
   }
+}
+
+/// How many verdicts there are; none before the first episode's files are there.
+std::size_t Judged(const fs::path& run) try {
+  return Stored(run) == 0 ? 0 : Store::Open(run, Store::Mode::kReadOnly).CurrentVerdicts().size();
+} catch (const Error&) {
+  return 0;
+}
+
+/// A run was judged at its end alone: whoever looked before found no verdict, and `evac judge` was refused beside it.
+TEST(Resume, ARunInProgressHasVerdictsOfThePoliciesThatAreThrough) {
+  const TempFolder folder;
+  const fs::path run = folder / "run";
+  Child child(RunWords(kSuite, run), folder / "log");
+  EXPECT_TRUE(WaitUntil([&] { return Judged(run) > 0; }, 600)) << ReadFile(folder / "log");
+  EXPECT_LT(Stored(run), 16u) << "it is not over";
+  const int status = child.End(SIGINT);
+  EXPECT_TRUE(WIFEXITED(status) && WEXITSTATUS(status) == 4) << status;
+  EXPECT_THAT(Judged(run), testing::AllOf(testing::Gt(0u), testing::Lt(16u)));
+
+  const CommandResult resumed = RunCommand({Binary("evac"), "resume", run.string()});
+  EXPECT_EQ(resumed.exit_code, 0) << resumed.err;
+  EXPECT_EQ(Judged(run), 16u);
 }
 
 TEST(Resume, WhoRanWithOtherTimesThanTheRunBeganWithIsToldTheCommandThatKeepsThem) {

@@ -57,6 +57,22 @@ TEST(Storage, AFullDiskEndsTheRunWithOneMessageAndNoEpisodeIsBlamedForIt) {
   ::waitpid(goes_on, nullptr, 0);
 }
 
+/// The lock was opened as standard error: progress went into it, and nobody took it for a lock any more.
+TEST(Storage, WithStandardErrorClosedNothingThatIsPrintedGoesIntoAFileOfTheRun) {
+  const TempFolder folder;
+  const fs::path run = folder / "run";
+  const auto closed = [&](const std::string& streams) {
+    return RunCommand({"/bin/sh", "-c", fmt::format("exec '{}' run '{}' --out '{}' --set initial_states.count=1 {}",
+                                                    Binary("evac"), kFaults, run.string(), streams)});
+  };
+  EXPECT_EQ(closed("2>&-").exit_code, 0);
+  EXPECT_EQ(closed("<&- 2>&-").exit_code, 0);
+  EXPECT_THAT(ReadFile(run / "lock"), testing::MatchesRegex("[0-9]*\n?"));
+  const CommandResult resumed = RunCommand({Binary("evac"), "resume", run});
+  EXPECT_EQ(resumed.exit_code, 0) << resumed.err;
+  EXPECT_EQ(Store::Open(run, Store::Mode::kReadOnly).Episodes().size(), 1u);
+}
+
 TEST(Storage, AnOutputThatCannotBeWrittenIsOneMessage) {
   const TempFolder folder;
   SmallDisk disk(folder / "disk", "size=1m");

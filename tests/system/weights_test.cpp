@@ -2,13 +2,17 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <filesystem>
 #include <fstream>
 #include <nlohmann/json.hpp>
+#include <span>
 
 #include "core/file.h"
 #include "core/hash.h"
 #include "core/tensor_file.h"
+#include "tests/support/command.h"
+#include "tests/support/synthetic_recording.h"
 #include "tests/support/temp_folder.h"
 #include "tests/system/process_support.h"
 
@@ -192,6 +196,57 @@ TEST_F(WeightsCommand, LeanLeavesOutWhatNothingReadsAndStillFits) {
   EXPECT_LT(fs::file_size(folder_ / "lean.safetensors"), fs::file_size(folder_ / "f32.safetensors"));
   const Answer answer = Evac("inspect lean.safetensors --config tiny.yaml");
   EXPECT_THAT(answer.text, HasSubstr("fits; 0 of its keys are read by nothing"));
+}
+
+/// A number beyond 65504 was infinite in OUT, which `inspect` called fitting.
+TEST_F(WeightsCommand, ConvertWritesNoNumberThatTheTypeCannotHold) {
+  Init("a.safetensors");
+  {
+    const TensorFile file = TensorFile::Open(folder_ / "a.safetensors");
+    std::vector<TensorView> tensors = file.tensors();
+    const std::string key = "first_stage_model.decoder.conv_out.bias";
+    const auto found = std::ranges::find(tensors, key, &TensorView::name);
+    ASSERT_NE(found, tensors.end());
+    const std::vector<float> large(found->ByteCount() / sizeof(float), 1e6F);
+    found->bytes = std::as_bytes(std::span(large));
+    WriteTensorFile(folder_ / "large.safetensors", tensors, file.metadata());
+  }
+  const Answer half = Evac("convert large.safetensors half.safetensors --config tiny.yaml --dtype f16");
+  EXPECT_EQ(half.exit_code, 2);
+  EXPECT_THAT(half.text, HasSubstr("large.safetensors: first_stage_model.decoder.conv_out.bias holds 1000000"));
+  EXPECT_FALSE(fs::exists(folder_ / "half.safetensors"));
+  const Answer bf16 = Evac("convert large.safetensors bf16.safetensors --config tiny.yaml --dtype bf16");
+  EXPECT_EQ(bf16.exit_code, 0) << bf16.text;
+}
+
+/// OUT said the cameras, maps and statistics of another packing, and could be used by nothing.
+TEST_F(WeightsCommand, ConvertTakesNoShardsOfOtherViewsSizesOrMapsThanThePages) {
+  SyntheticClip clip(15);
+  clip.cameras = {"head", "hand_left"};
+  clip.Write(OneFolder(folder_ / "data/a"));
+  const auto pack = [&](const std::string& name, const std::string& more) {
+    WriteFileAtomically(folder_ / (name + ".yaml"), kTinyPage + more);
+    const CommandResult packed =
+        RunCommand({Binary("evac"), "pack", folder_ / "data", "--out", folder_ / name, "--config",
+                    folder_ / (name + ".yaml"), "--clips-per-shard", "1", "--holdout", "0"});
+    ASSERT_EQ(packed.exit_code, 0) << packed.err;
+  };
+  pack("own", "");
+  pack("two_views", "views: 2\n");
+  pack("scaled", "pose_map: {scaled: true}\n");
+  Init("w.safetensors");
+  const auto convert = [&](const std::string& shards) {
+    return Evac("convert w.safetensors " + shards + ".safetensors --config tiny.yaml --shards " + shards);
+  };
+  const Answer of_two_views = convert("two_views"), of_scaled = convert("scaled");
+  EXPECT_EQ(of_two_views.exit_code, 2);
+  EXPECT_THAT(of_two_views.text, HasSubstr("found 2 views of 24x16 px, wanted 1 of 24x16, as tiny.yaml has"));
+  EXPECT_FALSE(fs::exists(folder_ / "two_views.safetensors"));
+  EXPECT_EQ(of_scaled.exit_code, 2);
+  EXPECT_THAT(of_scaled.text, HasSubstr("pose maps were drawn with"));
+  EXPECT_FALSE(fs::exists(folder_ / "scaled.safetensors"));
+  const Answer of_its_own = convert("own");
+  EXPECT_EQ(of_its_own.exit_code, 0) << of_its_own.text;
 }
 
 }  // namespace

@@ -307,7 +307,8 @@ TEST(Trainer, RefusesTheCheckpointOfAnotherTraining) {
   using testing::HasSubstr;
   using testing::ThrowsMessage;
   EXPECT_THAT([&] { Trainer(again.Parameters(), other, folder.path()); },
-              ThrowsMessage<TensorError>(HasSubstr("is a training with other options")));
+              ThrowsMessage<TensorError>(
+                  HasSubstr("is a training with other options: learning_rate is 0.05 there, 0.1 here: another folder")));
   EXPECT_THAT([&] { Trainer({{"weight", at::zeros({3, 1})}}, QuickTrainer(3), folder.path()); },
               ThrowsMessage<TensorError>(HasSubstr("is a training of other parameters")));
 }

@@ -104,6 +104,20 @@ TEST(TrainedFor, StatisticsOfAnotherRobotAreRefusedWithWhatDiffers) {
               ThrowsMessage<Error>(HasSubstr("mean of left z: found 1e-05, wanted 0")));
 }
 
+/// A mean of 5.6e-20, the noise of rounding, wanted the same 5.6e-20: 0 was another robot's.
+TEST(TrainedFor, AMeanCountsAgainstItsDeviationAlone) {
+  ActionStatistics noisy = OfTheDesk();
+  noisy.mean[7] = 5.557200473554684e-20;
+  noisy.deviation[7] = 0.003;
+  const TrainedFor trained = TrainedFor::Of("w.safetensors", {{"statistics", StatisticsPage(noisy)}});
+  ActionStatistics asked = noisy;
+  asked.mean[7] = 0;
+  EXPECT_NO_THROW(trained.CheckStatistics(asked, "suite"));
+  asked.mean[7] = 1e-6;
+  EXPECT_THAT([&] { trained.CheckStatistics(asked, "suite"); },
+              ThrowsMessage<Error>(HasSubstr("mean of right y: found 1e-06, wanted 5.5572e-20")));
+}
+
 TEST(TrainedFor, MetadataThatMakeNoSenseAreRefusedByName) {
   for (const char* period : {"fast", "0", "-1", "nan", "0.1s"}) {
     EXPECT_THAT([&] { TrainedFor::Of("w.safetensors", {{"period_s", period}}); },

@@ -17,8 +17,12 @@ void Require(bool holds, const std::string& name, std::int64_t found, const std:
   if (!holds) throw TensorError(name + " is " + std::to_string(found) + ", wanted " + wanted);
 }
 
+void RequireSize(const std::string& name, std::int64_t size) {
+  Require(size > 0 && size < (1 << 20), name, size, "a number from 1 to 2^20");
+}
+
 void RequirePositive(std::initializer_list<std::pair<const char*, std::int64_t>> sizes) {
-  for (const auto& [name, size] : sizes) Require(size > 0 && size < (1 << 20), name, size, "a number from 1 to 2^20");
+  for (const auto& [name, size] : sizes) RequireSize(name, size);
 }
 
 void CheckLevels(const char* name, const std::vector<std::int64_t>& multipliers) {
@@ -45,22 +49,27 @@ void CheckUNet(const UNetConfig& unet) {
             unet.num_head_channels, "a divisor of every level's width");
 }
 
+/// @param name  of the page's section
 void CheckResampler(const std::string& name, const ResamplerConfig& resampler, std::int64_t context_dim) {
-  for (const std::int64_t size : {resampler.embedding_dim, resampler.queries, resampler.dim, resampler.depth,
-                                  resampler.dim_head, resampler.heads, resampler.ff_mult})
-    Require(size > 0 && size < (1 << 20), name, size, "positive sizes");
+  const std::pair<const char*, std::int64_t> sizes[] = {
+      {"embedding_dim", resampler.embedding_dim}, {"queries", resampler.queries},   {"dim", resampler.dim},
+      {"depth", resampler.depth},                 {"dim_head", resampler.dim_head}, {"heads", resampler.heads},
+      {"ff_mult", resampler.ff_mult}};
+  for (const auto& [field, size] : sizes) RequireSize(name + "." + field, size);
   Require(resampler.output_dim == context_dim, name + ".output_dim", resampler.output_dim,
           "unet.context_dim = " + std::to_string(context_dim));
 }
 
 void CheckEncoder(const ImageEncoderConfig& clip) {
-  RequirePositive({{"clip.width", clip.width},
-                   {"clip.layers", clip.layers},
-                   {"clip.head_width", clip.head_width},
-                   {"clip.patch", clip.patch_px},
-                   {"clip.image", clip.image_px}});
-  Require(clip.width % clip.head_width == 0, "clip.head_width", clip.head_width, "a divisor of clip.width");
-  Require(clip.image_px % clip.patch_px == 0, "clip.image", clip.image_px, "a multiple of clip.patch");
+  RequirePositive({{"image_encoder.width", clip.width},
+                   {"image_encoder.layers", clip.layers},
+                   {"image_encoder.head_width", clip.head_width},
+                   {"image_encoder.patch_px", clip.patch_px},
+                   {"image_encoder.image_px", clip.image_px}});
+  Require(clip.width % clip.head_width == 0, "image_encoder.head_width", clip.head_width,
+          "a divisor of image_encoder.width = " + std::to_string(clip.width));
+  Require(clip.image_px % clip.patch_px == 0, "image_encoder.image_px", clip.image_px,
+          "a multiple of image_encoder.patch_px = " + std::to_string(clip.patch_px));
 }
 
 std::string Number(double value) {
@@ -86,6 +95,18 @@ void CheckFactors(const ModelConfig& config) {
   Require(config.schedule.steps <= kMostSteps, "schedule.steps", config.schedule.steps, "at most a million");
   Require(config.schedule.turning_step >= 1 && config.schedule.turning_step <= kMostSteps, "schedule.turning_step",
           config.schedule.turning_step, "1 … a million");
+}
+
+/// A page in millimetres would draw its marks beside every picture. Arms are never 5 m from their base (ReadRecording).
+void CheckMetres(const ModelConfig& config) {
+  const auto check = [](const char* name, double found, double most) {
+    if (!(std::fabs(found) <= most))
+      throw TensorError(std::string(name) + ": found " + Number(found) + ", wanted metres, -" + Number(most) + " … " +
+                        Number(most));
+  };
+  check("pose_map.tool_length_m", config.pose_map.tool_length_m, 5);
+  check("pose_map.drop_line_m", config.pose_map.drop_line_m.value_or(0), 10);
+  check("schedule.carry_plane_m", config.schedule.carry_plane_m.value_or(0), 10);
 }
 
 /// Rays are told from the corners of the latent: one place high or wide, it has none.
@@ -157,12 +178,12 @@ void ModelConfig::Check() const {
                    {"schedule.steps", schedule.steps}});
   Require(vae.channels % kGroups == 0, "vae.channels", vae.channels, "a multiple of 32");
   CheckEncoder(image_encoder);
-  CheckResampler("action resampler", action_resampler, unet.context_dim);
-  CheckResampler("image resampler", image_resampler, unet.context_dim);
-  Require(image_resampler.embedding_dim == image_encoder.width, "image resampler embedding_dim",
-          image_resampler.embedding_dim, "clip.width = " + std::to_string(image_encoder.width));
+  CheckResampler("action_resampler", action_resampler, unet.context_dim);
+  CheckResampler("image_resampler", image_resampler, unet.context_dim);
+  Require(image_resampler.embedding_dim == image_encoder.width, "image_resampler.embedding_dim",
+          image_resampler.embedding_dim, "image_encoder.width = " + std::to_string(image_encoder.width));
   Require(action_resampler.embedding_dim >= 14 && action_resampler.embedding_dim % 2 == 0,
-          "action resampler embedding_dim", action_resampler.embedding_dim, "14, or more by an even number");
+          "action_resampler.embedding_dim", action_resampler.embedding_dim, "14, or more by an even number");
   const std::int64_t carried = (schedule.carry_plane_m ? 1 : 0) + (schedule.carry_first ? 1 : 0),
                      inputs = 3 * vae.z_channels + 7 + carried * (vae.z_channels + 1) + (object_forecast ? 1 : 0);
   Require(unet.in_channels == inputs, "unet.in_channels", unet.in_channels,
@@ -175,6 +196,7 @@ void ModelConfig::Check() const {
             "a multiple of " + std::to_string(ObjectForecast::kCell_px) + " with object_forecast");
   CheckFactors(*this);
   CheckSchedule(schedule, memory, views);
+  CheckMetres(*this);
   if (!(pose_map.lag_frames >= 0 && pose_map.lag_frames <= 1))
     throw TensorError("pose_map.lag_frames: found " + Number(pose_map.lag_frames) + ", wanted 0 … 1");
   Require(unet.hand_views == 0 || unet.hand_views == views, "unet.hand_views", unet.hand_views,

@@ -84,7 +84,7 @@ struct ScheduleConfig {
   bool from_last_frame = false;
   /// With from_last_frame: where a camera moves, "nothing changes" is the newest memory frame carried to where the
   /// camera will be, as if all it shows lay in the plane z = this many metres of the base frame (carried_frame.h). The
-  /// network is shown that too: z + 1 channels more. Not in the paper.
+  /// network is shown that too: z + 1 channels more. -10 … 10. Not in the paper.
   std::optional<double> carry_plane_m;
   /// How many memory frames are carried, 1 … ModelConfig::memory: what the newest does not show is looked for in the one
   /// before it, and so on. Of such places `seen` is one half.
@@ -113,10 +113,10 @@ struct PoseMapConfig {
   bool scaled =
       false;  ///< radius and thickness in parts of the picture's height: 50 and 8 of 320. Published: in pixels
   /// Height in metres, base frame, to which a line is drawn straight down from each gripper: which point of the table
-  /// it is above, which one camera alone does not show. Not in the paper.
+  /// it is above, which one camera alone does not show. -10 … 10. Not in the paper.
   std::optional<double> drop_line_m;
   /// From the recorded pose to where the fingers meet, along the tool axis: what the disc is drawn at. AgiBot records
-  /// the flange; 0 for robots whose poses are the fingertips'.
+  /// the flange; 0 for robots whose poses are the fingertips'. -5 … 5.
   double tool_length_m = 0.23;
   /// Arms that are told where to be follow late: a picture shows them where they were told to be this share of a frame
   /// before, 0 … 1. Maps and the cameras that move with a gripper are drawn so. Not in the paper, whose arms are

@@ -1,6 +1,7 @@
 #include <algorithm>
 #include <map>
 
+#include "worldmodel/nn/number_text.h"
 #include "worldmodel/nn/weights.h"
 
 namespace evac::nn {
@@ -30,6 +31,17 @@ Plan MakePlan(const ModelConfig& config, const SaveOptions& options) {
 
 }  // namespace
 
+Tensor InType(const std::string& name, const Tensor& tensor, at::ScalarType type) {
+  const Tensor written = tensor.to(type);
+  const bool is_narrower = type == at::kHalf || tensor.scalar_type() == at::kDouble;  // bf16 goes as far as f32
+  if (!is_narrower || written.is_same(tensor)) return written;
+  const Tensor lost = tensor.masked_select(written.isinf().logical_and(tensor.isfinite()));
+  if (lost.numel() == 0) return written;
+  throw TensorError(name + " holds " + TextOfNumber(lost[0].item<double>()) + ", which is infinite in " +
+                    Name(ViewOf(name, at::empty({0}, type)).type) +
+                    ": wanted a type that reaches further, as BF16 and F32 do");
+}
+
 void SaveWeights(const std::filesystem::path& path, ParameterSource& source, const ModelConfig& config,
                  const SaveOptions& options) {
   const Plan plan = MakePlan(config, options);
@@ -43,7 +55,7 @@ void SaveWeights(const std::filesystem::path& path, ParameterSource& source, con
     }
     const Tensor given = source.Take(key, shape);
     CheckShape(key, given, shape);
-    const Tensor written = given.to(given.options().dtype(options.dtype).device(at::kCPU)).contiguous();
+    const Tensor written = InType(path.string() + ": " + key, given.to(at::kCPU), options.dtype).contiguous();
     const TensorView view = ViewOf(key, written);
     writer.Append(view.bytes);
     LetGo(given);

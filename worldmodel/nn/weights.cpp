@@ -109,7 +109,7 @@ Tensor FileWeights::Take(const std::string& key, at::IntArrayRef shape) {
   if (is_unread && (!options_.with_unread || !Has(key))) return {};
   const Tensor mapped = tensors_.Get(key);
   if (!is_unread) CheckShape(file().name() + ": " + key, mapped, shape);
-  const Tensor tensor = mapped.to(mapped.options().dtype(options_.dtype).device(options_.device));
+  const Tensor tensor = InType(file().name() + ": " + key, mapped, options_.dtype).to(options_.device);
   if (!tensor.is_same(mapped)) LetGo(mapped);
   return tensor;
 }

@@ -55,6 +55,7 @@ class FileWeights final : public ParameterSource {
   FileWeights(const std::filesystem::path& path, const ModelConfig& config, const LoadOptions& options = {});
 
   /// Undefined for a key that nothing reads, unless asked for with `with_unread`.
+  /// @throws TensorError for another shape, and as InType
   Tensor Take(const std::string& key, at::IntArrayRef shape) override;
   std::optional<at::ScalarType> ProductType() const override { return options_.products; }
   bool Has(const std::string& key) const { return tensors_.file().Has(key); }
@@ -90,6 +91,11 @@ class RandomWeights final : public ParameterSource {
   LastLayers last_;
 };
 
+/// The same numbers in another type.
+/// @param name  for the message: "FILE: KEY"
+/// @throws TensorError with the number, if one becomes infinite: f16 ends at 65504
+Tensor InType(const std::string& name, const Tensor& tensor, at::ScalarType type);
+
 struct SaveOptions {
   at::ScalarType dtype = at::kFloat;  ///< of every parameter; the schedule stays float
   TensorMetadata metadata = {{"format", "pt"}};
@@ -100,6 +106,7 @@ struct SaveOptions {
 /// Writes a checkpoint in the published order, one tensor in memory at a time: the file is there whole or not at all.
 /// The same parameters give the same bytes.
 /// @param source  is asked for every key of CheckpointKeys in order, but for the schedule, which is the configuration's
+/// @throws TensorError as InType and as TensorFileWriter; there is no file then
 void SaveWeights(const std::filesystem::path& path, ParameterSource& source, const ModelConfig& config,
                  const SaveOptions& options = {});
 

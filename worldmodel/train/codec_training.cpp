@@ -26,7 +26,7 @@ Tensor DiscWeight(const Tensor& middle_px, const Tensor& like, double radius_px,
 
 void CheckOptions(const CodecTrainingOptions& o) {
   constexpr const char* kTraining = "codec training";
-  if (o.batch < 1) throw TensorError("codec training: batch is " + std::to_string(o.batch) + ", wanted at least 1");
+  if (o.batch < 1) RefuseOption(kTraining, {"batch", static_cast<double>(o.batch)}, "at least 1");
   RequireShares(kTraining, {{"map_share", o.map_share}, {"contact_share", o.contact_share}});
   RequireWeights(kTraining, {{"squared_weight", o.squared_weight},
                              {"kl_weight", o.kl_weight},

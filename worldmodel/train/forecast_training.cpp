@@ -55,14 +55,13 @@ Tensor OfEnds(const nn::ObjectForecast::Answer& answer, const Tensor& place, con
 }
 
 void Check(const ForecastTrainingOptions& o) {
-  if (o.batch < 1 || o.frames < 1)
-    throw TensorError("forecast training: batch " + std::to_string(o.batch) + ", frames " + std::to_string(o.frames) +
-                      ", wanted at least 1 of each");
-  if (!(o.failure_weight >= 1))
-    throw TensorError("forecast training: failure_weight is " + std::to_string(o.failure_weight) + ", wanted at least 1");
-  if (!(o.drop >= 0 && o.drop < 1))
-    throw TensorError("forecast training: drop is " + std::to_string(o.drop) + ", wanted 0 or more and below 1");
   constexpr const char* kTraining = "forecast training";
+  for (const NamedNumber& count : {NamedNumber{"batch", static_cast<double>(o.batch)},
+                                   NamedNumber{"frames", static_cast<double>(o.frames)},
+                                   NamedNumber{"failure_weight", o.failure_weight}}) {
+    if (!(count.value >= 1)) RefuseOption(kTraining, count, "at least 1");
+  }
+  if (!(o.drop >= 0 && o.drop < 1)) RefuseOption(kTraining, {"drop", o.drop}, "0 or more and below 1");
   RequireShares(kTraining, {{"variant_share", o.variant_share}, {"late_start", o.late_start}});
   RequireWeights(kTraining, {{"picture_gain", o.picture_gain},
                              {"picture_noise", o.picture_noise},

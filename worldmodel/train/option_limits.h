@@ -4,6 +4,7 @@
 #include <cstdio>
 #include <initializer_list>
 #include <string>
+#include <utility>
 
 #include "worldmodel/nn/tensor.h"
 
@@ -11,17 +12,30 @@
 /// and hours later nobody sees it. What is no number is refused too.
 namespace evac::train {
 
+/// An option of a training that is out of range, by name: whoever read it from a page knows where it stands there.
+class OptionError : public TensorError {
+ public:
+  /// @param training  whose option it is, e.g. "world training"
+  /// @param found     "is 4, wanted 0 to 1"
+  OptionError(const std::string& training, std::string option, const std::string& found)
+      : TensorError(training + ": " + option + " " + found), option_(std::move(option)) {}
+  const std::string& option() const { return option_; }
+
+ private:
+  std::string option_;
+};
+
 struct NamedNumber {
   const char* name;
   double value;
 };
 
 /// @param training  whose options they are, e.g. "world training"
-/// @throws TensorError naming it, the option, what was found and what was wanted; as all of these do
+/// @throws OptionError naming it, the option, what was found and what was wanted; as all of these do
 [[noreturn]] inline void RefuseOption(const char* training, const NamedNumber& option, const char* wanted) {
   char found[32];
   std::snprintf(found, sizeof found, "%g", option.value);
-  throw TensorError(std::string(training) + ": " + option.name + " is " + found + ", wanted " + wanted);
+  throw OptionError(training, option.name, std::string("is ") + found + ", wanted " + wanted);
 }
 
 /// Parts of a whole: 0 to 1.

@@ -8,9 +8,12 @@
 #include <utility>
 
 #include "worldmodel/nn/number_text.h"
+#include "worldmodel/train/option_limits.h"
 
 namespace evac::train {
 namespace {
+
+constexpr const char* kTraining = "world training";
 
 void Add(Settings& settings, const Settings& more) { settings.insert(settings.end(), more.begin(), more.end()); }
 
@@ -28,7 +31,7 @@ std::vector<double> Numbers(const std::string& text) {
     char* end = nullptr;
     const double number = std::strtod(word.c_str(), &end);
     if (word.empty() || *end != '\0' || !(number > 0) || !std::isfinite(number))
-      throw TensorError("view_weights is '" + text + "', wanted numbers above 0 with commas between");
+      throw OptionError(kTraining, "view_weights", "is '" + text + "', wanted numbers above 0 with commas between");
     numbers.push_back(number);
   }
   return numbers;
@@ -170,10 +173,10 @@ Settings SettingsOf(WorldOptions& options) {
 void WorldOptions::Resolve() {
   world.view_weights = Numbers(view_weights);
   if (memory_noise_kind != "published" && memory_noise_kind != "uniform")
-    throw TensorError("memory_noise_kind is '" + memory_noise_kind + "', wanted published or uniform");
+    throw OptionError(kTraining, "memory_noise_kind", "is '" + memory_noise_kind + "', wanted published or uniform");
   world.memory_noise_kind = memory_noise_kind == "uniform" ? MemoryNoise::kUniform : MemoryNoise::kPublished;
   if (step_weight != "velocity" && step_weight != "min_snr" && step_weight != "clean")
-    throw TensorError("step_weight is '" + step_weight + "', wanted velocity, min_snr or clean");
+    throw OptionError(kTraining, "step_weight", "is '" + step_weight + "', wanted velocity, min_snr or clean");
   world.step_weight = step_weight == "min_snr" ? StepWeight::kMinSnr
                       : step_weight == "clean" ? StepWeight::kClean
                                                : StepWeight::kVelocity;

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "worldmodel/nn/weights.h"
+#include "worldmodel/train/option_limits.h"
 #include "worldmodel/train/weight_files.h"
 
 namespace evac::train {
@@ -18,18 +19,13 @@ std::string Decibel(double value) {
   return text;
 }
 
-void CheckSizes(const ShardSet& shards, const nn::ModelConfig& config) {
-  nn::CheckShape("the shards' pictures", shards.shards().front().frames,
-                 {-1, config.views, config.image_height_px, config.image_width_px, 3});
-}
-
 /// Those to learn from and the hold-out, which fit one another and the page; after the options.
 std::pair<ShardSet, ShardSet> OpenChecked(const JobPlace& place, const CodecOptions& options) {
   CheckHoldoutSize(options.job);
   CheckOptions(options.job.trainer);
   CheckOptions(options.codec);
   std::pair both(ShardSet(place.shards, Split::kTrain), ShardSet(EachOnce(place.shards), Split::kHoldout));
-  CheckSizes(both.first, place.config);
+  CheckPictures(both.first, place.config);
   both.first.CheckLike(both.second);
   return both;
 }
@@ -76,9 +72,21 @@ std::string IdentityOf(const JobPlace& place, const JobOptions& options) {
   return text + place.begun_with;
 }
 
+void CheckPictures(const ShardSet& shards, const nn::ModelConfig& config) {
+  const auto sizes = [](std::int64_t views, std::int64_t height_px, std::int64_t width_px) {
+    return "views: " + std::to_string(views) + ", image_height_px: " + std::to_string(height_px) +
+           ", image_width_px: " + std::to_string(width_px);
+  };
+  const std::string found = sizes(shards.views(), shards.height_px(), shards.width_px()),
+                    wanted = sizes(config.views, config.image_height_px, config.image_width_px);
+  if (found != wanted)
+    throw TensorError(shards.FolderNames() + ": its pictures have " + found + "; the page of sizes wants " + wanted +
+                      ": another page, or pack again with this one");
+}
+
 void CheckHoldoutSize(const JobOptions& options) {
   if (options.holdout_size < 1)
-    throw TensorError("training: holdout_size is " + std::to_string(options.holdout_size) + ", wanted at least 1");
+    RefuseOption("training", {"holdout_size", static_cast<double>(options.holdout_size)}, "at least 1");
 }
 
 void CheckCodecTraining(const JobPlace& place, const CodecOptions& options, const std::filesystem::path& init) {

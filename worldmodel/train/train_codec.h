@@ -26,6 +26,8 @@ std::int64_t Workers(const JobPlace& place, const JobOptions& options);
 /// What of a place decides the numbers of each step: its threads on a CPU, else the kind of device ("cuda" of "cuda:1"),
 /// and what it was begun with.
 std::string IdentityOf(const JobPlace& place, const JobOptions& options);
+/// @throws TensorError if the shards' pictures are of other sizes than the page's or of more or fewer views, with both
+void CheckPictures(const ShardSet& shards, const nn::ModelConfig& config);
 /// @throws TensorError if the shards' pose maps were drawn in another way than the page says, with both
 void CheckPoseMaps(const ShardSet& shards, const nn::ModelConfig& config);
 /// @throws TensorError if a hold-out of no picture or window is wanted

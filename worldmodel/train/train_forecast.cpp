@@ -39,8 +39,7 @@ TrainerSummary TrainForecast(const JobPlace& place, const ForecastOptions& given
   ShardSet shards(place.shards, Split::kTrain);
   shards.OpenVariants();
   const ShardSet holdout(EachOnce(place.shards), Split::kHoldout);
-  nn::CheckShape("the shards' pictures", shards.shards().front().frames,
-                 {-1, place.config.views, place.config.image_height_px, place.config.image_width_px, 3});
+  CheckPictures(shards, place.config);
   CheckPoseMaps(shards, place.config);  // with them the page says how long the tool is
   shards.CheckLike(holdout);
   nn::RandomWeights random(options.job.trainer.seed);

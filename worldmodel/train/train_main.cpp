@@ -212,14 +212,16 @@ int Train(const Arguments& arguments) {
   const JobPlace place{arguments.shards, arguments.out, job.config, threads, [] { return g_interrupted != 0; },
                        ShowNowAndThen, [](const std::string& sentence) { std::fprintf(stderr, "%s\n", sentence.c_str()); },
                        job.begun_with, arguments.device};
+  job.start.codec = arguments.codec;
+  job.start.init = arguments.init;
+  job.start.forecast = arguments.forecast;
+  if (is_codec) CheckCodecTraining(place, job.codec, arguments.init);  // before OUT is made
+  else CheckWorldTraining(place, job.world, job.start);
   const Hold hold(arguments.out);
   KeepWhoBegan(arguments.out);
   CatchInterrupts();
   nn::KeepFreedMemory();
   const nn::LibraryThreads library(Workers(place, job.options()) > 1 ? 1 : threads);
-  job.start.codec = arguments.codec;
-  job.start.init = arguments.init;
-  job.start.forecast = arguments.forecast;
   const auto look = [&](std::int64_t step, const Strips& strips) { WriteStrips(arguments.out, step, strips); };
   const TrainerSummary summary =
       is_codec ? TrainCodec(place, job.codec, arguments.init) : TrainWorld(place, job.world, job.start, look);
@@ -237,6 +239,9 @@ int Train(const Arguments& arguments) {
 }  // namespace
 
 int main(int count, char** words) {
+  for (const int stream : {STDIN_FILENO, STDOUT_FILENO, STDERR_FILENO}) {  // else a file gets the number of one that is closed
+    if (::fcntl(stream, F_GETFD) < 0) (void)!::open("/dev/null", O_RDWR);
+  }
   if (nn::TellOpenBlasTheProcessor()) ::execv("/proc/self/exe", words);  // it was loaded already; without, slower
   const std::vector<std::string> given(words + 1, words + count);
   if (given.size() == 1 && (given[0] == "--help" || given[0] == "-h")) {

@@ -7,6 +7,7 @@
 
 #include "worldmodel/nn/weight_keys.h"
 #include "worldmodel/nn/weights.h"
+#include "worldmodel/train/option_limits.h"
 #include "worldmodel/train/weight_files.h"
 
 namespace evac::train {
@@ -97,8 +98,7 @@ void Save(const std::filesystem::path& path, const TrainableWeights& weights, co
 }
 
 void CheckShards(const ShardSet& shards, const nn::ModelConfig& config, const WorldStart& start) {
-  nn::CheckShape("the shards' pictures", shards.shards().front().frames,
-                 {-1, config.views, config.image_height_px, config.image_width_px, 3});
+  CheckPictures(shards, config);
   CheckPoseMaps(shards, config);
   if (!start.codec_sha256.empty() && shards.codec() != start.codec_sha256)
     throw TensorError(start.codec.string() + " did not make the shards' latents (they are of codec " + shards.codec() +
@@ -119,15 +119,17 @@ void CheckHoldout(const ShardSet& holdout, const ShardSet& shards) {
 void CheckViewWeights(const WorldTrainingOptions& options, const nn::ModelConfig& config) {
   const std::vector<double>& weights = options.view_weights;
   if (!weights.empty() && weights.size() != static_cast<std::size_t>(config.views))
-    throw TensorError("view_weights has " + std::to_string(weights.size()) + " numbers, wanted " +
-                      std::to_string(config.views) + ": one per view");
+    throw OptionError("world training", "view_weights",
+                      "has " + std::to_string(weights.size()) + " numbers, wanted " + std::to_string(config.views) +
+                          ": one per view, as `views` of the page of sizes says");
 }
 
 /// Strips are drawn at the first hold-out, hours after a number that no sampler takes was given.
 void CheckStripSteps(const WorldOptions& options, const nn::ModelConfig& config) {
   if (options.strip_steps < 2 || options.strip_steps > config.schedule.steps)
-    throw TensorError("training: strip_steps is " + std::to_string(options.strip_steps) + ", wanted 2 to " +
-                      std::to_string(config.schedule.steps) + ", the steps of the page's schedule");
+    throw OptionError("training", "strip_steps",
+                      "is " + std::to_string(options.strip_steps) + ", wanted 2 to " +
+                          std::to_string(config.schedule.steps) + ", the steps of the page's schedule");
 }
 
 /// @returns the options as they are meant

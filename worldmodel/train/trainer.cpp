@@ -15,6 +15,7 @@
 #include "worldmodel/nn/threads.h"
 #include "worldmodel/train/csv_log.h"
 #include "worldmodel/train/curves.h"
+#include "worldmodel/train/option_limits.h"
 
 namespace evac::train {
 namespace {
@@ -27,7 +28,7 @@ constexpr const char* kHoldouts = "step,holdout";
 constexpr std::int64_t kUnplanned = std::int64_t{1} << 40;  ///< steps, so many that those done are no part of them
 
 void Require(bool holds, const char* name, double found, const char* wanted) {
-  if (!holds) throw TensorError(std::string("training: ") + name + " is " + std::to_string(found) + ", wanted " + wanted);
+  if (!holds) throw OptionError("training", name, "is " + std::to_string(found) + ", wanted " + wanted);
 }
 
 void CheckMeasuring(const TrainerOptions& o) {
@@ -50,7 +51,7 @@ void CheckOptions(const TrainerOptions& o) {
   Require(o.adamw.beta1 >= 0 && o.adamw.beta1 < 1, "beta1", o.adamw.beta1, "0 to below 1");
   Require(o.momentum >= 0 && o.momentum < 1, "momentum", o.momentum, "0 to below 1");
   if (o.optimiser != "adamw" && o.optimiser != "muon")
-    throw TensorError("training: optimiser is '" + o.optimiser + "', wanted adamw or muon");
+    throw OptionError("training", "optimiser", "is '" + o.optimiser + "', wanted adamw or muon");
   Require(o.adamw.beta2 >= 0 && o.adamw.beta2 < 1, "beta2", o.adamw.beta2, "0 to below 1");
   Require(o.adamw.epsilon > 0, "epsilon", o.adamw.epsilon, "a number above 0");
   Require(o.adamw.weight_decay >= 0, "weight_decay", o.adamw.weight_decay, "at least 0");

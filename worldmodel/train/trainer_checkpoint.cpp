@@ -5,6 +5,7 @@
 
 #include "worldmodel/nn/mapped_tensors.h"
 #include "worldmodel/nn/number_text.h"
+#include "worldmodel/train/identity_text.h"
 #include "worldmodel/train/trainer.h"
 
 namespace evac::train {
@@ -77,7 +78,7 @@ void CopyFrom(const nn::MappedTensors& file, const char* name, const Tensor& to)
 }  // namespace
 
 /// What must be the same for two processes to work on one training. How long it goes on and how often it is looked at
-/// may change from one to the next.
+/// may change from one to the next. WhatDiffers reads it.
 std::string Trainer::Identity() const {
   const TrainerOptions& o = options_;
   std::string text;
@@ -100,8 +101,8 @@ bool Trainer::Load() {
   if (metadata.Text("layout") != parameters_.Layout())
     throw TensorError(path.string() + " is a training of other parameters: another folder, or throw it away" + kTables);
   if (metadata.Text("identity") != Identity())
-    throw TensorError(path.string() + " is a training with other options (" + metadata.Text("identity") +
-                      "; wanted: " + Identity() + "): another folder, or throw it away" + kTables);
+    throw TensorError(path.string() + " is a training with other options: " +
+                      WhatDiffers(metadata.Text("identity"), Identity()) + ": another folder, or throw it away" + kTables);
   CopyFrom(file, "values", state_.values);
   CopyFrom(file, "first_moment", state_.first_moment);
   CopyFrom(file, "second_moment", state_.second_moment);

@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "worldmodel/nn/hand_turns.h"
+#include "worldmodel/train/option_limits.h"
 
 namespace evac::train {
 namespace {
@@ -48,7 +49,7 @@ WindowSampler::WindowSampler(const ShardSet& shards, const WindowOptions& option
     throw TensorError("windows: memory " + std::to_string(options.memory) + ", chunk " + std::to_string(options.chunk) +
                       ", history " + std::to_string(options.history) + ", wanted 1 <= memory <= history, 1 <= chunk");
   if (!(options.failure_weight > 0))
-    throw TensorError("windows: failure_weight " + std::to_string(options.failure_weight) + ", wanted above 0");
+    RefuseOption("windows", {"failure_weight", options.failure_weight}, "above 0");
   for (const Clip& clip : shards.clips()) {
     if (!options.successes_only || clip.outcome == 1) AddClip(shards, clip);
   }

@@ -19,8 +19,9 @@ enum Stream : std::uint32_t { kWindows = 1, kSteps, kDropouts, kNoise, kSelf, kM
 constexpr std::int64_t kMeasureSteps[] = {999, 700, 400, 150};  ///< of 1000: how the hold-out is noised, in turn
 constexpr std::int64_t kMeasureBatch = 8;
 
+constexpr const char* kTraining = "world training";
+
 void CheckRanges(const WorldTrainingOptions& o) {
-  constexpr const char* kTraining = "world training";
   RequireShares(kTraining, {{"rollout_share", o.windows.rollout_share},
                             {"contact_share", o.windows.contact_share},
                             {"closing_share", o.windows.closing_share},
@@ -41,22 +42,21 @@ void CheckRanges(const WorldTrainingOptions& o) {
 }  // namespace
 
 void CheckOptions(const WorldTrainingOptions& o, const nn::ModelConfig& config) {
-  if (o.batch < 1) throw TensorError("world training: batch is " + std::to_string(o.batch) + ", wanted at least 1");
+  if (o.batch < 1) RefuseOption(kTraining, {"batch", static_cast<double>(o.batch)}, "at least 1");
   if (o.windows.chunk != config.chunk || o.windows.memory != config.memory)
     throw TensorError("world training: windows of " + std::to_string(o.windows.memory) + " + " +
                       std::to_string(o.windows.chunk) + " frames, the model has " + std::to_string(config.memory) +
                       " + " + std::to_string(config.chunk));
   if (config.unet.hand_views > 0 && !o.windows.first_image)
-    throw TensorError("world training: first_image is false, wanted true: unet.hand_views reads the oldest memory");
+    throw OptionError(kTraining, "first_image", "is false, wanted true: unet.hand_views reads the oldest memory");
   if (config.object_forecast && !o.windows.first_image)
-    throw TensorError("world training: first_image is false, wanted true: object_forecast reads the oldest memory");
+    throw OptionError(kTraining, "first_image", "is false, wanted true: object_forecast reads the oldest memory");
   if (o.self_memory_chunks < 1)
-    throw TensorError("world training: self_memory_chunks is " + std::to_string(o.self_memory_chunks) +
-                      ", wanted at least 1");
+    RefuseOption(kTraining, {"self_memory_chunks", static_cast<double>(o.self_memory_chunks)}, "at least 1");
   CheckRanges(o);
   if (o.log_uniform && !(o.ratio_from > 0 && o.ratio_to > o.ratio_from))
-    throw TensorError("world training: noise / signal from " + std::to_string(o.ratio_from) + " to " +
-                      std::to_string(o.ratio_to) + ", wanted 0 < from < to");
+    throw OptionError(kTraining, "ratio_from", "is " + std::to_string(o.ratio_from) + ", ratio_to " +
+                                                   std::to_string(o.ratio_to) + ", wanted 0 < ratio_from < ratio_to");
 }
 
 bool IsTrained(const std::string& key, const WorldTrainingOptions& options) {
