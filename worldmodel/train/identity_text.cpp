@@ -92,7 +92,7 @@ std::string WhatDiffers(const std::string& there, const std::string& here) {
     const std::string was = said(before, name), is = said(now, name);
     if (was != is) text += (text.empty() ? "" : "; ") + name + " is " + was + " there, " + is + " here";
   }
-  return text.empty() ? "the same, as another version writes them" : text;
+  return text;
 }
 
 }  // namespace evac::train

@@ -100,9 +100,12 @@ bool Trainer::Load() {
     throw TensorError(path.string() + ": format '" + metadata.Text("format") + "', wanted '" + kFormat + "'");
   if (metadata.Text("layout") != parameters_.Layout())
     throw TensorError(path.string() + " is a training of other parameters: another folder, or throw it away" + kTables);
-  if (metadata.Text("identity") != Identity())
+  if (metadata.Text("identity") != Identity()) {
+    const std::string named = WhatDiffers(metadata.Text("identity"), Identity());
     throw TensorError(path.string() + " is a training with other options: " +
-                      WhatDiffers(metadata.Text("identity"), Identity()) + ": another folder, or throw it away" + kTables);
+                      (named.empty() ? "as another version of evac says them" : named) +
+                      ": another folder, or throw it away" + kTables);
+  }
   CopyFrom(file, "values", state_.values);
   CopyFrom(file, "first_moment", state_.first_moment);
   CopyFrom(file, "second_moment", state_.second_moment);
